@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ddenv import processor
-from ddenv.engine.baseline import fix_failure
+from ddenv.engine.judging import fix_failure
 from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.state import Test
+from ddenv.runs import processor
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from long_run import ROBOT_SDF, world_of, write
 
+from ddenv import __version__
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
@@ -39,7 +40,6 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
 from ddenv.runs.subject import read_parts, with_options
-from ddenv.version import __version__
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario

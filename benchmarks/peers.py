@@ -41,7 +41,7 @@ from ddenv.runfile.state import CERTIFY
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import with_options
 from ddenv.study.plan import PAIRS
-from ddenv.words import first_of
+from ddenv.text import first_of
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 

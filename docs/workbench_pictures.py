@@ -131,7 +131,7 @@ def main() -> None:
         os.environ.pop(name, None)
     time.tzset()
     try:
-        with patch("socket.gethostname", lambda: "robot"), patch("ddenv.processor.usable_cores", lambda: 2):
+        with patch("socket.gethostname", lambda: "robot"), patch("ddenv.runs.processor.usable_cores", lambda: 2):
             asyncio.run(make_all())
     finally:
         for run in (HOME / "runs").glob("*.ddenv"):

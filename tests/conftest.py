@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from ddenv import processor
+from ddenv.runs import processor
 from tests.tiers import SLOW
 
 settings.load_profile("quick")

@@ -13,7 +13,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
 from ddenv.text import printable
-from ddenv.words import headline
+from ddenv.words.news import headline
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import Config
 from ddenv.workbench.lines.line_mode import LineMode

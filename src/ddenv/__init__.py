@@ -6,12 +6,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.version import __version__
 
 if TYPE_CHECKING:
     from ddenv.reduction.evidence import Traits
     from ddenv.reduction.reduce import Reduction, reduce
     from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
+
+__version__ = "0.1.0"
 
 __all__ = ["Reading", "Reduction", "Setup", "Traits", "Twist", "UserError", "WheelSpeeds", "__version__", "reduce"]
 

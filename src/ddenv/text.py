@@ -1,8 +1,10 @@
-"""Text for a terminal or a page: what is safe to print, how wide it is, and as much of it as fits."""
+"""Text for people: numbers as they are worded, what is safe to print, how wide it is, and as much of it as fits."""
 
 from __future__ import annotations
 
+import math
 import unicodedata
+from collections.abc import Sequence
 
 
 def printable(text: str) -> str:
@@ -48,3 +50,55 @@ def truncated(line: str, columns: int) -> str:
 def padded(text: str, columns: int) -> str:
     """`text` filled with spaces to `columns`."""
     return text + " " * (columns - width(text))
+
+
+def count(number: int, word: str) -> str:
+    """1 model, 2 models."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def first_of(names: Sequence[str], most: int) -> str:
+    """a, b and 3 more: at most `most` of them by name."""
+    left = len(names) - most
+    return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
+
+
+def duration(seconds: float) -> str:
+    """`seconds` as 7 s, 1 min 40 s or 2 h 05 min."""
+    whole = max(0, round(seconds)) if math.isfinite(seconds) else 0
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
+
+
+def rounded(number: float) -> int:
+    """An estimate as it is said: no more exact than to a tenth, and only up to 10 to a single one; 1 at least."""
+    if not 10 <= number < math.inf:
+        return max(1, round(number)) if math.isfinite(number) else 1
+    digits: int = 10 ** math.floor(math.log10(number))
+    step = digits // 2 if number < 5 * digits else digits
+    return step * round(number / step)
+
+
+def between(low: float, high: float) -> str:
+    """An estimate's range as it is said: "50 to 1,000"."""
+    return f"{rounded(low):,} to {rounded(high):,}"
+
+
+def about(low: float, middle: float, high: float) -> str:
+    """A time in s with its interval, rounded to its uncertainty: 2 min (1 to 5)."""
+    unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
+    interval = f" ({between(low / unit, high / unit)})" if rounded(low / unit) < rounded(high / unit) else ""
+    return f"{rounded(middle / unit):,} {name}{interval}"
+
+
+def percent(part: float) -> str:
+    """A fraction as a whole percentage that is never rounded to certainty."""
+    value = round(100 * part)
+    if value == 0 and part > 0:
+        return "<1 %"
+    if value == 100 and part < 1:
+        return ">99 %"
+    return f"{value} %"

@@ -69,7 +69,18 @@ def test_a_test_for_pytest_fails_as_long_as_the_robot_fails(reduced, tmp_path):
     done = ddenv("export", reduced[0], "--pytest", tmp_path, cwd=tmp_path)
     assert done.stdout.splitlines() == [f"wrote {tmp_path / 'test_run.py'}", f"wrote {tmp_path / 'run.ddenv'}"]
     test = tmp_path / "test_run.py"
-    pytest_ = [sys.executable, "-m", "pytest", "-p", "no:ddenv", "-p", "ddenv.pytest_plugin", "-c", "/dev/null", test]
+    pytest_ = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "no:ddenv",
+        "-p",
+        "ddenv.engine.pytest_plugin",
+        "-c",
+        "/dev/null",
+        test,
+    ]
     said = subprocess.run(pytest_, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert said.returncode == 1 and "it fails as it did: f in 7 of 7 runs" in said.stdout, said.stdout
     test.write_text(test.read_text().replace("is False", "is True"))

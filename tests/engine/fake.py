@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.engine.beginning import check_repeats
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken, Pace
-from ddenv.engine.repeating import check_repeats
 from ddenv.engine.worker import Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled

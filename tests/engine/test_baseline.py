@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.engine.baseline import fix_failure
+from ddenv.engine.judging import fix_failure
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.runfile.events import BaselineFinished
 from ddenv.runfile.fold import fold

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddenv.engine.crash_loop import MOST_DEATHS, check_crash_loop
+from ddenv.engine.beginning import MOST_DEATHS, check_crash_loop
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile

@@ -88,7 +88,7 @@ def test_a_sub_environment_that_kills_its_worker_twice_is_unknown(tmp_path):
 
 
 def test_without_a_number_workers_share_what_the_machine_allows(monkeypatch):
-    monkeypatch.setattr("ddenv.processor.usable_memory", lambda: 10e9)
+    monkeypatch.setattr("ddenv.runs.processor.usable_memory", lambda: 10e9)
     scenario = parts()[0]
     assert memory_limit(scenario, 3) == pytest.approx(3e9)
     asked = scenario.simulation.model_copy(update={"memory_limit": 0.5})

@@ -10,11 +10,10 @@ from dataclasses import asdict
 
 import pytest
 
-from ddenv.engine import disk_space
+from ddenv.engine import disturbances
 from ddenv.engine.bench import Bench
-from ddenv.engine.clock_jumps import ClockJumps
 from ddenv.engine.control import Control
-from ddenv.engine.disk_space import NEEDED, DiskSpace
+from ddenv.engine.disturbances import NEEDED, ClockJumps, DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
@@ -25,7 +24,7 @@ from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import LOGS, NoRoom, RunFile
 from ddenv.runs.subject import read_parts
-from ddenv.words import news
+from ddenv.words.news import news
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import story
 from tests.engine.oracles import needs
@@ -62,8 +61,8 @@ def undisturbed(tmp_path):
 
 
 def disk(monkeypatch, free):
-    monkeypatch.setattr(disk_space, "PERIOD", 0.0)
-    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(free()))
+    monkeypatch.setattr(disturbances, "PERIOD", 0.0)
+    monkeypatch.setattr(disturbances.shutil, "disk_usage", lambda _: Usage(free()))
 
 
 def told(path):

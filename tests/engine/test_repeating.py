@@ -5,13 +5,13 @@ from contextlib import suppress
 
 import pytest
 
-from ddenv import processor
 from ddenv.engine import shared
 from ddenv.engine.control import Stopped
 from ddenv.errors import UserError
 from ddenv.report.report import write_report
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.runs import processor
 from tests.command import ddenv
 from tests.conftest import DATA
 from tests.engine import fake

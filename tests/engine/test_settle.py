@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine import bench
+from ddenv.engine.beginning import note_start
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
-from ddenv.engine.settle import note_start
 from ddenv.errors import UserError
 from ddenv.robot.settled import Settled, notes_on
 from ddenv.runfile.fold import fold
@@ -18,7 +18,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import stacks
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.world.load import load_scenario
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.read import read_world

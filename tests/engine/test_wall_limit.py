@@ -15,7 +15,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.settings import SETTINGS
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run

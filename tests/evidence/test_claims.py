@@ -11,7 +11,7 @@ from ddenv.page.markdown import markdown
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.shared.poll import Snapshot
 from tests.workbench import fake_run

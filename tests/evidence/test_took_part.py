@@ -12,7 +12,7 @@ from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.run.models import FREE, Course, steps

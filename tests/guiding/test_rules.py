@@ -13,8 +13,8 @@ from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.guiding.commands import KINDS, data_of, parse, refusal
+from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import ACTIONS, Pointed, offer
-from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.run_keys import GUIDING, KeyOffers

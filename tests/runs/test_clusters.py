@@ -5,9 +5,9 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.runs import clusters
 from ddenv.runs.creation import create_run
+from ddenv.runs.programs import how_to_install
 from ddenv.runs.subject import with_options
 from ddenv.runs.trust import check_trusted, trust_cluster
-from ddenv.version import how_to_install
 from ddenv.world.load import load_scenario
 from tests.command import in_process
 from tests.conftest import DATA

@@ -6,9 +6,9 @@ import sqlite3
 
 import pytest
 
+from ddenv import __version__
 from ddenv.study.results import read_cell
 from ddenv.study.study_folder import RUNS, run_path
-from ddenv.version import __version__
 from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_moments
 

@@ -59,7 +59,7 @@ def scenarios(tmp_path, monkeypatch) -> Path:
     (folder / "robot.sdf").write_bytes(fake_run.ROBOT_SDF)
     (folder / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario()))
     monkeypatch.setattr("ddenv.world.load.SCENARIOS", folder)
-    monkeypatch.setattr("ddenv.processor.usable_cores", lambda: 4)
+    monkeypatch.setattr("ddenv.runs.processor.usable_cores", lambda: 4)
     return folder
 
 

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
@@ -16,7 +17,6 @@ from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
 from ddenv.runfile.store import ROBOT, Live, Motions, RunFile, create
 from ddenv.settings import PRINTED
-from ddenv.version import __version__
 from ddenv.world.sdf.read import parse_world
 from tests.shorthand import Writing
 

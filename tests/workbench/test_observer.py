@@ -11,7 +11,7 @@ from attached import Attached
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.guiding.pace import Pause, Resume, Stop
+from ddenv.guiding.course import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.shared import poll as polling

@@ -17,6 +17,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from ddenv import __version__
 from ddenv.cli.certify_command import certify_command
 from ddenv.cli.completing import runs_and_scenarios
 from ddenv.cli.config_command import config_command
@@ -39,7 +40,6 @@ from ddenv.cli.why_command import why_command
 from ddenv.cli.world_command import world_group
 from ddenv.errors import UserError, printable
 from ddenv.schemas import nearest
-from ddenv.version import __version__
 
 
 class Commands(click.Group):

@@ -99,8 +99,7 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 
 def announce_needs(sdf: Path, uris: list[str]) -> None:
     """Lists the other files that a written world still needs, since it keeps their names."""
-    from ddenv.text import shortened
-    from ddenv.words import first_of
+    from ddenv.text import first_of, shortened
 
     if uris:
         announce(f"{sdf} still needs {first_of([shortened(uri, LONGEST_URI) for uri in uris], 3)}")

@@ -18,7 +18,7 @@ from ddenv.runfile.follow import Follower
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words, stop_engines
-from ddenv.words import headline, news
+from ddenv.words.news import headline, news
 
 POLL = 0.2
 

@@ -36,7 +36,7 @@ def isolate_command(
     """
     from ddenv.cli.follow import Interrupted, follow
     from ddenv.cli.trusting import idle_run
-    from ddenv.guiding.pace import Isolate
+    from ddenv.guiding.course import Isolate
     from ddenv.guiding.situation import Situation
     from ddenv.runs.programs import start_engine
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
-from ddenv import processor
 from ddenv.errors import printable
+from ddenv.runs import processor
 from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
 
 

@@ -32,11 +32,11 @@ def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust
     Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 it cannot be
     said: the runs do not decide, or something is wrong.
     """
-    from ddenv.amounts import percent
     from ddenv.cli.test_summary import line
     from ddenv.cli.trusting import allow
-    from ddenv.engine.reproducing import expected, reproduce, subject_in
+    from ddenv.engine.single_test import expected, reproduce, subject_in
     from ddenv.runs.folder import find_run
+    from ddenv.text import percent
 
     path = find_run(run)
     subject = subject_in(path, folder)

@@ -64,7 +64,7 @@ def run_command(
 
 def announce_notes(world: World, as_json: bool) -> None:
     """Counts the parts of a world that were replaced or ignored, if any."""
-    from ddenv.words import count
+    from ddenv.text import count
 
     if world.notes:
         were = f"{count(len(world.notes), 'part')} of {world.path} {'was' if len(world.notes) == 1 else 'were'}"

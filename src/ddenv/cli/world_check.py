@@ -7,8 +7,7 @@ from typing import Any
 
 from ddenv.cli.wrapping import cut, wrapped
 from ddenv.errors import printable
-from ddenv.text import padded, shortened, width
-from ddenv.words import count, first_of
+from ddenv.text import count, first_of, padded, shortened, width
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import (
     Box,

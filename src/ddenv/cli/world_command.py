@@ -95,8 +95,8 @@ def _took_part(run: str) -> tuple[World, frozenset[str], list[str]]:
 
     Raises UserError where that is unknown.
     """
-    from ddenv.amounts import count
     from ddenv.evidence.took_part import in_whole_world
+    from ddenv.text import count
 
     path, world, state = _of_run(run)
     times, baseline = in_whole_world(state), state.baseline
@@ -112,8 +112,8 @@ def _passing(run: str) -> tuple[World, frozenset[str], list[str]]:
 
     Raises UserError where no world that passes is known.
     """
-    from ddenv.amounts import count
     from ddenv.runs.nearest import removed_in_passing
+    from ddenv.text import count
 
     path, world, state = _of_run(run)
     gone = removed_in_passing(state, path)
@@ -166,7 +166,7 @@ def _settle(world: World, reading: Reading, output: Path) -> list[str]:
     from ddenv.robot.settled import moved, notes_on
     from ddenv.robot.simulation.template import Variants
     from ddenv.runs.subject import scenario_for_world
-    from ddenv.words import count, first_of
+    from ddenv.text import count, first_of
     from ddenv.world.access import write_file
     from ddenv.world.placement import note_inside
     from ddenv.world.sdf.moved import with_places

@@ -14,8 +14,7 @@ from ddenv.map.footprints import Drawn, plan
 from ddenv.map.frame import tick_step, tick_text, ticks
 from ddenv.map.paint import Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
-from ddenv.text import padded, shortened, width
-from ddenv.words import count
+from ddenv.text import count, padded, shortened, width
 from ddenv.world.model import World
 
 # Columns for numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.

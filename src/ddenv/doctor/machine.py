@@ -16,11 +16,12 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ddenv import processor
-from ddenv.amounts import count
+from ddenv import __version__
 from ddenv.doctor.finding import Finding
+from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX, runs_folder
-from ddenv.version import __version__, how_to_install
+from ddenv.runs.programs import how_to_install
+from ddenv.text import count
 
 # By the names that packages are installed as, with the module that shows that they are there.
 NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ddenv.amounts import count
+from ddenv import __version__
 from ddenv.doctor.finding import Finding
 from ddenv.errors import UserError
 from ddenv.runfile.integrity import Whole, faults, rescue, whole
@@ -16,7 +16,7 @@ from ddenv.runfile.lock import engine_is_alive, mode_beside
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
 from ddenv.runs.subject import read_parts
-from ddenv.version import __version__
+from ddenv.text import count
 
 GROUP = "run"
 

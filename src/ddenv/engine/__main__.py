@@ -13,19 +13,16 @@ import threading
 from pathlib import Path
 from typing import Literal
 
-from ddenv import processor
+from ddenv import __version__
+from ddenv.engine.beginning import check_crash_loop, check_repeats, note_start
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
-from ddenv.engine.crash_loop import check_crash_loop
-from ddenv.engine.disk_space import DiskSpace
+from ddenv.engine.disturbances import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Pool
-from ddenv.engine.repeating import check_repeats
-from ddenv.engine.settle import note_start
+from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
-from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.runfile.events import (
     AcceptModeChanged,
@@ -37,11 +34,11 @@ from ddenv.runfile.events import (
 )
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.runs import processor
 from ddenv.runs.clusters import HERE, check_cluster, made_here
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.runs.subject import read_parts
 from ddenv.runs.trust import check_trusted
-from ddenv.version import __version__
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
@@ -160,10 +157,7 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     # Only who asks for a cluster needs Dask.
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
-    def tell(tests: int, words: str) -> None:
-        journal.record(Cluster(tests, words))
-
-    return ClusterPool(scenario, world, robot, cluster, tell)
+    return ClusterPool(scenario, world, robot, cluster, lambda tests, words: journal.record(Cluster(tests, words)))
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: Literal["automatic", "ask"] | None) -> None:

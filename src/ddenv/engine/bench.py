@@ -12,17 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from ddenv.amounts import count
 from ddenv.engine.background import Background
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.noting import give_up_if_late, note_slow
-from ddenv.engine.pool import Broken
+from ddenv.engine.pool import Broken, Workers
 from ddenv.engine.slicing import audit_is_due, compare
 from ddenv.engine.worker import Start
-from ddenv.engine.workers import Workers
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Test
@@ -32,6 +30,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Implied, TestFinished, TestStarted, TrialJudged
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.store import ROBOT, Motions
+from ddenv.text import count
 from ddenv.world.scenario import FailureSpec
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.

@@ -5,20 +5,17 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
-from ddenv.engine.clock_jumps import ClockJumps
-from ddenv.engine.disk_space import DiskSpace
+from ddenv.engine.disturbances import ClockJumps, DiskSpace
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, rejudged
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, parse, refusal
-from ddenv.guiding.course import Change, GoBack, Undo
-from ddenv.guiding.pace import AcceptMode, Pause, Resume, Step, Stop
-from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
+from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import Situation, label_of, numbers_of
 from ddenv.runfile.events import (
     AcceptedOther,
@@ -28,6 +25,7 @@ from ddenv.runfile.events import (
     CommandHandled,
     CommandRefused,
     Decided,
+    Event,
     Outcomes,
     Paused,
     Pinned,
@@ -160,7 +158,7 @@ class Control:
             return str(error)
         why = refusal(command, Situation(self._journal.state))
         if not why:
-            _OBEYED[type(command)](self, command)
+            self._do(command)
         return why
 
     def _handled(self, request: Request) -> None:
@@ -168,24 +166,28 @@ class Control:
         self._journal.record(CommandHandled())
         self._journal.command = None
 
-    # Speed.
-
-    def _obey_pause(self, _: Pause) -> None:
-        if not self._paused:
-            self._pause()
-
-    def _obey_resume(self, _: Resume) -> None:
-        self._run(credit=None, pause_after_round=False)
-
-    def _obey_step(self, step: Step) -> None:
-        whole_round = step.unit == "round"
-        self._run(credit=None if whole_round else 1, pause_after_round=whole_round)
-
-    def _obey_accept_mode(self, asked: AcceptMode) -> None:
-        self._journal.record(AcceptModeChanged(asked.mode))
-
-    def _obey_stop(self, _: Stop) -> None:
-        raise Stopped("stopped by the user")
+    def _do(self, command: Command) -> None:
+        """Does what is possible now. Raises Stopped."""
+        match command:
+            case Pause():
+                if not self._paused:
+                    self._pause()
+            case Resume():
+                self._run(credit=None, pause_after_round=False)
+            case Step(unit):
+                self._run(credit=1 if unit == "test" else None, pause_after_round=unit == "round")
+            case Stop():
+                raise Stopped("stopped by the user")
+            case Undo():
+                here = self._journal.state.here
+                if here is not None and here.parent is not None:
+                    self._go(here.parent, rejected=here.number)
+            case GoBack(node):
+                self._go(node, rejected=None)
+                if not self._paused:
+                    self._pause()
+            case _:
+                self._journal.record(_EVENTS[type(command)](self._journal, command))
 
     def _run(self, credit: int | None, pause_after_round: bool) -> None:
         self._credit, self._pause_after_round = credit, pause_after_round
@@ -197,94 +199,52 @@ class Control:
         self._paused, self._credit, self._pause_after_round = True, None, False
         self._journal.record(Paused())
 
-    # Candidates.
-
-    def _decide(self, asked: Accept | Reject) -> None:
-        self._journal.record(Decided(asked.round, asked.candidate, "accept" if isinstance(asked, Accept) else "reject"))
-
-    def _veto(self, asked: Veto) -> None:
-        self._journal.record(Vetoed(asked.round, asked.candidate))
-
-    def _unveto(self, asked: Unveto) -> None:
-        self._journal.record(Unvetoed(asked.round, asked.candidate))
-
-    # Models.
-
-    def _pin(self, asked: Pin) -> None:
-        self._journal.record(Pinned(self._numbers(asked.new(self._journal.state))))
-
-    def _unpin(self, asked: Unpin) -> None:
-        self._journal.record(Unpinned(self._numbers(asked.pinned(self._journal.state))))
-
-    def _try(self, asked: Try) -> None:
-        environment = self._journal.number(Environment.of(asked.models))
-        self._journal.record(TrialStarted(len(self._journal.state.trials) + 1, environment))
-
-    def _adopt(self, asked: Adopt) -> None:
-        trial = self._journal.state.trials[asked.trial - 1]
-        self._journal.record(Adopted(asked.trial, trial.environment, trial.tests[-1]))
-
-    def _accept_other(self, asked: AcceptOther) -> None:
-        journal, state = self._journal, self._journal.state
-        test = state.tests[asked.test - 1]
-        unnamed = asked.instead or test.phase == "hand"
-        journal.record(
-            AcceptedOther(
-                test.id,
-                f"test {test.id}" if unnamed else label_of(state, test),
-                test.environment,
-                self._judged((test.id,) if asked.instead else (*state.failures, test.id)),
-                None if asked.instead else test.trial,
-                asked.instead,
-            )
-        )
-
-    # Going back, and other settings.
-
-    def _undo(self, _: Undo) -> None:
-        here = self._journal.state.here
-        if here is not None and here.parent is not None:
-            self._go(here.parent, rejected=here.number)
-
-    def _go_back(self, asked: GoBack) -> None:
-        self._go(asked.node, rejected=None)
-        if not self._paused:
-            self._pause()
-
-    def _change(self, asked: Change) -> None:
-        self._journal.record(Changed(asked.new(self._journal.state)))
-
     def _go(self, node: int, rejected: int | None) -> None:
         state = self._journal.state
         failures = failures_at(state, node)
-        self._journal.record(WentBack(node, rejected, None if failures == state.failures else self._judged(failures)))
-
-    def _judged(self, failures: tuple[int, ...]) -> Outcomes:
-        """The outcomes of all tests if the ends of `failures` count as f."""
-        file, state = self._journal.file, self._journal.state
-        spec = FailureSpec.model_validate(state.scenario["failure"])
-        return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
-
-    def _numbers(self, models: Iterable[str]) -> tuple[int, ...]:
-        return numbers_of(self._journal.state, models)
+        outcomes = None if failures == state.failures else _judged(self._journal, failures)
+        self._journal.record(WentBack(node, rejected, outcomes))
 
 
-_OBEYED: dict[type[Command], Callable[[Control, Any], None]] = {
-    Pause: Control._obey_pause,
-    Resume: Control._obey_resume,
-    Step: Control._obey_step,
-    AcceptMode: Control._obey_accept_mode,
-    Stop: Control._obey_stop,
-    Accept: Control._decide,
-    Reject: Control._decide,
-    Veto: Control._veto,
-    Unveto: Control._unveto,
-    Pin: Control._pin,
-    Unpin: Control._unpin,
-    Try: Control._try,
-    Adopt: Control._adopt,
-    AcceptOther: Control._accept_other,
-    Undo: Control._undo,
-    GoBack: Control._go_back,
-    Change: Control._change,
+def _judged(journal: Journal, failures: tuple[int, ...]) -> Outcomes:
+    """The outcomes of all tests if the ends of `failures` count as f."""
+    file, state = journal.file, journal.state
+    spec = FailureSpec.model_validate(state.scenario["failure"])
+    return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
+
+
+def _adopted(journal: Journal, asked: Adopt) -> Event:
+    trial = journal.state.trials[asked.trial - 1]
+    return Adopted(asked.trial, trial.environment, trial.tests[-1])
+
+
+def _accepted_other(journal: Journal, asked: AcceptOther) -> Event:
+    state = journal.state
+    test = state.tests[asked.test - 1]
+    unnamed = asked.instead or test.phase == "hand"
+    return AcceptedOther(
+        test.id,
+        f"test {test.id}" if unnamed else label_of(state, test),
+        test.environment,
+        _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id)),
+        None if asked.instead else test.trial,
+        asked.instead,
+    )
+
+
+# What each decision of the user is in the run file.
+_EVENTS: dict[type[Command], Callable[[Journal, Any], Event]] = {
+    AcceptMode: lambda journal, asked: AcceptModeChanged(asked.mode),
+    Accept: lambda journal, asked: Decided(asked.round, asked.candidate, "accept"),
+    Reject: lambda journal, asked: Decided(asked.round, asked.candidate, "reject"),
+    Veto: lambda journal, asked: Vetoed(asked.round, asked.candidate),
+    Unveto: lambda journal, asked: Unvetoed(asked.round, asked.candidate),
+    Pin: lambda journal, asked: Pinned(numbers_of(journal.state, asked.new(journal.state))),
+    Unpin: lambda journal, asked: Unpinned(numbers_of(journal.state, asked.pinned(journal.state))),
+    Try: lambda journal, asked: TrialStarted(
+        len(journal.state.trials) + 1, journal.number(Environment.of(asked.models))
+    ),
+    Adopt: _adopted,
+    AcceptOther: _accepted_other,
+    Change: lambda journal, asked: Changed(asked.new(journal.state)),
 }

@@ -8,14 +8,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ddenv.amounts import count
-from ddenv.engine.baseline import fix_failure
+from ddenv.engine.beginning import settle
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import known_failure, rows_of
+from ddenv.engine.judging import fix_failure, known_failure, rows_of
 from ddenv.engine.limits import limit_after
-from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.environment import Environment
@@ -37,6 +35,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
+from ddenv.text import count
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from ddenv import processor
 from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runs import processor
 from ddenv.settings import SETTINGS, read
 from ddenv.world.scenario import Scenario
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ddenv.amounts import about, count, duration
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pace
 from ddenv.errors import UserError
@@ -12,6 +11,7 @@ from ddenv.runfile.events import Noted
 from ddenv.runfile.state import RunState
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
+from ddenv.text import about, count, duration
 from ddenv.world.scenario import Reduction
 
 # A run is slow if it simulates less than `SLOW` s in each real second; that is known after so many real seconds.

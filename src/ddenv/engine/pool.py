@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Any
+from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, memory_limit, too_large
 from ddenv.engine.worker import POSE, Broke, Make, Ready, Refused, Run, Settle, Shared, Start, Task, simulator_of
@@ -103,6 +103,23 @@ class Pace:
 
     simulated: float
     real: float
+
+
+class Workers(Protocol):
+    """Make tests, several at a time: processes here, or a cluster. `Pool` says what each of these does."""
+
+    @property
+    def idle(self) -> int: ...
+    @property
+    def busy(self) -> int: ...
+    def submit(
+        self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None
+    ) -> None: ...
+    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]: ...
+    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]: ...
+    def live(self) -> list[Live]: ...
+    def paces(self) -> list[Pace]: ...
+    def close(self) -> None: ...
 
 
 class _Slot:

@@ -15,18 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from ddenv import processor
-from ddenv.engine.pool import Broken, Pace
+from ddenv import __version__
+from ddenv.engine.pool import Broken, Pace, Workers
 from ddenv.engine.worker import Start
-from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY, Test
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
-from ddenv.version import __version__
 from ddenv.world.scenario import Scenario
 
 OURS = ("straight", "costmap")

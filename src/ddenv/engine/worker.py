@@ -76,7 +76,8 @@ class Shared:
 
     def moved(self, slot: int) -> dict[str, PoseRow]:
         """Where the models of a slot's test are that are no longer where they started."""
-        poses = zip(*[iter(self._rows(slot))] * POSE, strict=True)
+        size = POSE * len(self.names)
+        poses = (tuple(self.models[at : at + POSE]) for at in range(slot * size, (slot + 1) * size, POSE))
         return {name: pose for name, pose in zip(self.names, poses, strict=True) if math.isfinite(pose[0])}
 
     def move(self, slot: int, starts: Mapping[str, PoseRow], models: Mapping[str, PoseRow]) -> None:
@@ -86,10 +87,6 @@ class Shared:
         if rows:
             begin = slot * POSE * len(rows)
             self.models[begin : begin + POSE * len(rows)] = [value for row in rows for value in row]
-
-    def _rows(self, slot: int) -> list[float]:
-        size = POSE * len(self.names)
-        return list(self.models[slot * size : (slot + 1) * size]) if size else []
 
 
 @dataclass(frozen=True)

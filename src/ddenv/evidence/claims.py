@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from ddenv.amounts import between, count, first_of, percent
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.evidence.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
@@ -14,6 +13,7 @@ from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, RunState, Trial
 from ddenv.runfile.supports import stack_with
+from ddenv.text import between, count, first_of, percent
 
 MOST_NAMES = 3
 NO_FRESH_RUNS = "no fresh runs were made"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from ddenv.amounts import count, first_of, percent
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.slices import fresh_chance, reasons
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, RunState
+from ddenv.text import count, first_of, percent
 
 # The maximum number of tests that a word on a candidate names.
 NAMED = 2

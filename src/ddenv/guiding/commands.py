@@ -11,13 +11,24 @@ from typing import Any, get_args
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
-from ddenv.guiding.pace import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop
-from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
+from ddenv.guiding.course import (
+    CHANGEABLE,
+    ONLY_CHANGEABLE,
+    AcceptMode,
+    Change,
+    GoBack,
+    Isolate,
+    Pause,
+    Resume,
+    StartEngine,
+    Step,
+    Stop,
+    Undo,
+)
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import NO_MODELS, Situation
 from ddenv.runfile.state import RunState
-from ddenv.words import count
+from ddenv.text import count
 
 Command = (
     Pause

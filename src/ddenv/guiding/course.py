@@ -1,19 +1,126 @@
-"""Where a run goes on, and how: undo, go back to another environment, change settings."""
+"""How a run goes on: pause, resume, step, accept mode, stop, start an engine; undo, go back, change settings."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from ddenv.errors import UserError, printable
-from ddenv.guiding.situation import NO_FAILURE, Situation, Words, new_search
+from ddenv.guiding.situation import FINISHED, NO_FAILURE, Situation, Words, new_search
 from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.words import count
+from ddenv.text import count
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Start no new test."""
+
+    kind: ClassVar[str] = "pause"
+
+    def refusal(self, now: Situation) -> str:
+        return now.needs_engine()
+
+    def words(self, _: RunState) -> Words:
+        return Words("pause")
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """Go on; also ends a step."""
+
+    kind: ClassVar[str] = "resume"
+
+    def refusal(self, now: Situation) -> str:
+        return now.needs_engine()
+
+    def words(self, _: RunState) -> Words:
+        return Words("resume")
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Run one test, or to the end of the round, then pause."""
+
+    kind: ClassVar[str] = "step"
+    unit: Literal["test", "round"] = "test"
+
+    def refusal(self, now: Situation) -> str:
+        waits = now.state.waiting_candidate is not None
+        return now.needs_engine() or ("a reduction waits: accept it with a, or reject it with x" if waits else "")
+
+    def words(self, _: RunState) -> Words:
+        return Words(f"step one {self.unit}")
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptMode:
+    """Make each reduction at once ("automatic"), or wait for accept or reject ("ask")."""
+
+    kind: ClassVar[str] = "accept_mode"
+    mode: Literal["automatic", "ask"]
+
+    def refusal(self, now: Situation) -> str:
+        return now.needs_engine()
+
+    def words(self, _: RunState) -> Words:
+        ask = self.mode == "ask"
+        said = "each reduction will wait for you" if ask else "reductions are accepted automatically"
+        return Words(f"accept mode {self.mode}", said)
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """End the engine; another one can go on from there."""
+
+    kind: ClassVar[str] = "stop"
+
+    def refusal(self, now: Situation) -> str:
+        return "no engine is running" if now.engine == "absent" else ""
+
+    def words(self, _: RunState) -> Words:
+        return Words("stop")
+
+
+@dataclass(frozen=True, slots=True)
+class StartEngine:
+    """Start an engine on the run. It is not a command: the run file does not have it."""
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if now.engine == "alive":
+            return f"the engine is running already{'; space resumes' if state.paused else ''}"
+        if now.engine == "starting":
+            return "the engine is starting already"
+        if state.status == "finished":
+            return FINISHED
+        spent = state.budget is not None and state.made >= state.budget
+        return f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it" if spent else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Isolate:
+    """Start an engine that finds the nearest world that passes, or goes on with that. It is not a command, as `StartEngine`.
+
+    `again`: search also if that world is known.
+    """
+
+    again: bool = False
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if state.baseline is None:
+            return "no failure is known yet, so there is nothing to isolate"
+        if state.status != "finished" and state.isolating is None:
+            return "its search is not over; let it end first"
+        if now.engine != "absent":
+            return "an engine is at work on the run; let it end first"
+        known = state.isolated is not None and state.isolating is None and not self.again
+        return "the nearest world that passes is known; 'ddenv isolate RUN --again' searches again" if known else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +128,6 @@ class Undo:
     """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
 
     kind: ClassVar[str] = "undo"
-    offer: ClassVar[str] = "undo"
 
     def refusal(self, now: Situation) -> str:
         here = now.state.here
@@ -44,7 +150,6 @@ class GoBack:
     """Make the environment of a node the current one again; the run pauses there."""
 
     kind: ClassVar[str] = "go_back"
-    offer: ClassVar[str] = ""
     node: int
 
     def refusal(self, now: Situation) -> str:
@@ -69,7 +174,6 @@ class Change:
     """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
 
     kind: ClassVar[str] = "change"
-    offer: ClassVar[str] = ""
     settings: Mapping[str, Value]
 
     def refusal(self, now: Situation) -> str:

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import Change, Undo
-from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step
-from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto, round_over
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin, nearest_other
+from ddenv.guiding.course import AcceptMode, Change, Pause, Resume, StartEngine, Step, Undo
+from ddenv.guiding.selections import (
+    Accept,
+    AcceptOther,
+    Adopt,
+    Pin,
+    Reject,
+    Try,
+    Unpin,
+    Unveto,
+    Veto,
+    nearest_other,
+    round_over,
+)
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
 from ddenv.runfile.state import REFUSED, RunState, Trial
 from ddenv.settings import Value
@@ -52,7 +62,7 @@ def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
     if command is None:
         return Offer()
     why_not = refusal(command, now)
-    return Offer(why_not=why_not) if why_not else Offer(command, command.offer)
+    return Offer(why_not=why_not) if why_not else Offer(command, _FOOTER.get(type(command), ""))
 
 
 def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
@@ -115,18 +125,18 @@ def _pin(now: Situation, pointed: Pointed) -> Command | None:
 
 
 def _without(now: Situation, pointed: Pointed) -> Command | None:
-    if now.state.baseline is None:
-        raise UserError(NO_FAILURE)
-    if not _any(now.state, pointed.models):
-        return None
     out = frozenset(pointed.models)
-    return Try(numbers_of(now.state, (name for name in now.state.environment if name not in out)))
+    return _try(now, pointed, (name for name in now.state.environment if name not in out))
 
 
 def _only(now: Situation, pointed: Pointed) -> Command | None:
+    return _try(now, pointed, frozenset(pointed.models))
+
+
+def _try(now: Situation, pointed: Pointed, keep: Iterable[str]) -> Command | None:
     if now.state.baseline is None:
         raise UserError(NO_FAILURE)
-    return Try(numbers_of(now.state, frozenset(pointed.models))) if _any(now.state, pointed.models) else None
+    return Try(numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
 
 
 def _any(state: RunState, models: Collection[str]) -> bool:
@@ -139,6 +149,20 @@ def _any(state: RunState, models: Collection[str]) -> bool:
         raise UserError("there are no models to choose from")
     return bool(models)
 
+
+# What the footer calls a command where the action's usual words do not fit.
+_FOOTER: dict[type, str] = {
+    StartEngine: "start",
+    Pause: "pause",
+    Resume: "resume",
+    Accept: "accept",
+    Adopt: "adopt",
+    AcceptOther: "count as f",
+    Reject: "reject",
+    Veto: "veto",
+    Unveto: "take back",
+    Undo: "undo",
+}
 
 # By the names of the run screen's actions. Its other actions change nothing in the run.
 ACTIONS: dict[str, Meaning] = {

@@ -1,4 +1,6 @@
-"""Models chosen by hand: pin and unpin them, try a selection, adopt it, count its other failure as f."""
+"""Candidates and models chosen by hand: accept or reject the reduction that waits, veto a candidate; pin models, try a selection,
+adopt it, count its other failure as f.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +22,115 @@ from ddenv.guiding.situation import (
     named,
     names_of,
     new_search,
+    next_candidate,
 )
 from ddenv.runfile.events import deed
-from ddenv.runfile.state import RunState, Test, Trial
-from ddenv.text import shortened
-from ddenv.words import count
+from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
+from ddenv.text import count, shortened
+
+
+@dataclass(frozen=True, slots=True)
+class Accept:
+    """Make the reduction that waits."""
+
+    kind: ClassVar[str] = "accept"
+    round: int
+    candidate: int
+
+    def refusal(self, now: Situation) -> str:
+        return _not_waiting(now, self)
+
+    def words(self, state: RunState) -> Words:
+        one = _candidate(state, self)
+        left = "" if one is None else f": E is now its {count(one.size, 'model')}. The next round begins"
+        return Words("accept", f"{_label(state, self)} is accepted{left}")
+
+
+@dataclass(frozen=True, slots=True)
+class Reject:
+    """Go on as if the candidate that waits had not shown f."""
+
+    kind: ClassVar[str] = "reject"
+    round: int
+    candidate: int
+
+    def refusal(self, now: Situation) -> str:
+        return _not_waiting(now, self)
+
+    def words(self, state: RunState) -> Words:
+        return Words("reject", f"{_label(state, self)} is rejected. {next_candidate(state, self.candidate)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Veto:
+    """Leave out a candidate that has no verdict yet."""
+
+    kind: ClassVar[str] = "veto"
+    round: int
+    candidate: int
+
+    def refusal(self, now: Situation) -> str:
+        one = _candidate(now.state, self)
+        if one is None:
+            return round_over(now.state)
+        if one.index == now.state.waiting_candidate:
+            return f"{one.label} showed f and waits: reject it with x"
+        return f"{one.label} is {one.verdict} already" if one.verdict else ""
+
+    def words(self, state: RunState) -> Words:
+        said = f"{_label(state, self)} is vetoed: it is not tried in any round; v again takes that back"
+        return Words("veto", f"{said}. {next_candidate(state, self.candidate)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Unveto:
+    """Try a vetoed or rejected candidate after all."""
+
+    kind: ClassVar[str] = "unveto"
+    round: int
+    candidate: int
+
+    def refusal(self, now: Situation) -> str:
+        one = _candidate(now.state, self)
+        if one is None:
+            return round_over(now.state)
+        return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
+
+    def words(self, state: RunState) -> Words:
+        one = _candidate(state, self)
+        verdict = "vetoed" if one is None else one.verdict
+        return Words("allow it again", f"{_label(state, self)} is no longer {verdict}: it is tried after all")
+
+
+def round_over(state: RunState) -> str:
+    """Why candidates can no longer be left out."""
+    return "the rounds are over" if state.confirming and not state.ended else "this round is over"
+
+
+_Of = Accept | Reject | Veto | Unveto
+
+
+def _candidate(state: RunState, command: _Of) -> Candidate | None:
+    """The command's candidate, while its round goes on."""
+    current = state.round
+    if current is None or current.done or current.winner is not None or current.number != command.round:
+        return None
+    return current.candidates[command.candidate] if 0 <= command.candidate < len(current.candidates) else None
+
+
+def _label(state: RunState, command: _Of) -> str:
+    one = _candidate(state, command)
+    return "the candidate" if one is None else one.label
+
+
+def _not_waiting(now: Situation, command: Accept | Reject) -> str:
+    state = now.state
+    waits = None
+    # When a new search is due, earlier reductions can no longer be accepted.
+    if state.round is not None and state.waiting_candidate is not None and not state.search_due:
+        waits = state.round.number, state.waiting_candidate
+    same = (command.round, command.candidate) == waits
+    return "" if same else "that reduction no longer waits"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +138,6 @@ class Pin:
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
     kind: ClassVar[str] = "pin"
-    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -62,7 +167,6 @@ class Unpin:
     """Let pinned models be removed again."""
 
     kind: ClassVar[str] = "unpin"
-    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -82,7 +186,6 @@ class Try:
     """Test a selection: `models` are the ones that are kept."""
 
     kind: ClassVar[str] = "try"
-    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -112,7 +215,6 @@ class Adopt:
     """Make a try that showed f the environment."""
 
     kind: ClassVar[str] = "adopt"
-    offer: ClassVar[str] = "adopt"
     trial: int
 
     def refusal(self, now: Situation) -> str:
@@ -145,7 +247,6 @@ class AcceptOther:
     """
 
     kind: ClassVar[str] = "accept_other"
-    offer: ClassVar[str] = "count as f"
     test: int
     instead: bool = False
 

@@ -9,8 +9,7 @@ from typing import Literal
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose
-from ddenv.text import shortened
-from ddenv.words import count, first_of
+from ddenv.text import count, first_of, shortened
 
 EngineIs = Literal["alive", "starting", "absent"]
 Row = Candidate | Trial
@@ -21,7 +20,6 @@ NAMED, LONGEST = 2, 32
 FINISHED = "the run is finished; u, h, f, c, p, w and o go on from there"
 NO_FAILURE = "f is not known yet: the baseline comes first"
 NO_MODELS = "no such models"
-ROUND_OVER = "this round is over"
 
 
 @dataclass(frozen=True, slots=True)

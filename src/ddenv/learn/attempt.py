@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from ddenv.amounts import count, first_of
 from ddenv.errors import UserError
 from ddenv.evidence.claims import of_all_parts
 from ddenv.learn.plays import Play
 from ddenv.learn.recorded_oracle import Oracle
+from ddenv.text import count, first_of
 
 NAMED = 5
 BOUND = "The last line: how many answers of yes or no it takes to single out such a set if nothing is known beforehand."

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ddenv.amounts import count
 from ddenv.learn.lesson import Answer, Foretold, Question
 from ddenv.runfile.events import RoundStarted, TestFinished, TestStarted, deed
 from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runfile.tested import pointed
+from ddenv.text import count
 
 SAID = {
     "similar": "f again: it fails as in the whole world",

@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from ddenv.amounts import first_of, percent
 from ddenv.errors import UserError
 from ddenv.evidence import claims
 from ddenv.evidence.rates import miss_chance, wilson_interval
@@ -23,6 +22,7 @@ from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState
 from ddenv.schemas import nearest
+from ddenv.text import first_of, percent
 
 # Terms that contain a digit.
 TERMS = ("1-minimal", "Algorithm 1", "(1 − rate)")

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from ddenv.amounts import count
 from ddenv.learn.lesson import Answer, Question
 from ddenv.learn.plays import Play, Turn
 from ddenv.runfile.state import BROKEN, Candidate
+from ddenv.text import count
 
 RACERS = (2, 4)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.amounts import count
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test
 from ddenv.runfile.tested import pointed
+from ddenv.text import count
 
 SIGNS = {"similar": "●", "other": "◇", "pass": "○", "error": "✗", "timeout": "◷", "running": "▶"}
 VERDICTS = {"similar": "●", "dissimilar": "○", "missed": "○", "unknown": "✗"} | dict.fromkeys(REFUSED, "⊘")

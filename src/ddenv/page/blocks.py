@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from ddenv.words import duration as duration
-from ddenv.words import percent as percent
+from ddenv.text import duration as duration
+from ddenv.text import percent as percent
 
 
 @dataclass(frozen=True, slots=True)

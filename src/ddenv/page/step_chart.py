@@ -8,7 +8,7 @@ from dataclasses import replace
 from ddenv.map.frame import tick_step, tick_text, ticks
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import RunState
-from ddenv.words import count
+from ddenv.text import count
 
 WIDTH, HEIGHT = 880.0, 300.0
 LEFT, TOP, RIGHT, BOTTOM = 52.0, 26.0, 24.0, 46.0

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, rate
 from ddenv.report.report import content, write_report
@@ -18,10 +19,9 @@ from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed
 from ddenv.runs.export import export_world
 from ddenv.runs.folder import BUNDLED_RUN
+from ddenv.runs.programs import how_to_install
 from ddenv.runs.reasons import sentence
-from ddenv.text import printable
-from ddenv.version import __version__, how_to_install
-from ddenv.words import count
+from ddenv.text import count, printable
 from ddenv.world.access import write_file
 
 RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (

@@ -9,8 +9,7 @@ from ddenv.page.blocks import Block, Cell, Section, Table, moment, say
 from ddenv.report.run_data import Record
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import RunState, Trial
-from ddenv.text import plain
-from ddenv.words import count
+from ddenv.text import count, plain
 
 # Longer tables of decisions, trials or nodes show only the first and the last rows.
 MOST = 120

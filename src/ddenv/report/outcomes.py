@@ -15,8 +15,8 @@ from ddenv.runfile.failures import Baseline
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.text import plain
-from ddenv.words import count, failed_in
+from ddenv.text import count, plain
+from ddenv.words.news import failed_in
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200

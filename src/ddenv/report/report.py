@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, ended, for_everyone
 from ddenv.page.blocks import (
@@ -36,9 +37,7 @@ from ddenv.runfile.failures import Place
 from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
-from ddenv.text import plain
-from ddenv.version import __version__
-from ddenv.words import count
+from ddenv.text import count, plain
 from ddenv.world.access import write_file
 
 KINDS = (".html", ".htm", ".md")

@@ -10,7 +10,7 @@ from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import REFUSED, Candidate, Round, RunState
-from ddenv.words import count
+from ddenv.text import count
 
 # The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
 MOST_ROUNDS = 60

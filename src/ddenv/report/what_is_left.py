@@ -10,8 +10,7 @@ from ddenv.report.report_map import CORNERS, close_up, picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
-from ddenv.text import plain
-from ddenv.words import count
+from ddenv.text import count, plain
 from ddenv.world.model import is_ground
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from ddenv.report.report_map import CORNERS, two_ways
 from ddenv.report.run_data import Record
 from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Reason, no_reasons, parting_sentence, sentence
-from ddenv.text import plain
-from ddenv.words import count, first_of
+from ddenv.text import count, first_of, plain
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn

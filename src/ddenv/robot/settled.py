@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from ddenv.amounts import count, first_of
+from ddenv.text import count, first_of
 from ddenv.world.model import World
 from ddenv.world.pose import Pose
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import reduce
 from typing import Any
 
-from ddenv.amounts import count
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.runfile import events as e
@@ -21,6 +20,7 @@ from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Forecast, Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
 from ddenv.runfile.store import Recorded, uncollected
+from ddenv.text import count
 
 # Verdicts that tests led to, not the user.
 JUDGED = ("similar", "missed", "dissimilar", "unknown")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from ddenv.runfile.events import Created, Implied, TestFinished
 from ddenv.runfile.fold import apply
 from ddenv.runfile.reading import plain
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.runfile.store import Motions, Recorded, Request, RunFile, create, recorded
+from ddenv.runfile.store import Motions, Recorded, Request, RunFile, create
 
 # How many faults SQLite lists.
 MOST_FAULTS = 3
@@ -54,7 +54,7 @@ def _read(file: RunFile, keep: Callable[[Recorded], None]) -> Whole:
     """Calls `keep` with each event that makes sense, up to the first one that does not."""
     state, count, bare, trouble = RunState(), 0, 0, ""
     try:
-        for event in _events(file):
+        for event in file.read():
             state = apply(state, event)
             bare += _is_bare(file, event)
             keep(event)
@@ -72,7 +72,7 @@ def rescue(file: RunFile, copy: Path) -> Whole:
     if copy.exists():
         raise UserError(f"{copy}: exists already; choose another name for the copy")
     try:
-        first = next(_events(file), None)
+        first = next(file.read(most=1), None)
     except UserError:
         first = None
     if first is None or not isinstance(first.event, Created):
@@ -116,16 +116,6 @@ def _is_bare(file: RunFile, event: Recorded) -> bool:
         return False
     test = event.event.test
     return not file.motion(test) or not file.trajectory(test)
-
-
-def _events(file: RunFile) -> Iterator[Recorded]:
-    """One after the other, so that those before a fault can be read. Raises UserError at the first that is damaged."""
-    try:
-        with closing(_connected(file)) as db:
-            for row in db.execute("SELECT id, time, kind, data FROM event ORDER BY id"):
-                yield recorded(*row)
-    except sqlite3.Error as error:
-        raise UserError(f"{file.path}: damaged run file: {error}") from None
 
 
 def _connected(file: RunFile) -> sqlite3.Connection:

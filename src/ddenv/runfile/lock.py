@@ -60,19 +60,15 @@ def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) ->
     try:
         # A viewer that checks for an engine holds the lock for an instant.
         deadline = time.monotonic() + 1.0
-        while not _try(handle, fcntl.LOCK_EX):
-            if time.monotonic() > deadline:
-                raise UserError(taken)
-            time.sleep(0.02)
-    except OSError as error:
-        os.close(handle)
-        raise UserError(
-            f"{refused}: its folder has no file locks ({error.strerror}), as some network folders; {instead}"
-        ) from None
-    except UserError:
-        os.close(handle)
-        raise
-    try:
+        try:
+            while not _try(handle, fcntl.LOCK_EX):
+                if time.monotonic() > deadline:
+                    raise UserError(taken)
+                time.sleep(0.02)
+        except OSError as error:
+            raise UserError(
+                f"{refused}: its folder has no file locks ({error.strerror}), as some network folders; {instead}"
+            ) from None
         # A full disk may have no room for it.
         with suppress(OSError):
             os.truncate(handle, 0)

@@ -42,6 +42,7 @@ CREATE TABLE command (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, 
 CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NOT NULL, PRIMARY KEY (test, model)) WITHOUT ROWID;
 CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
 """
+_ROWS = "SELECT id, time, kind, data FROM {} WHERE id > ? ORDER BY id LIMIT ?"
 _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
 # The endings of the files that SQLite keeps beside a run file while it is open. After a kill they stay.
 LOGS = ("-wal", "-shm", "-journal")
@@ -227,14 +228,17 @@ class RunFile:
 
     def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
         """The same, one after the other, so that those before a damaged one can be used."""
-        for row in self._rows("event", after, most):
-            yield recorded(*row)
+        try:
+            for row in self._db.execute(_ROWS.format("event"), (after, most)):
+                yield recorded(*row)
+        except (sqlite3.Error, OverflowError) as error:
+            raise UserError(f"{self.path}: damaged run file: {error}") from None
 
     def commands(self, after: int = 0) -> list[Request]:
         """The requests of viewers with an id above `after`, in order. Raises UserError."""
         return [
             Request(id, _moment(at), str(kind), _object(id, data))
-            for id, at, kind, data in self._rows("command", after)
+            for id, at, kind, data in self._all(_ROWS.format("command"), (after, -1))
         ]
 
     def last_command(self) -> int:
@@ -245,7 +249,7 @@ class RunFile:
     def send(self, kind: str, **data: Any) -> int:
         """Sends a command to the engine; returns its id. Raises UserError."""
         with self._writing() as db:
-            return _insert(db, "command", kind, data)
+            return _insert(db, "command", kind, data, time.time())
 
     def motion(self, test: int, model: str = ROBOT) -> array[float] | None:
         """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
@@ -288,7 +292,6 @@ class RunFile:
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
-            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
@@ -305,14 +308,13 @@ class RunFile:
                     raise
 
     def _append(self, event: Event, motions: Motions | None, command: int | None) -> Recorded:
-        data = plain(event) | ({} if command is None else {"command": command})
+        data, at = plain(event) | ({} if command is None else {"command": command}), time.time()
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
-            id = _insert(db, "event", NAMES[type(event)], data)
+            id = _insert(db, "event", NAMES[type(event)], data, at)
             if motions and isinstance(event, TestFinished | Implied):
                 rows = [(event.test, model, samples) for model, samples in motions.items()]
                 db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
-            at = db.execute("SELECT time FROM event WHERE id = ?", (id,)).fetchone()[0]
             db.execute("COMMIT")
         if not self._logs:
             logs = [self.path.with_name(f"{self.path.name}{ending}") for ending in LOGS]
@@ -341,9 +343,6 @@ class RunFile:
         """Merges the write-ahead log into the run file, so that the run is one file again."""
         with suppress(NoRoom), self._writing() as db:
             db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-
-    def _rows(self, table: str, after: int, most: int = -1) -> list[tuple[Any, ...]]:
-        return self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
 
     def _one(self, query: str, values: tuple[Any, ...] = ()) -> tuple[Any, ...] | None:
         rows = self._all(query, values)
@@ -404,9 +403,9 @@ def _moment(value: Any) -> float:
     return float(value)
 
 
-def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
+def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any], at: float) -> int:
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text))
+    cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (at, kind, text))
     assert cursor.lastrowid is not None
     return cursor.lastrowid
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from ddenv.amounts import first_of
 from ddenv.runfile.events import CandidateJudged, Implied, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import CERTIFY, Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import stack_with
+from ddenv.text import first_of
 
 
 def purpose(state: RunState, test: Test) -> str:

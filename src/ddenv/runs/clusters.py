@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.version import how_to_install
+from ddenv.runs.programs import how_to_install
 from ddenv.world.scenario import Scenario
 
 HERE = "here"

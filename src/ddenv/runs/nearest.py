@@ -10,13 +10,13 @@ from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ddenv.amounts import first_of
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_nearest, of_passing
 from ddenv.runfile.progress import Isolation
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_unknown, where_they_part
+from ddenv.text import first_of
 
 # Instants at which the two runs are compared, from where they part to the end of the shorter one.
 INSTANTS = 8

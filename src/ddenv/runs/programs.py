@@ -1,4 +1,4 @@
-"""Starts and stops the programs beside a view: the engine and the 3-D scene."""
+"""Starts and stops the programs beside a view, the engine and the 3-D scene, and says how to install what is missing."""
 
 from __future__ import annotations
 
@@ -98,3 +98,9 @@ def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
         return subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
         )
+
+
+def how_to_install(extra: str = "") -> str:
+    """What to type for ddenv, or for one of its extras, in words."""
+    what = f"'.[{extra}]'" if extra else "."
+    return f"pip install {what} in ddenv's clone (the ddenv on PyPI is another program)"

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from ddenv.amounts import count, percent
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, verdict_on
 from ddenv.evidence.rates import wilson_interval
@@ -16,6 +15,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
+from ddenv.text import count, percent
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
 F, GOAL = "similar", "pass"

@@ -22,8 +22,7 @@ from ddenv.study.results import read_cell
 from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
 from ddenv.study.study_page import write_study
 from ddenv.study.work import PER_CELL, Work, is_done, tests_made, work
-from ddenv.text import printable
-from ddenv.words import count, duration
+from ddenv.text import count, duration, printable
 
 
 def seconds_left(

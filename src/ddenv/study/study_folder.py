@@ -12,13 +12,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ddenv import processor
+from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.runfile.lock import held
+from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
 from ddenv.study.plan import Cell
-from ddenv.version import __version__
-from ddenv.words import count
+from ddenv.text import count
 from ddenv.world.access import read_bytes, write_file
 
 RUNS, ABOUT, LOCK = "runs", "study.json", "study.lock"

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean
 
+from ddenv import __version__
 from ddenv.page.blocks import (
     Block,
     Code,
@@ -31,9 +32,7 @@ from ddenv.study.results import Found, read_cell
 from ddenv.study.rows import groups, least_of, least_to_find, least_to_show, theirs
 from ddenv.study.study_folder import RUNS, Sitting, run_path
 from ddenv.study.tables import best, section
-from ddenv.text import plain
-from ddenv.version import __version__
-from ddenv.words import count
+from ddenv.text import count, plain
 from ddenv.world.access import write_file
 from ddenv.world.scenario import Scenario
 

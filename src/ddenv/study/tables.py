@@ -18,8 +18,7 @@ from ddenv.study.plan import Method, file_name
 from ddenv.study.results import Found
 from ddenv.study.rows import TABLES, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
 from ddenv.study.study_folder import run_path
-from ddenv.text import plain
-from ddenv.words import count
+from ddenv.text import count, plain
 
 HEIGHT = 320.0
 LINE, SAMPLE = 22.0, 30.0

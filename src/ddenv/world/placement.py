@@ -8,8 +8,8 @@ from itertools import islice
 
 import numpy as np
 
-from ddenv.amounts import count
 from ddenv.errors import UserError
+from ddenv.text import count
 from ddenv.world.extent import Bounds, bounds, filled_bounds, shape_bounds, stacked
 from ddenv.world.model import Collision, Mesh, Model, Plane, World
 from ddenv.world.overlap import Hull, hull, overlap

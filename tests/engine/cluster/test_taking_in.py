@@ -7,11 +7,11 @@ import pytest
 
 pytest.importorskip("distributed")
 
+from ddenv import __version__
+from ddenv.engine.cluster.cluster_pool import refusal
 from ddenv.engine.cluster.made_there import Hello
-from ddenv.engine.cluster.taking_in import refusal
 from ddenv.engine.pool import Broken
 from ddenv.engine.shared import machine, simulator
-from ddenv.version import __version__
 from tests.engine.fake import result
 
 SAME = Hello("b", 1, __version__, simulator(), machine())

@@ -18,18 +18,19 @@ from hashlib import sha256
 from queue import Empty, SimpleQueue
 from typing import Any
 
+import numpy as np
 from distributed import Client, Future, KilledWorker
 
-from ddenv.amounts import count
+from ddenv import __version__
 from ddenv.engine.cluster.link import GOODBYE, Attached, Link, Lost, There, in_a_line
-from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, Parts, forget, greet, make
-from ddenv.engine.cluster.taking_in import refusal
+from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
 from ddenv.engine.pool import Broken, Pace, Pool
+from ddenv.engine.shared import machine, simulator
 from ddenv.engine.worker import Start
 from ddenv.errors import UserError, printable
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
-from ddenv.version import __version__
+from ddenv.text import count
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
@@ -79,7 +80,7 @@ class ClusterPool:
     def __init__(self, scenario: Scenario, world: World, robot: Model, cluster: str, tell: Tell) -> None:
         """Raises UserError if no scheduler answers, or where Drake is needed and not installed."""
         self._cluster, self._tell, self._parts = cluster, tell, (scenario, world, robot)
-        self._blob = pickle.dumps(Parts(*self._parts))
+        self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
         self._keys = 0
@@ -381,6 +382,40 @@ def _answer(done: Future[Any]) -> Any:
         return done.result()
     except BaseException as error:
         return error
+
+
+def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | None) -> str:
+    """Why a worker is left out whose first run of the whole world is `there`; "" if it may make tests.
+
+    Without a run `here` to compare with, only the version of ddenv counts.
+    """
+    if hello.version != __version__:
+        return f"it has ddenv {hello.version}, here is ddenv {__version__}"
+    if here is None:
+        return ""
+    if isinstance(there, Broken):
+        return f"its first run of the whole world broke: {there.failure}"
+    if there is None or not _same_bits(there, here):
+        return f"its first run of the whole world has other bits than here; {_difference(hello)}"
+    return ""
+
+
+def _difference(hello: Hello) -> str:
+    there = f"{hello.simulator}, {hello.machine}".split(", ")
+    here = f"{simulator()}, {machine()}".split(", ")
+    theirs = ", ".join(each for each in there if each not in here)
+    ours = ", ".join(each for each in here if each not in there)
+    return (
+        f"it has {theirs}, here is {ours}" if theirs else "it says that it has the same versions and the same processor"
+    )
+
+
+def _same_bits(one: RunResult, other: RunResult) -> bool:
+    """Whether two runs of the same models with the same seed are the same to the last bit."""
+    first, second = ((run.outcome, run.failure, run.cut, run.took_part) for run in (one, other))
+    ours, theirs = ({**run.motions, "": run.trajectory} for run in (one, other))
+    same_models = ours.keys() == theirs.keys()
+    return first == second and same_models and all(np.array_equal(ours[name], theirs[name]) for name in ours)
 
 
 _HANDLED: dict[type, Callable[[ClusterPool, Any], None]] = {

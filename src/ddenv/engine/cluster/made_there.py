@@ -11,17 +11,17 @@ import pickle
 import platform
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from distributed import Worker, get_worker
 
+from ddenv import __version__
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import machine, simulator
 from ddenv.robot.result import RunResult
-from ddenv.version import __version__
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -34,13 +34,8 @@ PERIOD = 0.5
 UNUSED = 600.0
 
 
-@dataclass(frozen=True)
-class Parts:
-    """What a test needs. They are sent once to each worker, as bytes."""
-
-    scenario: Scenario
-    world: World
-    robot: Model
+# What a test needs. It is sent once to each worker, as bytes.
+Parts = tuple[Scenario, World, Model]
 
 
 @dataclass(frozen=True)
@@ -86,18 +81,14 @@ def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]
     """
     _engines.add(asked.topic)
     hello = Hello(platform.node(), os.getpid(), __version__, simulator(), machine())
-    if hello.version != asked_version(asked.run):
+    # The name of the run begins with the engine's version: another one may understand nothing else.
+    if hello.version != asked.run.partition(" ")[0]:
         return hello, None
     known: Parts = pickle.loads(parts)
-    if known.scenario.oracle is not None:
-        command_words(known.scenario)
+    if known[0].oracle is not None:
+        command_words(known[0])
         return hello, None
     return hello, make(parts, asked)
-
-
-def asked_version(run: str) -> str:
-    """The engine's version of ddenv, from its name of the run: another one may understand nothing else."""
-    return run.partition(" ")[0]
 
 
 def make(parts: bytes, asked: Asked) -> RunResult | Broken:
@@ -178,26 +169,27 @@ def _new(parts: bytes) -> Pool:
     # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
     known: Parts = pickle.loads(parts)
-    return Pool(known.scenario, known.world, known.robot, 1, at_a_time=get_worker().state.nthreads)
+    return Pool(*known, 1, at_a_time=get_worker().state.nthreads)
 
 
 def _end_unused() -> None:
     while True:
         time.sleep(UNUSED / 10)
-        with _lock:
-            old = [each for each in _idle if time.monotonic() - each.since > UNUSED]
-            for each in old:
-                _idle.remove(each)
-        for each in old:
-            each.child.close()
+        for child in _taken_out(lambda idle: time.monotonic() - idle.since > UNUSED):
+            child.close()
 
 
 def forget(run: str) -> None:
     """Ends the idle children of `run`."""
-    with _lock:
-        own = [each for each in _idle if each.run == run]
-        for each in own:
-            _idle.remove(each)
-    for each in own:
+    for child in _taken_out(lambda idle: idle.run == run):
         # This is the thread in which the worker talks with the scheduler.
-        threading.Thread(target=each.child.close).start()
+        threading.Thread(target=child.close).start()
+
+
+def _taken_out(which: Callable[[_Idle], bool]) -> list[Pool]:
+    """The idle children of this kind, which are idle no longer."""
+    with _lock:
+        taken = [idle for idle in _idle if which(idle)]
+        for idle in taken:
+            _idle.remove(idle)
+    return [idle.child for idle in taken]

@@ -21,8 +21,7 @@ from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.progress import Decision, Node
 from ddenv.runfile.state import RunState
-from ddenv.text import plain, shortened
-from ddenv.words import first_of
+from ddenv.text import first_of, plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place

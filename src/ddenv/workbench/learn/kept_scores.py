@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ddenv.amounts import count
 from ddenv.learn.score import Score, data_of, score_of
 from ddenv.runs.remembered import read_state, write_state
+from ddenv.text import count
 
 FILE = "lessons.json"
 

@@ -11,19 +11,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TextIO
 
-from ddenv import processor
-from ddenv.amounts import rounded
 from ddenv.errors import UserError
 from ddenv.evidence.claims import drift
 from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
+from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
-from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.state import Candidate, RunState, Trial
+from ddenv.runs import processor
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.runs.tests_left import remaining
-from ddenv.text import plain, printable
-from ddenv.words import first_of, headline, news
+from ddenv.text import first_of, plain, printable, rounded
+from ddenv.words.news import headline, news
 from ddenv.workbench.run.candidate_rows import name_of
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.shared.poll import Poll, Snapshot

@@ -13,12 +13,12 @@ from typing import Any
 
 from textual.screen import Screen
 
-from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, data_of, question, refusal, said, starts_engine
-from ddenv.guiding.pace import Isolate, StartEngine
+from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
+from ddenv.runs import processor
 from ddenv.text import plain
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine

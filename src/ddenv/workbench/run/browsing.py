@@ -13,7 +13,7 @@ from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import pointed, purpose
 from ddenv.text import plain
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.wording import count, outcome
 

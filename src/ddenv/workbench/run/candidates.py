@@ -18,8 +18,7 @@ from textual.strip import Strip
 
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.runs.fresh_runs import FreshRuns
-from ddenv.text import plain
-from ddenv.words import first_of
+from ddenv.text import first_of, plain
 from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
 from ddenv.workbench.shared.poll import Snapshot
 

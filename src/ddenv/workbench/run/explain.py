@@ -14,7 +14,7 @@ from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.text import plain
-from ddenv.words import failed_in, isolating, other_failures
+from ddenv.words.news import failed_in, isolating, other_failures
 from ddenv.workbench.run.explain_decisions import (
     arrival,
     by_hand,

@@ -20,8 +20,7 @@ from ddenv.guiding.situation import Situation
 from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.failures import named
 from ddenv.runfile.state import RunState
-from ddenv.text import plain, shortened
-from ddenv.words import first_of
+from ddenv.text import first_of, plain, shortened
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.question import Question

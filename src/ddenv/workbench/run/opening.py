@@ -10,8 +10,7 @@ from rich.text import Text
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.guiding.course import GoBack
-from ddenv.guiding.pace import Stop
+from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings

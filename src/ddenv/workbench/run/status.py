@@ -9,14 +9,13 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.amounts import between, percent, rounded
+from ddenv import __version__
 from ddenv.evidence.claims import drift, ended, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
-from ddenv.text import plain, shortened, truncated
-from ddenv.version import __version__
+from ddenv.text import between, percent, plain, rounded, shortened, truncated
 from ddenv.workbench.run.methods import GROUPS, labels
 from ddenv.workbench.shared.branches import path
 from ddenv.workbench.shared.poll import Snapshot

@@ -14,8 +14,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from ddenv.text import plain, truncated
-from ddenv.words import first_of
+from ddenv.text import first_of, plain, truncated
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
 from ddenv.workbench.shared.wording import brief, count

@@ -13,8 +13,7 @@ from textual.binding import Binding
 from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
-from ddenv.text import plain, shortened
-from ddenv.words import first_of
+from ddenv.text import first_of, plain, shortened
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
 from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open

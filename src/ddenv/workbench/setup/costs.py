@@ -9,11 +9,11 @@ from pathlib import Path
 from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
-from ddenv.amounts import about, between, rounded
 from ddenv.errors import UserError
 from ddenv.runfile.events import BaselineFinished, TestFinished
 from ddenv.runfile.store import RunFile
 from ddenv.runs.tests_left import rough_run
+from ddenv.text import about, between, rounded
 from ddenv.workbench.shared.wording import count
 
 if TYPE_CHECKING:

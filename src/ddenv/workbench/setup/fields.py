@@ -16,8 +16,8 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import Button, Input, Label, OptionList, Select, Static
 
-from ddenv import processor
 from ddenv.errors import UserError
+from ddenv.runs import processor
 from ddenv.schemas import Kind, names, uses
 from ddenv.text import plain
 from ddenv.workbench.run.methods import chosen, note, paragraph

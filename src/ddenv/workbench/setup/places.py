@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ddenv import processor
+from ddenv.runs import processor
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.settings import JOBS
 from ddenv.workbench.setup import form

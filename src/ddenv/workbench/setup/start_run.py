@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from textual.app import App
 
-from ddenv import processor
 from ddenv.errors import UserError
+from ddenv.runs import processor
 from ddenv.settings import OPTIONS, PRINTED, number_text, read
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice

@@ -12,7 +12,7 @@ from rich.text import Text
 from ddenv.runfile.progress import Decision
 from ddenv.runfile.state import RunState
 from ddenv.text import plain
-from ddenv.words import news
+from ddenv.words.news import news
 
 # Where the words begin, after the time.
 BEGIN = " " * 10

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
 from ddenv.runfile.fold import spent
@@ -17,7 +18,6 @@ from ddenv.runfile.follow import Follower
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
-from ddenv.version import __version__
 from ddenv.workbench.shared.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.

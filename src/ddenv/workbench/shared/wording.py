@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ddenv.amounts import about as about
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
+from ddenv.text import about as about
+from ddenv.text import count as count
+from ddenv.text import duration as duration
+from ddenv.text import percent as percent
 from ddenv.text import plain, shortened
-from ddenv.words import SETTLING
-from ddenv.words import count as count
-from ddenv.words import duration as duration
-from ddenv.words import percent as percent
+from ddenv.words.news import SETTLING
 
 # Every status and verdict has its own sign, so that nothing depends on colour alone.
 STATUS = {

@@ -16,7 +16,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
-from ddenv.version import how_to_install
+from ddenv.runs.programs import how_to_install
 
 HOST = "127.0.0.1"
 TOKEN_BYTES = 16

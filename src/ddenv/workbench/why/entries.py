@@ -15,7 +15,7 @@ from ddenv.runfile.supports import Names
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, reasons, sentence
 from ddenv.text import padded, plain, shortened
-from ddenv.words import isolating
+from ddenv.words.news import isolating
 from ddenv.workbench.playback.moving import snapshot_with
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.wording import CLAIM, percent

@@ -17,7 +17,7 @@ from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.guiding.pace import Isolate, Stop
+from ddenv.guiding.course import Isolate, Stop
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile

@@ -1,4 +1,4 @@
-"""A disk without space stops no reduction: no test starts until there is some, and none that has ended is lost."""
+"""What disturbs an engine from outside: a disk without space, and a clock that does not go on evenly."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import shutil
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
+from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile import events
 from ddenv.runfile.store import NoRoom, RunFile
@@ -59,3 +61,28 @@ class DiskSpace:
 
     def _free(self) -> int:
         return shutil.disk_usage(self._file.path.parent).free
+
+
+# How far a clock that is kept exact may go on or back between two looks, s.
+SMALL = 2.0
+
+
+class ClockJumps:
+    """Compares Unix time with a clock that stands still while the machine sleeps, and that nobody can set; both in s."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        clock: Callable[[], float] = time.time,
+        steady: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._journal = journal
+        self._offset: Callable[[], float] = lambda: clock() - steady()
+        self._last = self._offset()
+
+    def look(self) -> None:
+        """Records a jump since the last look: what is reckoned from the time that the run took would be wrong."""
+        offset = self._offset()
+        jump, self._last = offset - self._last, offset
+        if abs(jump) > SMALL:
+            self._journal.record(events.ClockJumped(jump))

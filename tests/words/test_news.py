@@ -4,7 +4,7 @@ from ddenv.cli.summary import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded
-from ddenv.words import baseline, headline, news
+from ddenv.words.news import baseline, headline, news
 from tests.shorthand import typed
 
 

@@ -5,10 +5,6 @@ from __future__ import annotations
 import shutil
 from collections import Counter
 
-from ddenv.amounts import count as count
-from ddenv.amounts import duration as duration
-from ddenv.amounts import first_of as first_of
-from ddenv.amounts import percent as percent
 from ddenv.evidence.claims import (
     in_the_making,
     made_of_usual,
@@ -25,6 +21,7 @@ from ddenv.runfile.failures import Baseline
 from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
+from ddenv.text import count, first_of
 
 SETTLING = "finding what rests on what"
 ISOLATING = "finding the nearest world that passes"

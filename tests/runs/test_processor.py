@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from ddenv import processor
+from ddenv.runs import processor
 
 VERSION_1 = "4:cpu,cpuacct:/docker/a\n3:memory:/docker/a"
 

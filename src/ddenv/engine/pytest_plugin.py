@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from ddenv.engine.reproducing import Reproduction
+    from ddenv.engine.single_test import Reproduction
 
 Reproduce = Callable[..., "Reproduction"]
 
@@ -30,7 +30,7 @@ def ddenv_reproduce(request: pytest.FixtureRequest) -> Reproduce:
     def reproduce(
         run: str | Path, folder: str | Path | None = None, most: int = 60, trust: bool = False
     ) -> Reproduction:
-        from ddenv.engine.reproducing import last_of
+        from ddenv.engine.single_test import last_of
 
         here = request.path.parent
         return last_of(here / run, None if folder is None else here / folder, most, 1, trust)

@@ -1,0 +1,136 @@
+"""What an engine does before its first test: it asks whether the engines before it died at once, whether it still computes the same
+as they did, and what rests on what.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddenv.engine.bench import Bench
+from ddenv.engine.control import Control
+from ddenv.engine.journal import Journal
+from ddenv.engine.judging import rows_of
+from ddenv.engine.limits import wall_limit
+from ddenv.engine.noting import note
+from ddenv.engine.pool import Broken, Workers
+from ddenv.errors import UserError
+from ddenv.robot.result import RunResult
+from ddenv.robot.settled import notes_on
+from ddenv.runfile.events import (
+    AcceptModeChanged,
+    Compared,
+    Comparing,
+    EngineStarted,
+    EnvironmentNamed,
+    LegStarted,
+    Still,
+    Supports,
+    SupportsStarted,
+    TestLost,
+    TestStarted,
+)
+from ddenv.runfile.state import RunState, Test
+from ddenv.runs.programs import log_of
+from ddenv.world.model import Model, World
+from ddenv.world.placement import notes_on_start
+from ddenv.world.scenario import Scenario
+
+# So many engines may die in a row, each before it has got anywhere.
+MOST_DEATHS = 3
+# What an engine writes again and again without getting anywhere.
+NOWHERE = (AcceptModeChanged, Comparing, SupportsStarted, LegStarted, EnvironmentNamed, TestStarted, TestLost)
+# The last events that are looked at.
+LAST = 3000
+
+
+def check_crash_loop(journal: Journal) -> None:
+    """Raises UserError if the last engines all died before they got anywhere."""
+    path, last = journal.file.path, journal.state.revision
+    deaths, place = 0, 0
+    for event in journal.file.events(max(0, last - LAST)):
+        if isinstance(event.event, EngineStarted):
+            deaths += 1
+        elif not isinstance(event.event, NOWHERE):
+            deaths, place = 0, event.id
+    if deaths >= MOST_DEATHS:
+        raise UserError(
+            f"{path}: the last {deaths} engines died after event {place}, before a test ended; {log_of(path)} may say why; "
+            f"'ddenv resume {path} --anyway' tries once more, perhaps with fewer --jobs"
+        )
+
+
+# How long to wait for the test before looking at commands again, s.
+WAIT = 0.05
+
+
+def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool) -> None:
+    """Makes the first baseline run again, and compares its bits, if this engine computes with anything else than the earlier ones.
+
+    Raises UserError if they differ, unless the run goes on `mixed`; and Stopped.
+    """
+    state = journal.state
+    test = _comparable(state)
+    if state.physics.now == state.physics.proven or test is None:
+        return
+    journal.record(Comparing(test.id))
+    pool.submit(0, frozenset(state.elements), test.seed, limit=wall_limit(state))
+    while not (ended := pool.finished(WAIT)):
+        control.poll()
+    result = ended[0][1]
+    same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
+    if not same and not mixed:
+        raise UserError(_differs(journal, result))
+    journal.record(Compared(same))
+
+
+def _comparable(state: RunState) -> Test | None:
+    """The first run of the whole world that did not break."""
+    baseline = (test for test in state.tests if test.phase == "baseline")
+    return next((test for test in baseline if test.outcome in ("similar", "other", "pass", "failed")), None)
+
+
+def _differs(journal: Journal, result: RunResult | Broken) -> str:
+    run, physics = journal.file.path, journal.state.physics
+    how = f"broke ({result.failure})" if isinstance(result, Broken) else "gives another trajectory"
+    return (
+        f"{run}: made again, the first run of the whole world {how}: the tests were made with {physics.before}, and this is "
+        f"{physics.after}; 'ddenv resume {run} --mixed' goes on all the same, 'ddenv resume {run} --again' makes all tests again "
+        "in a new run"
+    )
+
+
+def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal) -> None:
+    """Notes what the files alone show of the start, before the first test."""
+    if journal.state.baseline is None:
+        for about, words in notes_on_start(world, robot, scenario.robot.spawn):
+            note(journal, about, words)
+
+
+def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> None:
+    """Does nothing where nothing can move, or if it is known. Notes what is wrong with the start of the world.
+
+    Raises UserError if stacks are to be kept and it cannot be known.
+    """
+    moves = any(model.links and not model.static for model in world.models)
+    if not moves and scenario.reduction.slice and journal.state.ties is None:
+        journal.record(Still())
+    if journal.state.ties is not None or journal.state.unsettled or journal.state.supports or not moves:
+        return
+    needed = scenario.reduction.keep_supports
+    if scenario.oracle is not None:
+        if needed:
+            raise UserError(
+                "reduction.keep_supports: only ddenv's own simulator finds what rests on what; leave it out, or 'oracle'"
+            )
+        return
+    elements = journal.state.elements
+    found = bench.settle(frozenset(elements), lambda: journal.record(SupportsStarted()))
+    if not isinstance(found, Broken):
+        for about, words in notes_on(world, found.settled):
+            note(journal, about, words)
+        ties = None if found.ties is None else journal.pairs(found.ties)
+        journal.record(Supports(journal.pairs(found.supports), ties))
+    elif needed:
+        raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")
+    else:
+        journal.record(Supports((), why=found.failure))
