@@ -146,8 +146,6 @@ class Notice:
             yield from ((name, times[row]) for name, row in zip(names, rows, strict=True) if row >= 0)
 
 
-# Rows of a recording that are processed together, which shares the overhead of NumPy's calls.
-TOGETHER = 32
 # The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
 PARALLEL = 1e-12
 
@@ -160,15 +158,10 @@ def first_in_view(
     `low` and `high` (T, N, 3) m, `eyes` (T, 3) m and `headings` (T,) rad have a row for each of T instants, world frame.
     """
     first = np.full(low.shape[1], -1)
-    for start in range(0, len(eyes), TOGETHER):
-        rows = slice(start, start + TOGETHER)
-        eye = eyes[rows]
-        lowest, highest = low[rows].min(axis=0) - eye.max(axis=0), eye.min(axis=0) - high[rows].max(axis=0)
-        least = np.linalg.norm(np.maximum(np.maximum(lowest, highest), 0.0), axis=1)
-        near = np.flatnonzero((first < 0) & (least <= view_range))
-        seen = in_view(low[rows, near], high[rows, near], eye[:, None], headings[rows, None], view_range, view_angle)
-        ever = seen.any(axis=0)
-        first[near[ever]] = start + seen.argmax(axis=0)[ever]
+    for row, (eye, heading) in enumerate(zip(eyes, headings, strict=True)):
+        (unseen,) = (first < 0).nonzero()
+        seen = in_view(low[row, unseen], high[row, unseen], eye, heading, view_range, view_angle)
+        first[unseen[seen]] = row
     return first
 
 

@@ -26,7 +26,7 @@ from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
 from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
-from ddenv.robot.simulation.run import Run, RunParts, Stuck, seconds_for
+from ddenv.robot.simulation.run import Run, Stuck, seconds_for
 from ddenv.robot.simulation.taking_part import Reached, Solids
 from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import shape_bounds, with_ground_boxes
@@ -149,7 +149,8 @@ class Template:
         self._context.presence.remove(removed)
         with self._asleep(kept, present) as (sleep, unusual):
             suite = SensorSuite(self._scenario.sensors, seed)
-            parts = RunParts(
+            run = Run(
+                context=self._context,
                 scenario=self._scenario,
                 drive=self._drive,
                 sleep=sleep,
@@ -165,7 +166,7 @@ class Template:
                 kept=kept,
                 seed=seed,
             )
-            return Run(self._context, parts).execute(progress)
+            return run.execute(progress)
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """What rests on what in the whole world, as `piles.support.supports` has it. Raises LeftRegion."""
