@@ -10,7 +10,7 @@ import pytest
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation import notice
 from ddenv.robot.simulation.notice import Notice, first_in_view, in_view
-from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
+from ddenv.robot.simulation.taking_part import ENDLESS, Hull
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose

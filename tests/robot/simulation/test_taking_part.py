@@ -13,7 +13,7 @@ from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.simulation import taking_part
-from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.robot.simulation.taking_part import Hull
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose

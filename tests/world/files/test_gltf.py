@@ -96,7 +96,7 @@ HOSTILE_GLTF = {
     "remote": (gltf("http://example.org/x.bin"), "is outside the file's folder"),
     "file": (gltf("file:///etc/passwd"), "is outside the file's folder"),
     "nul": (gltf("a%00b"), "is outside the file's folder"),
-    "gone": (gltf("gone.bin"), "buffer 'gone.bin' cannot be read: No such file"),
+    "gone": (gltf("gone.bin"), "buffer 'gone.bin': no such file"),
     "folder": (gltf("."), "buffer '.' is a folder"),
     "base64": (gltf("data:x;base64,!!!"), "not a valid GLTF"),
     "circle": (gltf(nodes=[{"children": [0], "mesh": 0}]), "form a tree"),

@@ -25,9 +25,8 @@ from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
-from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
-from ddenv.robot.simulation.taking_part import Reached, Solids
+from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
 from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import shape_bounds, with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
