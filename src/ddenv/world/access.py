@@ -33,7 +33,7 @@ def read(path: Path, limit: int) -> bytes:
     """The bytes of the file `path`. Raises Unusable if it is not a regular file, is unreadable or exceeds `limit` bytes."""
     size = size_of(path)
     if size > limit:
-        raise Unusable(f"has {size / 1e6:.0f} MB; the maximum is {limit / 1e6:.0f} MB")
+        raise Unusable(f"{size / 1e6:.0f} MB is too large; the maximum is {limit / 1e6:.0f} MB")
     try:
         with path.open("rb") as file:
             return file.read(limit)

@@ -97,7 +97,7 @@ HOSTILE_GLTF = {
     "file": (gltf("file:///etc/passwd"), "is outside the file's folder"),
     "nul": (gltf("a%00b"), "is outside the file's folder"),
     "gone": (gltf("gone.bin"), "buffer 'gone.bin': no such file"),
-    "folder": (gltf("."), "buffer '.' is a folder"),
+    "folder": (gltf("."), "buffer '.': is a folder"),
     "base64": (gltf("data:x;base64,!!!"), "not a valid GLTF"),
     "circle": (gltf(nodes=[{"children": [0], "mesh": 0}]), "form a tree"),
     "bomb": (gltf(nodes=[{"children": [1] * 9}, {"mesh": 0}]), "form a tree"),

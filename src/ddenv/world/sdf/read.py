@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import read_bytes
-from ddenv.world.files.resources import Disk, Resources
+from ddenv.world.files.resources import Resources, on_disk
 from ddenv.world.model import Model, World
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
@@ -77,12 +77,12 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
 
-def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Disk:
+def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Resources:
     """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return Disk(path.parent, reading.model_path, announce)
+    return on_disk(path.parent, reading.model_path, announce)
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:
