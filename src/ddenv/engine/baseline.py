@@ -10,7 +10,7 @@ import numpy as np
 from ddenv.amounts import count
 from ddenv.engine.judging import end_of
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
-from ddenv.robot.oracle import Failure, is_similar, judge_trajectory
+from ddenv.robot.oracle import Failure, judge_trajectory
 from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
 from ddenv.runfile.failures import SeenFailure, grouped
 from ddenv.runfile.state import BROKEN, Test
@@ -37,7 +37,7 @@ def fix_failure(
     failures = [Failure(end_of(test), trajectories[test.id], spec.epsilon, spec.similarity) for test in failing]
 
     def apart(first: int, second: int) -> float | None:
-        if not is_similar(failures[second].trajectory, failures[first]):
+        if judge_trajectory(failures[second].trajectory, failures[first]).outcome != "similar":
             return None
         return float(np.linalg.norm(np.subtract(failures[first].position, failures[second].position)))
 

@@ -148,6 +148,13 @@ class Template:
         self._context.presence.remove(removed)
         with self._asleep(kept, present) as (sleep, unusual):
             suite = SensorSuite(self._scenario.sensors, seed)
+            lidar = None
+            if self._scenario.sensors.lidar and self._obstacles:
+                movers = [self._models[body.name] for body in kept]
+                lidar = Lidar(self._scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
+            reached = None
+            if self._slices and self._sleeping and self._repertoire.learnt:
+                reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
             run = Run(
                 context=self._context,
                 scenario=self._scenario,
@@ -157,10 +164,10 @@ class Template:
                     self._surroundings, self._scenario.sensors, self._context.plant_context, sleep, kept, present
                 ),
                 autonomy=self._autonomy(suite, seed, listener),
-                lidar=self._lidar(present, kept, suite),
+                lidar=lidar,
                 watch=Watch(self._region, self._reach) if self._far else None,
                 stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
-                reached=self._reached(sleep, present),
+                reached=reached,
                 unusual=unusual,
                 kept=kept,
                 seed=seed,
@@ -210,11 +217,6 @@ class Template:
         ties = self._repertoire.ties if self._repertoire.learnt else {}
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
-    def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
-        if not (self._slices and self._sleeping and self._repertoire.learnt):
-            return None
-        return Reached(self._solids, self._hull, sleep, present, self._clock.period)
-
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
         controller = self._controllers(setup)
@@ -223,12 +225,6 @@ class Template:
         return Autonomy(
             scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
         )
-
-    def _lidar(self, present: frozenset[str], kept: Sequence[Body], suite: SensorSuite) -> Lidar | None:
-        settings = self._scenario.sensors.lidar
-        if settings is None or self._obstacles is None:
-            return None
-        return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:

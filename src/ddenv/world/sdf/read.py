@@ -21,7 +21,7 @@ from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.standin import AUTO
-from ddenv.world.sdf.urdf import ROOT, massless, to_sdf, without_mass
+from ddenv.world.sdf.urdf import ROOT, to_sdf, without_mass
 from ddenv.world.sdf.xml import complain, name_of, numbers, parse
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
@@ -72,7 +72,7 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
     try:
         model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
         context.complain_of_missing()
-        return model if urdf is None else without_mass(model, massless(urdf))
+        return model if urdf is None else without_mass(model, urdf)
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
