@@ -68,7 +68,7 @@ def row(name: str, repaired: bool, results: list[RunResult]) -> str:
     similar = 0
     if failed:
         epsilon = load_scenario(SCENARIOS / f"{name}.yaml").failure.epsilon
-        similar = len(alike([result.end_position for result in failed], epsilon)[0])
+        similar = len(alike([result.end_pose[:3] for result in failed], epsilon)[0])
     kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(one.failure for one in failed).most_common())
     longest = max((one.simulated_seconds for one in results if one.outcome == "pass"), default=None)
     cells = [name, "repaired" if repaired else "whole", share(len(failed), len(results)), share(similar, len(results))]

@@ -107,7 +107,7 @@ def compare(templates: Iterable[tuple[Template, Scenario]], runs: int) -> None:
             began = time.process_time()
             result = template.run(template.names, seed, full=False)
             cost[sleeping] += (time.process_time() - began) / result.simulated_seconds
-            pair.append((result.failure or result.outcome, result.end_position))
+            pair.append((result.failure or result.outcome, result.end_pose[:3]))
         ends.append(pair)
         other += pair[0][0] != pair[1][0] or math.dist(pair[0][1], pair[1][1]) > scenario.failure.epsilon
         print(seed, *(f"{kind} at {x:.2f} {y:.2f} {z:.2f}" for kind, (x, y, z) in pair), sep="   ", flush=True)

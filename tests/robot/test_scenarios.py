@@ -107,7 +107,7 @@ def test_the_friction_of_patches_differs_a_thousandfold():
 def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
     results = [whole(name, seed) for seed in range(SEEDS[name])]
     failed = [result for result in results if result.outcome == "failed"]
-    ends = [result.end_position for result in failed]
+    ends = [result.end_pose[:3] for result in failed]
     similar = alike(ends, part(name).scenario.failure.epsilon)[0]
     assert 0.6 <= len(similar) / len(results) <= 1.0
     assert ends[similar[0]] == pytest.approx(ENDS[name], abs=0.15)
@@ -128,8 +128,8 @@ def test_it_reaches_its_goal_where_the_cause_is_taken_away(name, script):
 def failure(name: str) -> Failure:
     """f, as a run of the whole world has it that ends where most do."""
     runs = (whole(name, seed) for seed in range(SEEDS[name]))
-    first = next(run for run in runs if np.linalg.norm(np.subtract(run.end_position, ENDS[name])) < 0.15)
-    return Failure(first.end_position, first.trajectory, part(name).scenario.failure.epsilon)
+    first = next(run for run in runs if np.linalg.norm(np.subtract(run.end_pose[:3], ENDS[name])) < 0.15)
+    return Failure(first.end_pose[:3], first.trajectory, part(name).scenario.failure.epsilon)
 
 
 def shows_f(name: str, keep: set[str], seeds: range) -> list[bool]:

@@ -45,7 +45,7 @@ def test_a_program_on_the_path_is_found(words):
         ("'' x", "names no program"),
         ("no-such-program-of-ours", "no program 'no-such-program-of-ours' on PATH$"),
         ("run.sh", "no program 'run.sh' on PATH; there is one in .*: write ./run.sh"),
-        ("./missing.sh", "missing.sh: cannot be read: No such file"),
+        ("./missing.sh", "missing.sh: no such file"),
         ("./plain.sh", "plain.sh: is not executable; use 'chmod [+]x'"),
         ("/tmp/", "is a folder"),
         ("./run.sh a\0b", "NUL"),

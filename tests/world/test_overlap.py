@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
-from ddenv.world.overlap import Hull, distance, hull, overlap
+from ddenv.world.placement import Hull, distance, hull, overlap
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.read import read_model
 

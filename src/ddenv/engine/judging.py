@@ -14,7 +14,7 @@ import numpy as np
 from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
-from ddenv.robot.oracle import Failure, Judgement, is_similar, judge, judge_trajectory
+from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
 from ddenv.runfile.failures import Baseline, SeenFailure, grouped
@@ -132,7 +132,7 @@ def fix_failure(
     failures = [Failure(end_of(test), trajectories[test.id], spec.epsilon, spec.similarity) for test in failing]
 
     def apart(first: int, second: int) -> float | None:
-        if not is_similar(failures[second].trajectory, failures[first]):
+        if judge_trajectory(failures[second].trajectory, failures[first]).outcome != "similar":
             return None
         return float(np.linalg.norm(np.subtract(failures[first].position, failures[second].position)))
 

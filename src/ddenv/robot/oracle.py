@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,28 +86,15 @@ class Judgement:
 def judge(result: RunResult, failure: Failure) -> Judgement:
     """The outcome of a run with regard to f (`is_similar_failure` of the paper)."""
     judgement = judge_trajectory(result.trajectory, failure)
-    if result.outcome == "failed":
-        return judgement
-    return Judgement(result.outcome, judgement.distance, judgement.trajectory_distance)
+    return judgement if result.outcome == "failed" else replace(judgement, outcome=result.outcome)
 
 
 def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
     """Whether the trajectory (N, 8) of a failed run shows f ("similar") or another failure ("other")."""
+    distance = float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
     along = trajectory_distance(trajectory, failure.trajectory)
-    outcome = "similar" if is_similar(trajectory, failure) else "other"
-    return Judgement(outcome, _distance(trajectory, failure), along)
-
-
-def is_similar(trajectory: Floats, failure: Failure) -> bool:
-    """Whether the trajectory (N, 8) of a failed run shows f."""
-    if _distance(trajectory, failure) > failure.epsilon:
-        return False
-    return failure.similarity == "end-pose" or trajectory_distance(trajectory, failure.trajectory) <= failure.epsilon
-
-
-def _distance(trajectory: Floats, failure: Failure) -> float:
-    """Between the ends, m."""
-    return float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
+    similar = distance <= failure.epsilon and (failure.similarity == "end-pose" or along <= failure.epsilon)
+    return Judgement("similar" if similar else "other", distance, along)
 
 
 def trajectory_distance(a: Floats, b: Floats) -> float:

@@ -10,7 +10,6 @@ from typing import Protocol
 import numpy as np
 
 from ddenv.arrays import Floats
-from ddenv.world.pose import Vector
 
 # x, y, z (m), qw, qx, qy, qz.
 PoseRow = tuple[float, float, float, float, float, float, float]
@@ -52,11 +51,6 @@ class RunResult:
         """The pose of the robot at the end: x, y, z (m), qw, qx, qy, qz."""
         x, y, z, qw, qx, qy, qz = self.trajectory[-1, 1:].tolist()
         return x, y, z, qw, qx, qy, qz
-
-    @property
-    def end_position(self) -> Vector:
-        """x, y, z (m) of the robot at the end."""
-        return self.end_pose[:3]
 
 
 class Simulator(Protocol):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
@@ -14,8 +14,8 @@ from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.world.access import Missing, Unusable, write_file
 from ddenv.world.files.resolve import find
-from ddenv.world.files.resources import Stored
-from ddenv.world.model import Mesh, World
+from ddenv.world.files.resources import Resources
+from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import parse_model, parse_world
 from ddenv.world.write import without
@@ -29,23 +29,6 @@ class Exported:
     needs: list[str]
 
 
-class _Asked:
-    """Stored resources that record requests in `names`: each URI with the folder of the file that contains it."""
-
-    def __init__(self, stored: Stored) -> None:
-        self.taken = stored.taken
-        self.names: dict[tuple[str, Path], None] = {}
-        self._stored = stored
-
-    def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
-        self.names[uri, base] = None
-        return self._stored.sdf(uri, base)
-
-    def mesh(self, uri: str, base: Path, **how: Any) -> Mesh:
-        self.names[uri, base] = None
-        return self._stored.mesh(uri, base, **how)
-
-
 def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False) -> Exported:
     """Writes the current environment of a run, or the nearest world that `passes`, as an SDF world, and a scenario for it if asked.
 
@@ -53,7 +36,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     """
     with RunFile(run) as file:
         scenario, world, _ = read_parts(file)
-        robot, stored = file.document("robot"), Stored(file.documents(RESOURCE))
+        robot, documents = file.document("robot"), file.documents(RESOURCE)
         state = fold(file.events())
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
@@ -64,9 +47,9 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     except ValueError as error:
         raise UserError(f"{run}: damaged run file: its world has {error}") from None
     write_file(sdf, text)
-    asked = _Asked(stored)
+    asked = Resources(documents)
     minimal = parse_world(text, scenario.world, scenario.reading, asked)
-    needs = list(dict.fromkeys(uri for uri, base in asked.names if base == scenario.world.parent))
+    needs = list(dict.fromkeys(uri for uri, base in asked.asked if base == scenario.world.parent))
     if scenario_file is None:
         return Exported([sdf], needs)
     model = scenario_file.with_suffix(f".robot{_suffix(scenario.robot.model)}")
@@ -82,7 +65,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
         data["oracle"]["folder"] = _name(scenario.oracle.folder, folder)
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
     data["protected"] = _renamed(scenario.protected, world, removed, minimal)
-    needed = (*_folders(scenario, asked, robot, stored), *_packages(scenario.robot.model, robot))
+    needed = (*_folders(scenario, asked, robot, documents), *_packages(scenario.robot.model, robot))
     model_path = (*scenario.reading.model_path, *needed)
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
@@ -112,13 +95,13 @@ def _renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], 
     return [names[name] for name in protected]
 
 
-def _folders(scenario: Scenario, asked: _Asked, robot: bytes, stored: Stored) -> list[Path]:
+def _folders(scenario: Scenario, asked: Resources, robot: bytes, documents: Mapping[str, bytes]) -> list[Path]:
     """Those folders of the original world and robot that the exported files still need."""
     file = scenario.robot.model
-    asked_by_robot = _Asked(stored)
+    asked_by_robot = Resources(documents)
     parse_model(robot, file, scenario.reading, asked_by_robot)
     both = ((scenario.world.parent, asked), (file.parent, asked_by_robot))
-    return [folder for folder, each in both if any(_leans_on(folder, uri, base) for uri, base in each.names)]
+    return [folder for folder, each in both if any(_leans_on(folder, uri, base) for uri, base in each.asked)]
 
 
 def _leans_on(folder: Path, uri: str, base: Path) -> bool:

@@ -20,7 +20,7 @@ from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
 from ddenv.world.access import read_bytes, write_file
 from ddenv.world.command import command_words
-from ddenv.world.files.resources import Stored
+from ddenv.world.files.resources import Resources
 from ddenv.world.load import SCENARIOS, SDF, bundled_names, find_scenario, load_scenario, validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
@@ -237,7 +237,7 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     """The scenario, world and robot of a run file. Raises UserError."""
     scenario = read_scenario(run)
     # Never opens another file, whatever the run file says.
-    stored = Stored(run.documents(RESOURCE))
+    stored = Resources(run.documents(RESOURCE))
     world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
     robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
     if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):

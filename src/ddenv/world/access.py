@@ -33,7 +33,7 @@ def read(path: Path, limit: int) -> bytes:
     """The bytes of the file `path`. Raises Unusable if it is not a regular file, is unreadable or exceeds `limit` bytes."""
     size = size_of(path)
     if size > limit:
-        raise Unusable(f"has {size / 1e6:.0f} MB; the maximum is {limit / 1e6:.0f} MB")
+        raise Unusable(f"{size / 1e6:.0f} MB is too large; the maximum is {limit / 1e6:.0f} MB")
     try:
         with path.open("rb") as file:
             return file.read(limit)
@@ -74,26 +74,16 @@ def without_tilde(name: str) -> Path:
 
 
 def reason(error: OSError) -> str:
-    return f"cannot be read: {error.strerror or error}"
+    """Why a file cannot be read."""
+    return "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror or error}"
 
 
 def read_bytes(path: Path) -> bytes:
     """The content of a file. Raises UserError if it is missing, unreadable or larger than `MAX_BYTES`."""
     try:
-        if path.is_dir():
-            raise UserError(f"{path}: is a folder; expected a file")
-        if path.exists() and not path.is_file():
-            raise UserError(f"{path}: is not a regular file")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise UserError(f"{path}: {size / 1e6:.0f} MB is too large; the maximum is {MAX_BYTES / 1e6:.0f} MB")
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file") from None
-    except ValueError:
-        raise UserError(f"{path}: is not a valid file name") from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        return read(path, MAX_BYTES)
+    except Unusable as error:
+        raise UserError(f"{path}: {error}") from None
 
 
 def write_file(path: Path, content: bytes) -> None:

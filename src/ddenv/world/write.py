@@ -61,25 +61,26 @@ def without(world: World, removed: frozenset[str]) -> bytes:
 
 @dataclass
 class Converted:
-    """`text` is the world's SDF; `meshes` are the OBJ files it refers to, by relative path."""
+    """`text` is the world's SDF; `meshes` are the meshes it refers to, with the relative paths of their OBJ files in `folder`."""
 
+    folder: str
     text: bytes = b""
-    meshes: dict[str, bytes] = field(default_factory=dict)
+    meshes: dict[Mesh, str] = field(default_factory=dict)
+
+    def file(self, mesh: Mesh) -> str:
+        return self.meshes.setdefault(mesh, f"{self.folder}/mesh_{len(self.meshes) + 1}.obj")
 
 
 def convert(world: World, mesh_folder: str) -> Converted:
     """`world` as SDF 1.9, its meshes in the folder `mesh_folder` beside it."""
-    out = Converted()
-    files = _MeshFiles(mesh_folder)
+    out = Converted(mesh_folder)
     ElementTree.register_namespace("drake", DRAKE)
     root = Element("sdf", version="1.9")
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
     names = _unique(model.name for model in world.models)
     for name, model in zip(names, with_ground_boxes(world).models, strict=True):
-        _model(inside, name, model, files)
-    for mesh, name in files.names.items():
-        out.meshes[name] = obj(mesh)
+        _model(inside, name, model, out)
     ElementTree.indent(root)
     out.text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
     return out
@@ -96,24 +97,13 @@ def write_converted(world: World, path: Path) -> list[Path]:
             folder.mkdir(exist_ok=True)
         except OSError as error:
             raise UserError(f"{folder}: cannot be created: {error.strerror}") from None
-    files = {path.parent / name: content for name, content in converted.meshes.items()} | {path: converted.text}
+    files = {path.parent / name: obj(mesh) for mesh, name in converted.meshes.items()} | {path: converted.text}
     for file, content in files.items():
         write_file(file, content)
     return list(files)
 
 
-@dataclass
-class _MeshFiles:
-    """The files of meshes in `folder`, by mesh."""
-
-    folder: str
-    names: dict[Mesh, str] = field(default_factory=dict)
-
-    def name(self, mesh: Mesh) -> str:
-        return self.names.setdefault(mesh, f"{self.folder}/mesh_{len(self.names) + 1}.obj")
-
-
-def _model(parent: Element, name: str, model: Model, files: _MeshFiles) -> None:
+def _model(parent: Element, name: str, model: Model, out: Converted) -> None:
     element = SubElement(parent, "model", name=name)
     if model.static:
         SubElement(element, "static").text = "true"
@@ -122,14 +112,14 @@ def _model(parent: Element, name: str, model: Model, files: _MeshFiles) -> None:
     _pose(element, model.pose)
     names = dict(zip((link.name for link in model.links), _unique(link.name for link in model.links), strict=True))
     for link in model.links:
-        _link(element, names[link.name], link, model, files)
+        _link(element, names[link.name], link, model, out)
     joint_names = _unique((joint.name for joint in model.joints), taken=names.values())
     poses = {link.name: link.pose for link in model.links}
     for joint_name, joint in zip(joint_names, model.joints, strict=True):
         _joint(element, joint_name, joint, model, poses[joint.child], names)
 
 
-def _link(parent: Element, name: str, link: Link, model: Model, files: _MeshFiles) -> None:
+def _link(parent: Element, name: str, link: Link, model: Model, out: Converted) -> None:
     element = SubElement(parent, "link", name=name)
     _pose(element, model.pose.inverse() @ link.pose)
     if not model.gravity:
@@ -137,16 +127,16 @@ def _link(parent: Element, name: str, link: Link, model: Model, files: _MeshFile
     if link.inertia is not None:
         _inertia(element, link.inertia, link.pose)
     back = link.pose.inverse()
-    shapes: list[Collision | Visual] = [*link.collisions, *link.visuals]
-    names = [*_unique(one.name for one in link.collisions), *_unique(one.name for one in link.visuals)]
-    for one, own in zip(shapes, names, strict=True):
-        _shown(element, own, one, back, files)
+    groups: tuple[tuple[Collision | Visual, ...], ...] = (link.collisions, link.visuals)
+    for group in groups:
+        for one, own in zip(group, _unique(one.name for one in group), strict=True):
+            _shown(element, own, one, back, out)
 
 
-def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, files: _MeshFiles) -> None:
+def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, out: Converted) -> None:
     element = SubElement(parent, "collision" if isinstance(one, Collision) else "visual", name=name)
     _pose(element, back @ one.pose)
-    _geometry(element, one.shape, files)
+    _geometry(element, one.shape, out)
     if isinstance(one, Collision):
         friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
         for tag in ("mu", "mu2"):
@@ -157,7 +147,7 @@ def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file
             SubElement(material, tag).text = _numbers(one.color)
 
 
-def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
+def _geometry(parent: Element, shape: Shape, out: Converted) -> None:
     geometry = SubElement(parent, "geometry")
     if not isinstance(shape, Mesh):
         kind, sizes = primitive(shape)
@@ -166,7 +156,7 @@ def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
             SubElement(element, name).text = _numbers(values)
         return
     element = SubElement(geometry, "mesh")
-    SubElement(element, "uri").text = files.name(shape)
+    SubElement(element, "uri").text = out.file(shape)
     if parent.tag == "collision":
         SubElement(element, f"{{{DRAKE}}}declare_convex")
 
@@ -224,18 +214,10 @@ def _across(axis: Vector) -> Vector:
 
 def _turned(x_axis: Vector, y_axis: Vector) -> tuple[float, float, float, float]:
     """The quaternion (w, x, y, z) of the frame whose x and y axes are these unit vectors."""
+    from scipy.spatial.transform import Rotation
+
     matrix = np.column_stack([x_axis, y_axis, np.cross(x_axis, y_axis)])
-    # The quaternion is the eigenvector of the largest eigenvalue (Bar-Itzhack, 2000).
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
-    symmetric = np.array(
-        [
-            [xx + yy + zz, zy - yz, xz - zx, yx - xy],
-            [zy - yz, xx - yy - zz, xy + yx, xz + zx],
-            [xz - zx, xy + yx, yy - xx - zz, yz + zy],
-            [yx - xy, xz + zx, yz + zy, zz - xx - yy],
-        ]
-    )
-    w, x, y, z = np.linalg.eigh(symmetric)[1][:, -1].tolist()
+    x, y, z, w = Rotation.from_matrix(matrix).as_quat().tolist()
     return w, x, y, z
 
 

@@ -43,7 +43,7 @@ def test_the_robot_drives_up_a_mesh(world_of, add, husky, scenario_of):
     template = Template(add(world_of(), ramp), husky, scenario_of(goal={"x": 3.0, "y": 0.0, "tolerance": 0.3}))
     end = template.run(frozenset({"ramp"}), seed=1)
     assert end.outcome == "pass"
-    assert end.end_position[2] > 0.4
+    assert end.end_pose[:3][2] > 0.4
 
 
 @pytest.mark.parametrize(

@@ -72,8 +72,8 @@ def test_the_scenario_goes_along_in_the_reduced_world(simulator_of, tmp_path):
 def test_the_log_may_be_a_file_and_its_name_works_without_one(simulator_of):
     write = "import os, sys; open(os.environ['DDENV_LOG'], 'a').write('1,2,3,4,0,0,0,1')"
     to_file = simulator_of(f"print('starting'); {write}", "{log}").run(EVERYTHING, 0)
-    assert (to_file.outcome, to_file.end_position) == ("pass", (2, 3, 4))
-    assert simulator_of(write).run(EVERYTHING, 0).end_position == (2, 3, 4)
+    assert (to_file.outcome, to_file.end_pose[:3]) == ("pass", (2, 3, 4))
+    assert simulator_of(write).run(EVERYTHING, 0).end_pose[:3] == (2, 3, 4)
 
 
 def test_progress_is_reported_while_it_runs(simulator_of, tmp_path):
@@ -109,7 +109,7 @@ def test_progress_is_reported_while_it_runs(simulator_of, tmp_path):
 def test_a_command_that_hangs_is_killed_with_all_that_it_started(simulator_of, code, ends_at, within):
     result = simulator_of(code, wall_timeout=within).run(EVERYTHING, 0)
     assert (result.outcome, result.failure) == ("error", f"took longer than {within:g} s of wall clock")
-    assert result.end_position[0] == ends_at
+    assert result.end_pose[:3][0] == ends_at
 
 
 def test_a_command_that_stops_its_supervisor_is_killed_with_it(simulator_of, monkeypatch):
@@ -140,7 +140,7 @@ def test_what_breaks_is_an_error_with_its_reason(simulator_of, code, complaint):
     result = simulator_of(code).run(EVERYTHING, 0)
     assert result.outcome == "error"
     assert np.isfinite(result.trajectory).all() and result.trajectory.shape == (1, 8)
-    assert result.end_position == (0, 0, 0.45)
+    assert result.end_pose[:3] == (0, 0, 0.45)
     assert re.search(complaint, result.failure), result.failure
     assert result.failure.isprintable() and len(result.failure) < 400
 
@@ -168,7 +168,7 @@ def test_an_exception_is_no_failure_of_the_robot(simulator_of, code, outcome):
     """
     result = simulator_of(textwrap.dedent(caught) + code).run(EVERYTHING, 0)
     assert result.outcome == outcome
-    assert result.end_position == (1, 2, 3)
+    assert result.end_pose[:3] == (1, 2, 3)
 
 
 def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkeypatch):

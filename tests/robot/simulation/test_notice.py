@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation import notice
 from ddenv.robot.simulation.notice import Notice, first_in_view, in_view
-from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
+from ddenv.robot.simulation.taking_part import ENDLESS, Hull
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
@@ -80,7 +79,7 @@ def test_the_tiles_of_the_ditch_are_touched_in_driving_order(ditch, ditch_world)
 def test_asking_for_contacts_only_near_what_is_untouched_misses_none(ditch, ditch_world, monkeypatch):
     keep = frozenset(ditch_world.elements())
     first = ditch.run(keep, seed=3)
-    monkeypatch.setattr(Notice, "_reaches", lambda *_: True)
+    monkeypatch.setattr(Notice, "_may_touch", lambda *_: True)
     assert ditch.run(keep, seed=3).first_touched == first.first_touched
     assert len(first.first_touched) == 5
 
@@ -205,7 +204,7 @@ def test_noticing_changes_no_bit_of_a_run_in_the_ditch(ditch, ditch_world, monke
     keep = frozenset(ditch_world.elements())
     for seed in (0, 3):
         # Contacts are asked for at every look, not only where it is needed.
-        monkeypatch.setattr(Notice, "_reaches", lambda *_: True)
+        monkeypatch.setattr(Notice, "_may_touch", lambda *_: True)
         result = ditch.run(keep, seed)
         bare = without_noticing(monkeypatch, lambda seed=seed: ditch.run(keep, seed))
         assert result.first_touched
@@ -334,12 +333,3 @@ def test_reach_is_that_of_the_farthest_part_however_the_joints_stand():
     hand = link_of("hand", Sphere(0.2), Pose((5.0, 0.0, 1.0)))
     grip = joint_of("fixed", "arm", "hand", (5.0, 0.0, 1.0))
     assert reach_of(model_of("robot", base, hand, arm, joints=(grip, hinge))) >= 2 + corner
-
-
-@pytest.mark.rates
-def test_the_stride_does_not_matter(ditch, ditch_world, monkeypatch):
-    keep = frozenset(ditch_world.elements())
-    first = ditch.run(keep, seed=3).first_touched
-    for stride in (0.01, 100.0):
-        monkeypatch.setattr(notice, "STRIDE", stride)
-        assert ditch.run(keep, seed=3).first_touched == first

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.evidence.slices import Ties
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.simulation import taking_part
-from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.robot.simulation.taking_part import Hull
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
@@ -59,7 +58,10 @@ def bits(result: RunResult, keep: frozenset[str]) -> tuple:
 
 def with_ties(world: Variants, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
     """`models` with all of `there` that they are tied to."""
-    return Ties.among(world.ties(there)).closed(models, there)
+    ties = world.ties(there)
+    while new := frozenset(other for name, other in ties if name in models) - models:
+        models |= new
+    return models
 
 
 def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1) -> bool:

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import trimesh
 
-from ddenv.world.files.meshes import build, read_parts
+from ddenv.world.files.meshes import build, read_parts, unpack
 
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 2) for z in (0, 3)]
@@ -15,7 +15,7 @@ BOX = trimesh.Trimesh(CORNERS, [face for a, b, c, d in QUADS for face in ((a, b,
 
 def mesh_of(path, data, **way):
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
-    return build(read_parts(path), "m", **{"convex": False, **way})
+    return unpack("m", build(read_parts(path), **{"convex": False, **way}))
 
 
 def bounds(mesh):

@@ -283,7 +283,7 @@ def test_model_folder_without_file(tmp_path):
 
 def test_read_refuses_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    for name, reason in (("", "is a folder"), ("pipe", "not a regular file"), ("none", "No such file")):
+    for name, reason in (("", "is a folder"), ("pipe", "not a regular file"), ("none", "no such file")):
         with pytest.raises(Unusable, match=reason):
             read(tmp_path / name, 10)
     with pytest.raises(Unusable, match="the maximum is"):

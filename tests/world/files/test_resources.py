@@ -7,7 +7,7 @@ import pytest
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files import resources
 from ddenv.world.files.meshes import pack
-from ddenv.world.files.resources import Disk, Stored
+from ddenv.world.files.resources import Resources, on_disk
 
 CUBE = "\n".join(
     [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
@@ -29,7 +29,7 @@ def world(tmp_path, monkeypatch):
 
 
 def test_stored_gives_the_same_without_the_files(world):
-    disk = Disk(world)
+    disk = on_disk(world)
     ways = [
         {"convex": convex, "center": center, "submesh": name}
         for convex in (False, True)
@@ -41,7 +41,7 @@ def test_stored_gives_the_same_without_the_files(world):
     assert text == (world / "box" / "box.sdf", b"<sdf version='1.6'/>")
     assert disk.sdf("box/box.sdf", world)[1] == text[1]
     shutil.rmtree(world)
-    stored = Stored(dict(disk.taken))
+    stored = Resources(dict(disk.taken))
     assert stored.sdf("model://box", world) == text
     for way, mesh in zip(ways, given, strict=True):
         again = stored.mesh("cube.obj", world, **way)
@@ -54,7 +54,7 @@ def test_stored_gives_the_same_without_the_files(world):
 
 
 def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
-    disk = Disk(world)
+    disk = on_disk(world)
     disk.mesh("cube.obj", world, convex=True)
     disk.sdf("model://box", world)
 
@@ -65,7 +65,7 @@ def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
         monkeypatch.setattr(resources, name, forbidden)
     monkeypatch.setattr("os.stat", forbidden)
     monkeypatch.setattr("builtins.open", forbidden)
-    stored = Stored(disk.taken)
+    stored = Resources(disk.taken)
     stored.mesh("cube.obj", world, convex=True)
     stored.sdf("model://box", world)
     for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("cube.obj", world, convex=False)):
@@ -74,9 +74,9 @@ def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
 
 
 def test_the_same_request_gives_the_same_object_without_another_look(world, monkeypatch):
-    disk = Disk(world)
+    disk = on_disk(world)
     disk.mesh("cube.obj", world, convex=True)
-    for source in (disk, Stored(disk.taken)):
+    for source in (disk, Resources(disk.taken)):
         first = source.mesh("cube.obj", world, convex=True)
         with monkeypatch.context() as patch:
             for once in ("find", "read_parts", "build", "unpack"):
@@ -85,7 +85,7 @@ def test_the_same_request_gives_the_same_object_without_another_look(world, monk
 
 
 def test_refusals_are_kept_but_not_taken(world, monkeypatch):
-    disk = Disk(world)
+    disk = on_disk(world)
     asks = {
         "bad": (lambda: disk.mesh("bad.obj", world, convex=True), Unusable),
         "none": (lambda: disk.sdf("model://none", world), Missing),
@@ -104,13 +104,13 @@ def test_refusals_are_kept_but_not_taken(world, monkeypatch):
 def test_limits(world, monkeypatch):
     monkeypatch.setattr(resources, "SDF_LIMIT", 3)
     with pytest.raises(Unusable, match="the maximum is"):
-        Disk(world).sdf("model://box", world)
+        on_disk(world).sdf("model://box", world)
 
 
 def test_tells_before_something_slow(world):
     told = []
     (world / "big.obj").write_text(CUBE + "\n#" + "x" * 3_500_000)
-    disk = Disk(world, announce=told.append)
+    disk = on_disk(world, announce=told.append)
     disk.mesh("cube.obj", world, convex=True)
     disk.mesh("big.obj", world, convex=True)
     disk.mesh("big.obj", world, convex=False)
@@ -134,20 +134,20 @@ def damaged(packed: bytes):
 
 
 def test_damaged_bytes(world):
-    disk = Disk(world)
+    disk = on_disk(world)
     disk.mesh("cube.obj", world, convex=True)
     disk.sdf("model://box", world)
     keys = {json.loads(key)[0]: key for key in disk.taken}
     for bad in damaged(disk.taken[keys["mesh"]]):
         with pytest.raises(Unusable, match="damaged"):
-            Stored({keys["mesh"]: bad}).mesh("cube.obj", world, convex=True)
+            Resources({keys["mesh"]: bad}).mesh("cube.obj", world, convex=True)
     for bad in (b"", b"no end", b"\0<sdf/>"):
         with pytest.raises(Unusable, match="damaged"):
-            Stored({keys["sdf"]: bad}).sdf("model://box", world)
+            Resources({keys["sdf"]: bad}).sdf("model://box", world)
 
 
 def test_files_of_one_name_are_told_apart_by_content(world):
-    disk = Disk(world)
+    disk = on_disk(world)
     first = disk.mesh("cube.obj", world, convex=True)
     (world / "box" / "cube.obj").write_text(CUBE.replace("2", "3"))
     other = disk.mesh("cube.obj", world / "box", convex=True)

@@ -98,7 +98,7 @@ WRONG = {
     ),
     "typing mistake": (
         "<model name='m'><link name='chassis'/><link name='b'><pose relative_to='chasis'/></link></model>",
-        r"no frame 'chasis' here \(did you mean 'chassis'\?\)",
+        r"no frame 'chasis' here \(did you mean chassis\?\)",
     ),
     "far away": ("<model name='m'><pose>1e300 0 0 0 0 0</pose><link name='a'/></model>", "farther than 1e"),
     "no turn": (

@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.files.resources import Stored
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import Cylinder
 from ddenv.world.scenario import Reading
 from ddenv.world.sdf.read import parse_world, unique_names
@@ -61,7 +61,7 @@ def test_what_was_included_can_be_read_again_without_the_files(read, table, tmp_
     text = world_text(included())
     world = read(included(), model_path=(table,))
     (table / "table" / "model.sdf").unlink()
-    again = parse_world(text, tmp_path / "here.sdf", Reading(model_path=(table,)), Stored(world.resources))
+    again = parse_world(text, tmp_path / "here.sdf", Reading(model_path=(table,)), Resources(world.resources))
     assert again.models == world.models
 
 

@@ -5,7 +5,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.world.extent import model_bounds
 from ddenv.world.files.resolve import ENVIRONMENT, PACKAGES, PREFIXES
-from ddenv.world.files.resources import Stored
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import Box, Cylinder, Plane
 from ddenv.world.sdf.read import parse_world
 from ddenv.world.sdf.standin import KNOWN_SIZES
@@ -40,7 +40,8 @@ def test_sun_and_ground_plane_are_built_in(read, tmp_path, sun, ground):
     assert any("nothing can touch it" in note.why for note in world.notes)
     assert any("the one built into ddenv" in note.why for note in world.notes)
     assert (
-        parse_world(world_text(text), tmp_path / "here.sdf", resources=Stored(world.resources)).models == world.models
+        parse_world(world_text(text), tmp_path / "here.sdf", resources=Resources(world.resources)).models
+        == world.models
     )
 
 

@@ -18,6 +18,7 @@ from ddenv.errors import printable
 from ddenv.robot.deadline import Stopwatch
 
 SUPERVISOR = Path(__file__).with_name("supervise.py")
+BEGIN, END = b"+", b"."
 PIECE = 65536
 # How often a silent command is checked, s.
 TICK = 0.2
@@ -82,22 +83,15 @@ class Running:
     stdout: IO[bytes]
     stderr: IO[bytes]
 
-    def begin(self) -> None:
-        """Starts the command: its files are written."""
-        self._say(b"+")
-
-    def end(self) -> None:
-        """Ends it early."""
-        self._say(b".")
-
-    def _say(self, word: bytes) -> None:
+    def say(self, word: bytes) -> None:
+        """Has the supervisor start the command (`BEGIN`: its files are written), or end it early (`END`)."""
         with contextlib.suppress(OSError):
             self.line.send(word)
 
 
 @contextlib.contextmanager
 def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], temporary: Path) -> Iterator[Running]:
-    """The command `words`, which starts in `folder` at its `begin`.
+    """The command `words`, which starts in `folder` at `BEGIN`.
 
     At the end, nothing that the command started is left, and the folder `temporary` is removed, even if this process is killed
     while it writes there. Raises OSError if no program can be started.
@@ -152,7 +146,7 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             said = _look(selector, command)
             late = f"took longer than {seconds:g} s of wall clock" if clock.look() > limit else ""
             if said is None and not why and (why := late or too_much()):
-                command.end()
+                command.say(END)
                 limit, clock = STOP_WAIT, Stopwatch(LONGEST_LOOK)
             elif said is None and late:
                 # The supervisor itself was stopped, and will be killed.

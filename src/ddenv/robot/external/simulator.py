@@ -18,7 +18,7 @@ import yaml
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
-from ddenv.robot.external.process import Ended, running, watch
+from ddenv.robot.external.process import BEGIN, Ended, running, watch
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import Progress, RunResult
 from ddenv.world.command import command_words, filled, has_placeholder, start_folder
@@ -92,7 +92,7 @@ class ExternalSimulator:
         try:
             with running(words, start_folder(self._scenario), environment, folder) as command:
                 _write(folder, {world: without(self._world, self._removable - keep), whole: self._scenario_in(world)})
-                command.begin()
+                command.say(BEGIN)
                 ended = watch(command, self.limit, take, too_much)
                 # Reading a log that is too large would take longer than writing it did.
                 if file is not None and ended.reason != TOO_LARGE:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -25,81 +23,44 @@ LONGEST_BACK = 4.0
 LONGEST_TURN = 15.0
 
 
-class Attempt(Protocol):
-    """A recovery behaviour: commands until it is over, then None."""
-
-    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None: ...
-
-
-class Forget:
-    """Clears the costmap beyond `beyond` (m) and looks again. It keeps what is near and outside the lidar's field of view."""
-
-    def __init__(self, setup: Setup, time: float, estimate: Estimate, beyond: float) -> None:
-        self._until = time + LOOK
-        self._beyond: float | None = beyond
-
-    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
-        if self._beyond is not None:
-            map_.forget(estimate, self._beyond, NEAR)
-            self._beyond = None
-        return STOP if time < self._until else None
-
-
-class BackUp:
-    """Backs up a little, as long as nothing is there."""
-
-    def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
-        self._body = Footprint.of(setup)
-        self._speed = min(BACK_SPEED, setup.speed)
-        self._from = estimate
-        self._until = time + LONGEST_BACK
-
-    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
-        gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
-        if gone >= BACK or time >= self._until:
-            return None
-        return Twist(-self._speed, 0.0) if may_back_up(self._body, map_.spots, estimate) else None
-
-
-class LookAround:
-    """Turns around once on the spot, as long as nothing is in the way."""
-
-    def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
-        self._body = Footprint.of(setup)
-        self._rate = setup.turn_rate
-        self._heading = estimate.heading
-        self._turned = 0.0
-        self._until = time + LONGEST_TURN
-
-    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
-        self._turned += wrap(estimate.heading - self._heading)
-        self._heading = estimate.heading
-        if self._turned >= math.tau or time >= self._until:
-            return None
-        return Twist(0.0, self._rate) if may_turn(self._body, map_.spots, estimate, 1.0) else None
-
-
-@dataclass(slots=True)
 class Recovery:
-    """Chooses recovery behaviours in turn. `made` counts those since the robot last made progress."""
+    """Recovery behaviours in turn: clear the map, except near the robot, and look again; back up a little; turn around once on the
+    spot; clear all of the map. Robots move only as long as nothing is in the way.
 
-    setup: Setup
-    made: int = 0
+    `made` counts the behaviours since the robot last made progress.
+    """
 
-    def next(self, time: float, estimate: Estimate) -> Attempt | None:
-        """The next behaviour; None once the scenario's maximum number of recoveries is reached."""
-        if self.made >= self.setup.settings.planner.recoveries:
-            return None
+    def __init__(self, setup: Setup) -> None:
+        self._body = Footprint.of(setup)
+        self._most = setup.settings.planner.recoveries
+        self._speed, self._rate = min(BACK_SPEED, setup.speed), setup.turn_rate
+        self.made = 0
+
+    def begin(self, time: float, estimate: Estimate) -> bool:
+        """Begins the next behaviour; False once the scenario's maximum number of recoveries is reached."""
+        if self.made >= self._most:
+            return False
         self.made += 1
+        self._since, self._from, self._heading, self._turned = time, estimate, estimate.heading, 0.0
+        return True
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        """The command, from the time of `begin` on; None once the behaviour is over."""
         match (self.made - 1) % 4:
-            case 0:
-                return Forget(self.setup, time, estimate, NEAR)
             case 1:
-                return BackUp(self.setup, time, estimate)
+                gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
+                going = gone < BACK and time < self._since + LONGEST_BACK
+                return Twist(-self._speed, 0.0) if going and may_back_up(self._body, map_.spots, estimate) else None
             case 2:
-                return LookAround(self.setup, time, estimate)
-            case _:
-                return Forget(self.setup, time, estimate, 0.0)
+                self._turned += wrap(estimate.heading - self._heading)
+                self._heading = estimate.heading
+                turning = self._turned < math.tau and time < self._since + LONGEST_TURN
+                return Twist(0.0, self._rate) if turning and may_turn(self._body, map_.spots, estimate, 1.0) else None
+            case kind:
+                if time == self._since:
+                    # What is near is kept where the lidar does not look.
+                    map_.forget(estimate, NEAR if kind == 0 else 0.0, NEAR)
+                return STOP if time < self._since + LOOK else None
 
 
 # A controller stops when the estimated distance to the goal is within this fraction of its tolerance.
@@ -201,7 +162,7 @@ class Navigator:
         self._follower = Follower(setup)
         self._progress = Progress(planner.patience)
         self._recovery = Recovery(setup)
-        self._attempt: Attempt | None = None
+        self._recovers = False
         self._path: Path | None = None
         self._imu: Imu | None = None
         self._near = self._map.spots
@@ -224,13 +185,13 @@ class Navigator:
         self.arrived = self._is_there(reading.estimate)
         if self.arrived:
             return STOP
-        twist = self._recover(reading) if self._attempt else self._follow(reading)
+        twist = self._recover(reading) if self._recovers else self._follow(reading)
         # Faster starts lift the front wheels; braking is not limited.
         most = self._speed + self._setup.acceleration * self._setup.period
         if twist.speed > most:
             twist = Twist(most, twist.turn_rate * most / twist.speed)
         self._speed = max(twist.speed, 0.0)
-        self._waits = twist == STOP and self._attempt is None and self._path is not None
+        self._waits = twist == STOP and not self._recovers and self._path is not None
         return twist
 
     def _look(self, reading: Reading) -> None:
@@ -309,15 +270,15 @@ class Navigator:
         return room is not None and room >= (others or 0.0) - CLOSER and path.left <= LONGER * other.left
 
     def _try_to_recover(self, reading: Reading) -> Twist:
-        self._attempt = self._recovery.next(reading.time, reading.estimate)
-        self.gave_up = self._attempt is None
+        self._recovers = self._recovery.begin(reading.time, reading.estimate)
+        self.gave_up = not self._recovers
         return STOP if self.gave_up else self._recover(reading)
 
     def _recover(self, reading: Reading) -> Twist:
-        twist = self._attempt.step(reading.time, reading.estimate, self._map) if self._attempt else None
+        twist = self._recovery.step(reading.time, reading.estimate, self._map)
         if twist is not None:
             return twist
-        self._attempt = self._path = None
+        self._recovers, self._path = False, None
         self._found = reading.time
         self._planned = -math.inf
         self._recovered = (reading.estimate.x, reading.estimate.y)

@@ -56,9 +56,7 @@ class Autonomy:
         self._suite = suite
         self._left = [number for number, left in enumerate(drive.left) if left]
         self._right = [number for number, left in enumerate(drive.left) if not left]
-        self._radius = drive.radius
-        self._track = drive.track
-        self._skid = skid
+        self._drive, self._skid = drive, skid
         self._step = clock.step
         self._controller = controller
         self._filter = Filter(*start, settings)
@@ -96,12 +94,12 @@ class Autonomy:
             return
         # The mean speeds of the wheels' rims on both sides, m/s.
         left, right = (
-            self._radius * sum([self._wheels[number] for number in side]) / len(side)
+            self._drive.radius * sum([self._wheels[number] for number in side]) / len(side)
             for side in (self._left, self._right)
         )
         self._filter.advance(
             speed=(left + right) / 2,
-            wheel_rate=self._skid * (right - left) / self._track,
+            wheel_rate=self._skid * (right - left) / self._drive.track,
             gyro_rate=self._imu.yaw_rate,
             pitch=self._imu.pitch,
             seconds=(step - self._advanced) * self._step,

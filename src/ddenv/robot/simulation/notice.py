@@ -18,10 +18,6 @@ from ddenv.world.model import Model, Plane, World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
-# While the robot stays this near to where it was, only what it can touch from there is checked, m.
-STRIDE = 0.5
-NOWHERE = (math.inf, math.inf, math.inf)
-
 
 class Notice:
     """The models that the robot notices in one run. `first_touched` maps a model to the time (s) when it was first touched."""
@@ -46,10 +42,6 @@ class Notice:
         self._untouched = self._present.copy()
         self._solid: Booleans = np.array([any(body.bounds) for body in kept], dtype=bool)
         self._untouched_moving = self._solid.copy()
-        # Boxes of what never moves within the stride; and within `_free` m of `_free_start` the robot touches none of it.
-        self._low = self._high = np.empty((0, 3))
-        self._stride_start = self._free_start = NOWHERE
-        self._free = 0.0
         self._views: list[tuple[float, Vector, float]] = []
         self._boxes: list[tuple[Floats, Floats]] = []
 
@@ -59,13 +51,12 @@ class Notice:
         Call it after the motors got their command: then Drake computes the contacts that the next step needs in any case, once and
         with the same bits. Contacts that begin and end between two calls are missed.
         """
-        if not (self._reaches(place) or self._reaches_moving(place)):
+        if not self._may_touch(np.array(place)):
             return
         for name in self._touched():
             self.first_touched[name] = now
             self._untouched &= self._around.names != name
             self._untouched_moving &= self._moving != name
-            self._stride_start = self._free_start = NOWHERE
 
     def look(self, now: float, place: Vector, heading: float) -> None:
         """Notes where the robot is at the time `now` (s), and in which direction (rad) it looks."""
@@ -85,26 +76,13 @@ class Notice:
             first[name] = min(seen, first.get(name, math.inf))
         return dict(sorted(first.items(), key=lambda item: item[1]))
 
-    def _reaches(self, place: Vector) -> bool:
-        """Whether the robot might touch something that never moves and that it has not touched yet."""
-        if math.dist(place, self._free_start) < self._free:
-            return False
-        if not math.dist(place, self._stride_start) < STRIDE:
-            self._stride_start = place
-            apart = distances(self._around.low, self._around.high, np.array(place))
-            near = self._untouched & (apart < self._around.reach + STRIDE)
-            self._low, self._high = self._around.low[near], self._around.high[near]
-        gap = float(distances(self._low, self._high, np.array(place)).min(initial=math.inf)) - self._around.reach
-        self._free_start = place
-        self._free = min(gap, STRIDE - math.dist(place, self._stride_start))
-        return gap < 0
-
-    def _reaches_moving(self, place: Vector) -> bool:
-        """Whether the robot might touch a moving model that it has not touched yet."""
-        if not self._untouched_moving.any():
-            return False
-        apart = distances(*self._sleep.boxes(), np.array(place))
-        return bool((apart[self._untouched_moving] < self._around.reach).any())
+    def _may_touch(self, place: Floats) -> bool:
+        """Whether the robot might touch something that it has not touched yet."""
+        around = self._around
+        if (distances(around.low, around.high, place)[self._untouched] < around.reach).any():
+            return True
+        moving = self._untouched_moving
+        return bool(moving.any() and (distances(*self._sleep.boxes(), place)[moving] < around.reach).any())
 
     def _touched(self) -> Iterator[str]:
         """The models that the robot touches for the first time."""
@@ -146,8 +124,6 @@ class Notice:
             yield from ((name, times[row]) for name, row in zip(names, rows, strict=True) if row >= 0)
 
 
-# Rows of a recording that are processed together, which shares the overhead of NumPy's calls.
-TOGETHER = 32
 # The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
 PARALLEL = 1e-12
 
@@ -160,15 +136,10 @@ def first_in_view(
     `low` and `high` (T, N, 3) m, `eyes` (T, 3) m and `headings` (T,) rad have a row for each of T instants, world frame.
     """
     first = np.full(low.shape[1], -1)
-    for start in range(0, len(eyes), TOGETHER):
-        rows = slice(start, start + TOGETHER)
-        eye = eyes[rows]
-        lowest, highest = low[rows].min(axis=0) - eye.max(axis=0), eye.min(axis=0) - high[rows].max(axis=0)
-        least = np.linalg.norm(np.maximum(np.maximum(lowest, highest), 0.0), axis=1)
-        near = np.flatnonzero((first < 0) & (least <= view_range))
-        seen = in_view(low[rows, near], high[rows, near], eye[:, None], headings[rows, None], view_range, view_angle)
-        ever = seen.any(axis=0)
-        first[near[ever]] = start + seen.argmax(axis=0)[ever]
+    for row, (eye, heading) in enumerate(zip(eyes, headings, strict=True)):
+        (unseen,) = (first < 0).nonzero()
+        seen = in_view(low[row, unseen], high[row, unseen], eye, heading, view_range, view_angle)
+        first[unseen[seen]] = row
     return first
 
 

@@ -25,9 +25,8 @@ from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
-from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
-from ddenv.robot.simulation.run import Run, RunParts, Stuck, seconds_for
-from ddenv.robot.simulation.taking_part import Reached, Solids
+from ddenv.robot.simulation.run import Run, Stuck, seconds_for
+from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
 from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import shape_bounds, with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -149,7 +148,15 @@ class Template:
         self._context.presence.remove(removed)
         with self._asleep(kept, present) as (sleep, unusual):
             suite = SensorSuite(self._scenario.sensors, seed)
-            parts = RunParts(
+            lidar = None
+            if self._scenario.sensors.lidar and self._obstacles:
+                movers = [self._models[body.name] for body in kept]
+                lidar = Lidar(self._scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
+            reached = None
+            if self._slices and self._sleeping and self._repertoire.learnt:
+                reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
+            run = Run(
+                context=self._context,
                 scenario=self._scenario,
                 drive=self._drive,
                 sleep=sleep,
@@ -157,15 +164,15 @@ class Template:
                     self._surroundings, self._scenario.sensors, self._context.plant_context, sleep, kept, present
                 ),
                 autonomy=self._autonomy(suite, seed, listener),
-                lidar=self._lidar(present, kept, suite),
+                lidar=lidar,
                 watch=Watch(self._region, self._reach) if self._far else None,
                 stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
-                reached=self._reached(sleep, present),
+                reached=reached,
                 unusual=unusual,
                 kept=kept,
                 seed=seed,
             )
-            return Run(self._context, parts).execute(progress)
+            return run.execute(progress)
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """What rests on what in the whole world, as `piles.support.supports` has it. Raises LeftRegion."""
@@ -210,11 +217,6 @@ class Template:
         ties = self._repertoire.ties if self._repertoire.learnt else {}
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
-    def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
-        if not (self._slices and self._sleeping and self._repertoire.learnt):
-            return None
-        return Reached(self._solids, self._hull, sleep, present, self._clock.period)
-
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
         controller = self._controllers(setup)
@@ -223,12 +225,6 @@ class Template:
         return Autonomy(
             scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
         )
-
-    def _lidar(self, present: frozenset[str], kept: Sequence[Body], suite: SensorSuite) -> Lidar | None:
-        settings = self._scenario.sensors.lidar
-        if settings is None or self._obstacles is None:
-            return None
-        return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:

@@ -62,7 +62,7 @@ def _buffer(uri: str, folder: Path, limit: int) -> bytes:
     try:
         return read(folder / name, limit)
     except Unusable as error:
-        raise Unusable(f"buffer '{uri[:60]}' {error}") from None
+        raise Unusable(f"buffer '{uri[:60]}': {error}") from None
 
 
 def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:

@@ -78,14 +78,15 @@ def _line(text: str) -> str:
     return text if len(text) <= 200 else text[:199] + "…"
 
 
-def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-    """The mesh of all `parts`, or of those called `submesh`.
+def build(parts: list[Part], *, submesh: str = "", center: bool = False, convex: bool) -> bytes:
+    """The mesh of all `parts`, or of those called `submesh`, packed.
 
     `center` moves the middle of its bounding box to the origin. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is
-    replaced by its hull. `name` begins its `origin`. Raises Unusable.
+    replaced by its hull. Raises Unusable.
     """
     try:
-        vertices, faces = _checked(*joined(chosen(parts, submesh)))
+        vertices, faces = joined(chosen(parts, submesh))
+        _check(vertices, faces)
         if center:
             vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         # Adding zero makes -0.0 the same as 0.0.
@@ -99,11 +100,11 @@ def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = Fal
             faces = places.reshape(-1)[faces]
     except ValueError as error:
         raise Unusable(_line(str(error))) from None
-    return _mesh(name, pack(vertices, faces, simplified=too_fine))
+    return pack(vertices, faces, simplified=too_fine)
 
 
-def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same arrays. Raises ValueError unless all numbers are valid."""
+def _check(vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Raises ValueError unless all numbers are valid."""
     if not len(faces):
         raise ValueError("has no triangles")
     check_count(len(faces))
@@ -113,7 +114,6 @@ def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nd
         raise ValueError("has vertices that are not finite")
     if np.abs(vertices).max() > FARTHEST:
         raise ValueError(f"has vertices farther than {FARTHEST:.0f} m from its origin")
-    return vertices, faces
 
 
 def pack(vertices: np.ndarray, faces: np.ndarray, *, simplified: bool = False) -> bytes:
@@ -125,31 +125,23 @@ def pack(vertices: np.ndarray, faces: np.ndarray, *, simplified: bool = False) -
 
 
 def unpack(name: str, packed: bytes) -> Mesh:
-    """The packed mesh, equal to the one from `build`. Raises Unusable for damaged bytes."""
-    size, vertices, faces = (0, 0, 0)
+    """The packed mesh, with read-only arrays. Raises Unusable for damaged bytes.
+
+    Its `origin` is `name` with a digest of its content, which distinguishes files of one name.
+    """
+    size, count, triangles = (0, 0, 0)
     if len(packed) >= _HEADER.size and packed.startswith((_MAGIC, _MAGIC_HULL)):
-        _, size, vertices, faces = _HEADER.unpack_from(packed)
-    if size not in (4, 8) or len(packed) != _HEADER.size + 3 * size * vertices + 12 * faces:
+        _, size, count, triangles = _HEADER.unpack_from(packed)
+    start = _HEADER.size + 3 * size * count
+    if size not in (4, 8) or len(packed) != start + 12 * triangles:
         raise Unusable("its stored mesh is damaged")
+    vertices = np.frombuffer(packed, f"<f{size}", 3 * count, _HEADER.size).reshape(-1, 3).astype(np.float64)
+    faces = np.frombuffer(packed, "<u4", 3 * triangles, start).reshape(-1, 3).astype(np.uint32)
     try:
-        _checked(*_arrays(packed))
+        _check(vertices, faces)
     except ValueError as error:
         raise Unusable(f"its stored mesh is damaged: {error}") from None
-    return _mesh(name, packed)
-
-
-def _arrays(packed: bytes) -> tuple[np.ndarray, np.ndarray]:
-    _, size, vertices, faces = _HEADER.unpack_from(packed)
-    start = _HEADER.size + 3 * size * vertices
-    points = np.frombuffer(packed, f"<f{size}", 3 * vertices, _HEADER.size).reshape(-1, 3).astype(np.float64)
-    return points, np.frombuffer(packed, "<u4", 3 * faces, start).reshape(-1, 3).astype(np.uint32)
-
-
-def _mesh(name: str, packed: bytes) -> Mesh:
-    """A mesh with read-only arrays; the digest of its content distinguishes files of one name."""
-    vertices, faces = _arrays(packed)
-    vertices.flags.writeable = False
-    faces.flags.writeable = False
+    vertices.flags.writeable = faces.flags.writeable = False
     digest = hashlib.blake2b(packed, digest_size=8).hexdigest()
     return Mesh(f"{name} {digest}", vertices, faces, packed.startswith(_MAGIC_HULL))
 

@@ -218,8 +218,9 @@ def model_file(folder: Path) -> Path:
 
     Raises Unusable for an invalid model.config, and Missing if there is no SDF file.
     """
-    config = folder / "model.config"
-    if not _is_there(config):
+    try:
+        config = _first([folder / "model.config"], "")
+    except Missing:
         return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
     name = _configured(read(config, MODEL_CONFIG_LIMIT))
     if not name:
@@ -231,14 +232,6 @@ def model_file(folder: Path) -> Path:
     except Unusable as error:
         raise Unusable(f"model.config: <sdf> {error}") from None
     return _first([folder / path], f"model.config names '{name[:60]}', which does not exist")
-
-
-def _is_there(path: Path) -> bool:
-    try:
-        _first([path], "")
-    except Missing:
-        return False
-    return True
 
 
 def _configured(text: bytes) -> str:

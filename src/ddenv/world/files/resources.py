@@ -1,14 +1,13 @@
-"""The files that an SDF file refers to, from disk (`Disk`) or from what an earlier reading stored (`Stored`)."""
+"""The files that an SDF file refers to, from disk or from what an earlier reading stored."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
 
 from ddenv.world.access import Missing, Unusable, is_folder, read, size_of
-from ddenv.world.files.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
+from ddenv.world.files.meshes import MESH_LIMIT, build, origin, read_parts, unpack
 from ddenv.world.files.resolve import find, model_file, model_named, search_folders
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
@@ -16,50 +15,69 @@ from ddenv.world.model import Mesh
 SDF_LIMIT = 50_000_000  # bytes of a file
 SLOW_MESH = 3_000_000  # bytes; reading a larger mesh is announced
 
-Answer = TypeVar("Answer")
 
+class Resources:
+    """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from the `disk`, if there is one.
 
-class Resources(Protocol):
-    """Answers URIs in SDF files. `base` is the folder of the file that contains the URI.
-
-    Both methods raise Missing if there is no such file, and Unusable if it cannot be used. Equal requests return the same
-    object. `taken` holds at least everything returned so far, by request.
+    `base` is the folder of the file that contains the URI. Both methods raise Missing if there is no such file, and Unusable if it
+    cannot be used, or if its stored bytes are damaged. Equal requests return the same object. Failures are kept too: a world may
+    name one broken file a thousand times.
     """
 
-    @property
-    def taken(self) -> Mapping[str, bytes]: ...
+    def __init__(self, taken: Mapping[str, bytes], disk: _Reader | None = None) -> None:
+        self.taken = dict(taken)
+        self._disk = disk
+        self._files: dict[str, tuple[Path, bytes]] = {}
+        self._meshes: dict[str, Mesh] = {}
+        self._failed: dict[str, Missing | Unusable] = {}
+        # All requests so far: the URI, and its base.
+        self.asked: dict[tuple[str, Path], None] = {}
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         """Path and content of an SDF file, given by its own URI or by its model's folder."""
-        ...
+        self.asked[uri, base] = None
+        key = _key("sdf", uri, str(base))
+        if key not in self._files:
+            path, end, text = self._bytes(key, lambda disk: disk.sdf(uri, base)).partition(b"\0")
+            if not end or not path:
+                raise Unusable("its stored file is damaged")
+            self._files[key] = Path(path.decode("utf-8", "surrogateescape")), text
+        return self._files[key]
 
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
         """A mesh file in m, or its part called `submesh`; `center` moves the middle of its bounding box to the origin."""
-        ...
+        self.asked[uri, base] = None
+        key = _key("mesh", uri, str(base), submesh, center, convex)
+        if key not in self._meshes:
+            packed = self._bytes(key, lambda disk: disk.mesh(uri, base, submesh, center, convex))
+            self._meshes[key] = unpack(origin(uri, submesh, center, convex), packed)
+        return self._meshes[key]
+
+    def _bytes(self, key: str, ask: Callable[[_Reader], bytes]) -> bytes:
+        if key in self._failed:
+            # A new exception each time: an exception raised again would collect a traceback of all its uses.
+            raise type(self._failed[key])(str(self._failed[key]))
+        if key not in self.taken:
+            if self._disk is None:
+                raise Missing("was not found when the world was read")
+            try:
+                self.taken[key] = ask(self._disk)
+            except (Missing, Unusable) as error:
+                self._failed[key] = error
+                raise
+        return self.taken[key]
 
 
-class Disk:
-    """Reads from disk, and keeps everything it returned in `taken`, for a later `Stored`.
+class _Reader:
+    """Reads files from disk, as bytes to be stored."""
 
-    `announce` is called with a line of text before slow steps.
-    """
-
-    def __init__(
-        self, world_folder: Path, model_path: Sequence[Path] = (), announce: Callable[[str], None] | None = None
-    ) -> None:
-        self.taken: dict[str, bytes] = {}
-        self._folders = search_folders(model_path, world_folder)
-        self._announce = announce or (lambda message: None)
-        self._sdfs = _Answers[tuple[Path, bytes]]()
-        self._meshes = _Answers[Mesh]()
+    def __init__(self, folders: Sequence[Path], announce: Callable[[str], None] | None) -> None:
+        self._folders = folders
+        self._announce = announce
         # A collision and its visual mostly use the same file, one after the other.
         self._last: tuple[Path, list[Part]] | None = None
 
-    def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
-        key = _key("sdf", uri, str(base))
-        return self._sdfs.get(key, lambda: self._read_sdf(key, uri, base))
-
-    def _read_sdf(self, key: str, uri: str, base: Path) -> tuple[Path, bytes]:
+    def sdf(self, uri: str, base: Path) -> bytes:
         try:
             path = find(uri, base, self._folders)
             path = model_file(path) if is_folder(path) else path
@@ -69,76 +87,24 @@ class Disk:
             if found is None:
                 raise
             path, text = found
-        self.taken[key] = str(path).encode("utf-8", "surrogateescape") + b"\0" + text
-        return path, text
+        return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
 
-    def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        def read_mesh() -> Mesh:
-            parts = self._parts(find(uri, base, self._folders))
-            name = origin(uri, submesh, center, convex)
-            mesh = build(parts, name, submesh=submesh, center=center, convex=convex)
-            self.taken[key] = pack(mesh.vertices, mesh.faces, simplified=mesh.simplified)
-            return mesh
-
-        key = _key("mesh", uri, str(base), submesh, center, convex)
-        return self._meshes.get(key, read_mesh)
-
-    def _parts(self, path: Path) -> list[Part]:
+    def mesh(self, uri: str, base: Path, submesh: str, center: bool, convex: bool) -> bytes:
+        path = find(uri, base, self._folders)
         if self._last is None or self._last[0] != path:
             size = size_of(path)
-            if SLOW_MESH < size <= MESH_LIMIT:
+            if self._announce is not None and SLOW_MESH < size <= MESH_LIMIT:
                 self._announce(f"reading mesh {path.name} ({size / 1e6:.0f} MB)")
             self._last = None
             self._last = (path, read_parts(path))
-        return self._last[1]
+        return build(self._last[1], submesh=submesh, center=center, convex=convex)
 
 
-class Stored:
-    """Returns what a `Disk` has taken, without using the disk. Raises Missing for all else, Unusable for damaged bytes."""
-
-    def __init__(self, taken: Mapping[str, bytes]) -> None:
-        self.taken = taken
-        self._sdfs = _Answers[tuple[Path, bytes]]()
-        self._meshes = _Answers[Mesh]()
-
-    def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
-        key = _key("sdf", uri, str(base))
-        return self._sdfs.get(key, lambda: self._unpacked(key))
-
-    def _unpacked(self, key: str) -> tuple[Path, bytes]:
-        path, end, text = self._bytes(key).partition(b"\0")
-        if not end or not path:
-            raise Unusable("its stored file is damaged")
-        return Path(path.decode("utf-8", "surrogateescape")), text
-
-    def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        key = _key("mesh", uri, str(base), submesh, center, convex)
-        return self._meshes.get(key, lambda: unpack(origin(uri, submesh, center, convex), self._bytes(key)))
-
-    def _bytes(self, key: str) -> bytes:
-        try:
-            return self.taken[key]
-        except KeyError:
-            raise Missing("was not found when the world was read") from None
-
-
-class _Answers(Generic[Answer]):
-    """Answers by request, each made once. Failures are kept too: a world may name one broken file a thousand times."""
-
-    def __init__(self) -> None:
-        self._known: dict[str, Answer | Missing | Unusable] = {}
-
-    def get(self, key: str, make: Callable[[], Answer]) -> Answer:
-        if key not in self._known:
-            try:
-                self._known[key] = make()
-            except (Missing, Unusable) as error:
-                self._known[key] = error
-        answer = self._known[key]
-        if isinstance(answer, Missing | Unusable):
-            # A new exception each time: an exception raised again would collect a traceback of all its uses.
-            raise type(answer)(str(answer))
-        return answer
+def on_disk(
+    world_folder: Path, model_path: Sequence[Path] = (), announce: Callable[[str], None] | None = None
+) -> Resources:
+    """The files beside a world and in the folders of `model_path`, Gazebo and ROS; `announce` gets a line before slow steps."""
+    return Resources({}, _Reader(search_folders(model_path, world_folder), announce))
 
 
 def _key(*request: str | bool) -> str:

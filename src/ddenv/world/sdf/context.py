@@ -75,8 +75,8 @@ INSIDE = frozenset(
 class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
-    `used` are the URIs of stand-ins that were asked for, `missing` the errors of missing files by URI, `files` the parsed
-    files. `canonical` holds the link that a model's own frame is attached to, by the `id` of its `<model>`.
+    `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
+    lists, `files` the parsed files. `canonical` has the link that a model's own frame is attached to, by the `id` of its `<model>`.
     """
 
     resources: Resources
@@ -96,10 +96,6 @@ class Context:
     def note(self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = "") -> None:
         """Notes that `element` was replaced or ignored."""
         self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
-
-    def miss(self, uri: str, error: UserError) -> None:
-        """Remembers the error of a missing file, so that one message can list all of them."""
-        self.missing.setdefault(uri, error)
 
     def complain_of_missing(self) -> None:
         """Raises MissingFiles with the first error, and the names of the other files."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from functools import cached_property
 from pathlib import Path
 
+from ddenv.schemas import nearest
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.context import Context, version
 from ddenv.world.sdf.includes import Part, parts
@@ -94,8 +94,7 @@ class Scope:
         if isinstance(first, Part):
             return first
         # A nearest match among thousands of names would take longer than reading the file.
-        near = difflib.get_close_matches(name[:80], list(self.named)[:500], n=1)
-        hint = f" (did you mean '{near[0][:80]}'?)" if near else ""
+        hint = nearest(name[:80], [each[:80] for each in list(self.named)[:500]])
         raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
 
     def _base(self, name: str, thing: Element | Part) -> tuple[str, Element]:

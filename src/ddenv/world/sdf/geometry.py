@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Sh
 from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, StandIn
-from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
+from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, truth
 
 SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
@@ -67,9 +68,6 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "heightmap" | "image":
             _leave_out(element, parent, context)
             return None
-    if element.tag == "cone":
-        (radius,), (length,) = _sizes(element, "radius", (max(scale[:2]),)), _sizes(element, "length", scale[2:])
-        return Placed(cone(radius, length))
     return Placed(_primitive(element, scale))
 
 
@@ -77,14 +75,14 @@ def _primitive(element: Element, scale: Vector) -> Shape:
     match element.tag:
         case "box":
             return Box(vector(_sizes(element, "size", scale)))
-        case "cylinder":
-            return Cylinder(*_sizes(element, "radius", (max(scale[:2]),)), *_sizes(element, "length", scale[2:]))
-        case "sphere":
-            return Sphere(*_sizes(element, "radius", (max(scale),)))
-        case "capsule":
-            return Capsule(*_sizes(element, "radius", (max(scale[:2]),)), *_sizes(element, "length", scale[2:]))
         case "ellipsoid":
             return Ellipsoid(vector(_sizes(element, "radii", scale)))
+        case "sphere":
+            return Sphere(*_sizes(element, "radius", (max(scale),)))
+        case "cylinder" | "capsule" | "cone" as tag:
+            (radius,), (length,) = _sizes(element, "radius", (max(scale[:2]),)), _sizes(element, "length", scale[2:])
+            kinds: dict[str, Callable[[float, float], Shape]] = {"cylinder": Cylinder, "capsule": Capsule, "cone": cone}
+            return kinds[tag](radius, length)
     raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
 
 
@@ -225,7 +223,12 @@ def _checked(shape: Shape, element: Element) -> Shape:
 def read_polyline(geometry: Element, context: Context) -> Mesh:
     """The convex hull of all `<polyline>`s of a `<geometry>`, extruded upwards from z = 0. Raises UserError."""
     elements = geometry.findall("polyline")
-    height = _height(elements[0])
+    height = number(elements[0], "height", 1.0)
+    if not SMALLEST <= height <= LARGEST:
+        given = elements[0].find("height")
+        raise complain(
+            elements[0] if given is None else given, f"the height must be from 1e-06 to 1e+06 m, found {height:g}"
+        )
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
@@ -236,16 +239,6 @@ def read_polyline(geometry: Element, context: Context) -> Mesh:
     if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
         context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
     return prism(corners, height)
-
-
-def _height(element: Element) -> float:
-    child = element.find("height")
-    height = 1.0 if child is None else numbers(child, 1)[0]
-    if not 1e-6 <= height <= 1e6:
-        raise complain(
-            element if child is None else child, f"the height must be from 1e-06 to 1e+06 m, found {height:g}"
-        )
-    return height
 
 
 def prism(corners: np.ndarray, height: float) -> Mesh:

@@ -118,7 +118,7 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
             f"'{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), have one guessed with --stand-in auto, "
             "or leave it out with --ignore include",
         )
-        context.miss(uri, error)
+        context.missing.setdefault(uri, error)
         return None
 
 

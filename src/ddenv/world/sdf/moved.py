@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from ddenv.world.files.resources import Stored
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Reading
@@ -33,7 +33,7 @@ def with_places(world: World, places: Mapping[str, Sequence[Pose]], reading: Rea
     asked = {name: there for name, there in places.items() if name not in world.anchors}
     while True:
         text, wanted = _written(world, asked)
-        again = parse_world(text, world.path, reading, Stored(world.resources))
+        again = parse_world(text, world.path, reading, Resources(world.resources))
         # What was written is read again: only that shows that each model is where it has to be.
         wrong = {model.name for model in again.models if not _is_at(model, wanted[model.name])}
         if not wrong & set(asked):

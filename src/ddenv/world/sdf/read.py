@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import read_bytes
-from ddenv.world.files.resources import Disk, Resources
+from ddenv.world.files.resources import Resources, on_disk
 from ddenv.world.model import Model, World
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
@@ -21,7 +21,7 @@ from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.standin import AUTO
-from ddenv.world.sdf.urdf import ROOT, massless, to_sdf, without_mass
+from ddenv.world.sdf.urdf import ROOT, to_sdf, without_mass
 from ddenv.world.sdf.xml import complain, name_of, numbers, parse
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
@@ -72,17 +72,17 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
     try:
         model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
         context.complain_of_missing()
-        return model if urdf is None else without_mass(model, massless(urdf))
+        return model if urdf is None else without_mass(model, urdf)
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
 
-def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Disk:
+def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Resources:
     """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return Disk(path.parent, reading.model_path, announce)
+    return on_disk(path.parent, reading.model_path, announce)
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:

@@ -49,13 +49,9 @@ def to_sdf(robot: Element, context: Context) -> Element:
     return element("sdf", robot, "", model, version=VERSIONS[-1])
 
 
-def massless(robot: Element) -> frozenset[str]:
-    """The names of the links without mass."""
-    return frozenset(name_of(link) for link in robot.findall("link") if not has_mass(link))
-
-
-def without_mass(model: Model, names: frozenset[str]) -> Model:
-    """`model` with the links `names` as mere frames, since the SDF reader gives every link a mass."""
+def without_mass(model: Model, robot: Element) -> Model:
+    """`model` with the links that have no mass in `robot` as mere frames, since the SDF reader gives every link a mass."""
+    names = {name_of(link) for link in robot.findall("link") if not has_mass(link)}
     links = (replace(link, inertia=None) if link.name in names else link for link in model.links)
     return replace(model, links=tuple(links))
 
