@@ -14,9 +14,8 @@ from mcap_ros2.writer import Writer
 
 from ddenv.engine.mcap_file import Chosen, Streams, _chosen, messages
 from ddenv.engine.ros_messages import DEFINITIONS, header, marker, nanoseconds
-from ddenv.robot.protocol import Reading, Twist, WheelSpeeds
+from ddenv.robot.protocol import Imu, Reading, Scan, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
 from ddenv.world import scenario
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Sphere
 from ddenv.world.pose import Pose
