@@ -1,7 +1,6 @@
 """Who listens to a controller hears all of it, and changes nothing."""
 
 from ddenv.engine.mcap_file import Streams
-
 from ddenv.robot.simulation.template import Template
 
 

@@ -6,7 +6,7 @@ import os
 import stat
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -47,7 +47,7 @@ def mode_beside(run: Path) -> int:
 
 @contextmanager
 def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) -> Iterator[None]:
-    """Holds the file `lock`, with the number of this process in it.
+    """Holds the file `lock`.
 
     Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked.
     """
@@ -69,10 +69,6 @@ def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) ->
             raise UserError(
                 f"{refused}: its folder has no file locks ({error.strerror}), as some network folders; {instead}"
             ) from None
-        # A full disk may have no room for it.
-        with suppress(OSError):
-            os.truncate(handle, 0)
-            os.write(handle, str(os.getpid()).encode())
         yield
     finally:
         os.close(handle)
