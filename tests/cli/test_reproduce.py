@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.cli import reproduce_command
-from ddenv.engine import reproducing
+from ddenv.engine import single_test
 from tests.command import in_process
 
 
@@ -22,5 +22,5 @@ def test_a_crash_is_no_failure_of_the_robot(monkeypatch, capsys, home, error):
     def crash(*_):
         raise error
 
-    monkeypatch.setattr(reproducing, "subject_in", crash)
+    monkeypatch.setattr(single_test, "subject_in", crash)
     assert in_process(monkeypatch, capsys, "reproduce", "run").returncode == reproduce_command.CANNOT_SAY
