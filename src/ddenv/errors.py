@@ -1,7 +1,6 @@
 """The one kind of error a user can cause."""
 
 from ddenv.text import plain
-from ddenv.text import printable as printable
 
 LONGEST = 1500  # characters of a message
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from ddenv.errors import printable
+from ddenv.text import plain
 
 Value = int | float | str | bool | None
 
@@ -352,7 +352,7 @@ def read(scenario: Mapping[str, Any], one: Setting) -> Value:
     value = section.get(one.name, one.default) if one.stored else is_printed(section)
     if not one.allows(value):
         return one.default
-    return printable(" ".join(value.split())) if isinstance(value, str) else value
+    return plain(value) if isinstance(value, str) else value
 
 
 def put(scenario: Mapping[str, dict[str, Any]], one: Setting, value: Value) -> None:

@@ -38,8 +38,9 @@ from ddenv.cli.study_command import study_command
 from ddenv.cli.test_command import test_command
 from ddenv.cli.why_command import why_command
 from ddenv.cli.world_command import world_group
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.text import printable
 
 
 class Commands(click.Group):

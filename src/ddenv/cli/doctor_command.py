@@ -14,7 +14,8 @@ from ddenv.cli.completing import runs
 from ddenv.cli.options import json_option
 from ddenv.cli.wrapping import terminal_columns, wrapped
 from ddenv.doctor.finding import Finding, is_well
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
+from ddenv.text import printable
 
 SIGNS = {"ok": " ", "note": "!", "wrong": "✗"}
 

@@ -8,7 +8,8 @@ import click
 
 from ddenv.cli.completing import runs
 from ddenv.cli.options import announce, announced, trust_option
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
+from ddenv.text import printable
 
 # Columns.
 LONGEST_URI = 80

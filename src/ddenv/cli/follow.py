@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.cli.summary import summary, summary_lines
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.follow import Follower
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words, stop_engines
+from ddenv.text import printable
 from ddenv.words.news import headline, news
 
 POLL = 0.2

@@ -11,7 +11,8 @@ import click
 
 from ddenv.cli.completing import runs
 from ddenv.cli.options import cluster_option, jobs_option, json_option, trust_option, whole
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
+from ddenv.text import printable
 
 
 @click.command("isolate")

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
+from ddenv.text import printable
 
 
 @click.command("learn")

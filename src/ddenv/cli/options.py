@@ -10,9 +10,9 @@ from typing import Any
 
 import click
 
-from ddenv.errors import printable
 from ddenv.runs import processor
 from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
+from ddenv.text import printable
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from ddenv.cli.completing import runs
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
+from ddenv.text import printable
 
 
 @click.command("report")

@@ -18,7 +18,7 @@ from ddenv.cli.options import (
     setting_options,
     trust_option,
 )
-from ddenv.errors import printable
+from ddenv.text import printable
 
 if TYPE_CHECKING:
     from ddenv.world.model import World

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ddenv.cli.wrapping import terminal_columns, wrapped
-from ddenv.errors import printable
+from ddenv.text import printable
 
 if TYPE_CHECKING:
     from ddenv.schemas import Kind

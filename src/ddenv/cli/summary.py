@@ -6,7 +6,6 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ddenv.errors import printable
 from ddenv.evidence.claims import (
     current,
     drift,
@@ -27,7 +26,7 @@ from ddenv.runfile.progress import Claim, Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.text import count, first_of, percent
+from ddenv.text import count, first_of, percent, printable
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12

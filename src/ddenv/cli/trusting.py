@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ddenv.errors import printable
+from ddenv.text import printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.state import RunState

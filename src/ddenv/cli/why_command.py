@@ -21,13 +21,13 @@ def why_command(run: str, as_json: bool) -> int:
     that passes lacks.
     """
     from ddenv.cli.wrapping import terminal_columns, wrapped
-    from ddenv.errors import printable
     from ddenv.evidence.claims import current
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
     from ddenv.runs.nearest import nearest
     from ddenv.runs.reasons import no_reasons, parting_sentence, reasons, sentence
+    from ddenv.text import printable
 
     with RunFile(find_run(run)) as file:
         state = fold(file.events())

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ddenv.cli.wrapping import cut, wrapped
-from ddenv.errors import printable
-from ddenv.text import count, first_of, padded, shortened, width
+from ddenv.text import count, first_of, padded, printable, shortened, width
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import (
     Box,

@@ -13,7 +13,8 @@ import click
 
 from ddenv.cli.completing import scenarios
 from ddenv.cli.options import Numbers, announce, announced, reading_options
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
+from ddenv.text import printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.state import RunState

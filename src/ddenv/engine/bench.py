@@ -77,7 +77,7 @@ class Bench:
 
     def _start(self, tests: Sequence[Test]) -> bool:
         """Starts tests on free workers. Returns whether one was implied, and so needs none."""
-        # A step is one test, the next in order; nothing runs ahead.
+        # A step is one test, the next in order.
         free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
         for test in tests if free and self._control.may_start() else ():
             if self._key(test) in self._started:

@@ -476,7 +476,7 @@ class Driver:
 
     def _end(self, minimal: bool, reason: str) -> None:
         self._bench.finish_trials()
-        # Tests that ran ahead of time are no longer needed.
+        # Tests of later candidates are no longer needed.
         self._journal.lose_running()
         self._journal.record(events.Finished(minimal, reason))
 

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Protocol, cast, runtime_checkable
 
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
 from ddenv.runfile.store import COLUMNS
+from ddenv.text import printable
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 

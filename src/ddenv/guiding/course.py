@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.guiding.situation import FINISHED, NO_FAILURE, Situation, Words, new_search
 from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.text import count
+from ddenv.text import count, plain, printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +209,7 @@ class Change:
 def place(node: Node) -> str:
     """A node in words."""
     models = count(len(node.environment), "model")
-    what = printable(" ".join(node.what.split()))
+    what = plain(node.what)
     return f"the whole world ({models})" if node.parent is None else f"{models} (#{node.number}, {what})"
 
 

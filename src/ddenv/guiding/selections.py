@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ddenv.errors import printable
 from ddenv.guiding.situation import (
     LONGEST,
     NO_FAILURE,
@@ -26,7 +25,7 @@ from ddenv.guiding.situation import (
 )
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
-from ddenv.text import count, shortened
+from ddenv.text import count, printable, shortened
 
 
 @dataclass(frozen=True, slots=True)

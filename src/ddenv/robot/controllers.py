@@ -20,10 +20,11 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.robot.deadline import TooLate, call_within
 from ddenv.robot.protocol import Drives, Reading, Setup, Twist, WheelSpeeds
 from ddenv.schemas import nearest
+from ddenv.text import plain
 from ddenv.world.scenario import Controller
 
 BUILT_IN = {
@@ -127,7 +128,7 @@ class ControllerFailed(Exception):
     """A controller did something wrong. The text is one line: which controller, and what happened."""
 
     def __init__(self, reason: str) -> None:
-        line = printable(" ".join(reason.split()))
+        line = plain(reason)
         super().__init__(line if len(line) <= LONGEST_REASON else f"{line[: LONGEST_REASON - 3]}...")
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from ddenv.errors import printable
 from ddenv.runfile.state import RunState
 from ddenv.settings import SETTINGS, Failure, Reduction, read
+from ddenv.text import plain
 
 
 class Settings(Reduction, Failure):
     """A scenario's `name` and its settings; a damaged one has its default."""
 
     def __init__(self, scenario: dict[str, Any]) -> None:
-        self.name = printable(" ".join(str(scenario.get("name", "run")).split()))
+        self.name = plain(scenario.get("name", "run"))
         for one in SETTINGS.values():
             setattr(self, one.name, read(scenario, one))
 

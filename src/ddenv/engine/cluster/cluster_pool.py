@@ -27,10 +27,10 @@ from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted,
 from ddenv.engine.pool import Broken, Pace, Pool
 from ddenv.engine.shared import machine, simulator
 from ddenv.engine.worker import Start
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
-from ddenv.text import count
+from ddenv.text import count, printable
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 

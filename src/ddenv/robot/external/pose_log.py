@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from ddenv.arrays import Floats
-from ddenv.errors import printable
 from ddenv.robot.result import RECORD_PERIOD, Progress
+from ddenv.text import printable
 
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 EXPECTED = f"expected {','.join(COLUMNS)} (s, m, a quaternion)"

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from ddenv.errors import printable
 from ddenv.robot.deadline import Stopwatch
+from ddenv.text import printable
 
 SUPERVISOR = Path(__file__).with_name("supervise.py")
 BEGIN, END = b"+", b"."
