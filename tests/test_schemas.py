@@ -7,6 +7,8 @@ import pytest
 
 from ddenv import schemas
 from ddenv.errors import UserError
+from ddenv.runs.tests_left import SCALE
+from ddenv.workbench.run.methods import LISTINGS, SMALLER
 
 KINDS = ("partitioning", "prioritization", "algorithm")
 EVERY = [(kind, name) for kind in KINDS for name in schemas.names(kind)]
@@ -232,3 +234,9 @@ def test_ours_come_first(plugin):
 def test_ours_cannot_be_replaced_by_name(plugin):
     done = plugin("from ddenv import schemas; print(schemas.load('algorithm', 'ddenv').__module__)")
     assert done.stdout.strip() == "ddenv.reduction.algorithms"
+
+
+def test_each_algorithm_of_ours_has_its_listing_its_words_and_how_many_tests_it_takes():
+    ours = set(schemas.OURS["algorithm"])
+    assert set(LISTINGS) == set(SMALLER) == ours
+    assert ours <= set(SCALE)

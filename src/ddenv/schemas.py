@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["partitioning", "prioritization", "algorithm"]
 
-_OURS: dict[str, dict[str, str]] = {
+OURS: dict[str, dict[str, str]] = {
     "partitioning": {
         "model2model": "ddenv.reduction.partitionings:model2model",
         "timeseg": "ddenv.reduction.partitionings:timeseg",
@@ -143,7 +143,7 @@ def _installed() -> dict[str, list[EntryPoint]]:
     from importlib.metadata import entry_points
 
     found = entry_points()
-    return {group: list(found.select(group=group)) for group in map(_group, _OURS)}
+    return {group: list(found.select(group=group)) for group in map(_group, OURS)}
 
 
 def _group(kind: str) -> str:
@@ -155,7 +155,7 @@ def _known(kind: Kind) -> dict[str, EntryPoint]:
     from importlib.metadata import EntryPoint
 
     group = _group(kind)
-    ours = {name: EntryPoint(name, value, group) for name, value in _OURS[kind].items()}
+    ours = {name: EntryPoint(name, value, group) for name, value in OURS[kind].items()}
     # A name with a slash would look like a pair.
     others = {each.name: each for each in _installed()[group] if each.name not in ours and "/" not in each.name}
     return ours | others

@@ -17,6 +17,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
+from ddenv.schemas import names
 from tests.command import ddenv, in_process
 from tests.conftest import DATA
 from tests.waiting import PATIENCE, wait_until
@@ -242,7 +243,7 @@ MISTAKES = {
     "no pair": (["run", WALL, "--pair", "model2model"], "--pair: 'model2model' is not allowed (did you mean"),
     "algorithm": (
         ["run", WALL, "--algorithm", "ddmn"],
-        "ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
+        f"ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of {', '.join(names('algorithm'))}",
     ),
     "epsilon": (["run", WALL, "--epsilon", "0"], "--epsilon: expected 0.001 to 1000, found 0"),
     "similarity": (

@@ -22,7 +22,8 @@ class Guided(FakePool):
         super().__init__(oracle, jobs)
         self.viewer = RunFile(path)
         self.guide = guide
-        next(guide)
+        # The first value stands for nothing: the guide reads on from there.
+        assert next(guide) is None
 
     def finished(self, seconds):
         state = fold(self.viewer.events())

@@ -18,7 +18,7 @@ from textual.widgets import Button, Input, Label, OptionList, Select, Static
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
-from ddenv.schemas import Kind, names, uses
+from ddenv.schemas import OURS, Kind, names, uses
 from ddenv.text import plain
 from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
@@ -30,7 +30,6 @@ from ddenv.workbench.widgets.entry import Entry
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-OURS = ("ddenv", "ddmin", "probdd", "splitting")
 MARK = "✗ "
 METHOD: dict[Kind, str] = {
     "algorithm": "how the environment is searched",
@@ -54,7 +53,7 @@ class Circumstances:
 def not_used(field: Field, now: Circumstances) -> str:
     """Why a field has no effect, or ""."""
     only = field.setting.used_by if field.setting else ()
-    if only and now.algorithm in OURS and now.algorithm not in only:
+    if only and now.algorithm in OURS["algorithm"] and now.algorithm not in only:
         return f"Not used by {plain(now.algorithm)}."
     return ""
 
