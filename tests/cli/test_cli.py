@@ -213,12 +213,9 @@ def _engines(run):
 
 
 def _finished(run):
-    """Each finished test as (models, run)."""
-    from ddenv.engine.journal import Journal
-
+    """Each finished test as (environment, run)."""
     with RunFile(run) as file:
-        journal = Journal(file)
-        return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
+        return [(test.environment, test.run) for test in fold(file.events()).finished_tests]
 
 
 def test_a_second_engine_is_refused(reduced, tmp_path):

@@ -230,7 +230,7 @@ def test_saving_a_scenario(snap_compare, scenarios, monkeypatch, tmp_path):
 
 def reduced_by(algorithm, runs):
     data = fake_run.scenario()
-    data["reduction"]["algorithm"] = algorithm
+    data["reduction"] |= {"algorithm": algorithm, "accept_rate": "first"}
     run = fake_run.FakeRun(runs / "crates-1.ddenv", data).created().baseline()
     run.round = 1
     groups = [[0, 1, 2, 3], list(range(4, 11))]
