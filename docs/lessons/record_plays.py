@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -52,10 +53,10 @@ def record_plays(file: Path) -> tuple[Path, tuple[str, ...]]:
     return lesson.oracle, names
 
 
-def _places(run: Path) -> Places:
+def _places(run: Path) -> Callable[[str], int]:
     with RunFile(run) as content:
         events = content.events()
-    return Places(position_in(events), events)
+    return Places(position_in(events), events).event
 
 
 def _evidence(lesson: Lesson) -> dict[str, Any]:

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
-from ddenv.learn.new_lesson import write_template
-from ddenv.learn.shelf import LESSONS, open_lesson
+from ddenv.learn.shelf import LESSONS, open_lesson, write_template
 
 GOOD = """\
 title: A title

@@ -74,7 +74,7 @@ def _check(file: Path) -> int:
 
 
 def _new(file: Path, run: str | None) -> int:
-    from ddenv.learn.new_lesson import write_template
+    from ddenv.learn.shelf import write_template
     from ddenv.runs.folder import find_run
 
     if run is None:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
 
 from ddenv.learn.lesson import Answer, Foretold, Question
 from ddenv.runfile.events import RoundStarted, TestFinished, TestStarted, deed
 from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
-from ddenv.runfile.state import Candidate, Round, RunState, Test
+from ddenv.runfile.state import Candidate, Round, Test
 from ddenv.runfile.tested import pointed
 from ddenv.text import count
 
@@ -19,59 +24,13 @@ SAID = {
 }
 # Candidates of a round to choose from, and models of a candidate that are named there.
 MOST, FEW = 5, 3
+# Why something came about, as questions and answers.
+REASONS = Path(__file__).with_name("reasons.yaml")
 # By the setting `growth`, what n does.
 _GROWTH = {
     "paper": "After each round n grows by one, but never above the number of models.",
     "steady": "n grows by one after a round without f, but never above the number of models. After a reduction it stays.",
 }
-_OF_OTHER = (
-    Answer(
-        "It may have another cause, so it does not count as f.",
-        True,
-        "Only an end like that of f counts. This one is elsewhere, or came about otherwise.",
-    ),
-    Answer("Any failure is good enough: this is f.", False, "Only the same failure counts, close to f's end.", "any"),
-    Answer(
-        "The test is broken: fewer models cannot make the robot fail.",
-        False,
-        "With fewer models the robot can take another path, and find another trap.",
-        "fewer",
-    ),
-)
-_ALWAYS_THROUGH = Answer(
-    "With fewer models the robot always gets through.",
-    False,
-    "Not always: fewer models can open a path into another trap.",
-    "fewer",
-)
-_OF_MISS = (
-    Answer(
-        "Something that f needs is probably gone.",
-        True,
-        "Probably: one miss can be bad luck where a failure is flaky. That is why tests are repeated.",
-    ),
-    Answer(
-        "Now it is proved that f needs what was left out.",
-        False,
-        "It may have been bad luck: one test proves little.",
-        "proof",
-    ),
-    _ALWAYS_THROUGH,
-)
-# Where each candidate has one run.
-_OF_ONLY_MISS = (
-    Answer(
-        "Something that f needs is gone.",
-        True,
-        "This search runs each candidate once, so a single miss decides.",
-    ),
-    Answer(
-        "It was bad luck: another run would show f.",
-        False,
-        "That can happen where a failure is flaky. This search runs each candidate once, and takes the miss as its answer.",
-    ),
-    _ALWAYS_THROUGH,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +85,7 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
         return None
     answers = tuple(Answer(words, outcome == test.outcome, _seen(test)) for outcome, words in SAID.items())
     what = f"Test {number} runs {_what(candidate)}. How does it end?"
-    reason = why_ended(test, candidate, settings(moment.after))
+    reason = _why_ended(test, candidate, settings(moment.after))
     return Foretelling(Question(what, answers, _hint(candidate)), until, reason, test.outcome)
 
 
@@ -169,8 +128,8 @@ def _seen(test: Test) -> str:
 # Who wins a round.
 
 
-def _chapter(position: Position, moment: Moment) -> tuple[Chapter, Round, RunState] | None:
-    """The round that begins at a moment, as it was at its end, and the state then."""
+def _chapter(position: Position, moment: Moment) -> tuple[Chapter, Round] | None:
+    """The round that begins at a moment, as it was at its end."""
     started = moment.after.round
     if started is None:
         return None
@@ -178,14 +137,14 @@ def _chapter(position: Position, moment: Moment) -> tuple[Chapter, Round, RunSta
     state = None if found is None else position.state(found.last)
     if found is None or state is None or state.round is None or state.round.number != started.number:
         return None
-    return found, state.round, state
+    return found, state.round
 
 
 def _winner(position: Position, moment: Moment) -> Foretelling | None:
     found = _chapter(position, moment)
     if found is None or not isinstance(moment.recorded.event, RoundStarted):
         return None
-    chapter, round, _ = found
+    chapter, round = found
     listed = list(round.candidates)
     shown = listed[:MOST]
     if round.winner is not None and round.winner >= MOST:
@@ -201,8 +160,12 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         tuple(answers),
         "The first candidate that has everything f needs wins. 'part A' is A alone, 'without A' is all the rest.",
     )
-    kind = "won" if round.winner is not None else "last" if is_last(round) else "none"
-    return Foretelling(question, chapter.last, why_won(round), kind)
+    if round.winner is None:
+        kind = "last" if _is_last(round) else "none"
+        return Foretelling(question, chapter.last, _reason(kind, round.number), kind)
+    before = "Those before it probably lack something." if round.winner else "It was the first one to be tried."
+    reason = _reason("won", round.number, candidate=_name(round.candidates[round.winner]), before=before)
+    return Foretelling(question, chapter.last, reason, "won")
 
 
 def _candidate_answer(one: Candidate, round: Round) -> Answer:
@@ -227,7 +190,7 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
     found = _chapter(position, moment)
     if found is None or settings(moment.after).algorithm != "ddenv":
         return None
-    _, round, _ = found
+    _, round = found
     following = next(
         (each for each in position.chapters if each.kind == "round" and each.number == round.number + 1), None
     )
@@ -269,100 +232,45 @@ def _is_regular(round: Round, after: Round) -> bool:
     return as_many and set(after.environment) == set(left)
 
 
-def why_ended(test: Test, candidate: Candidate, options: Settings) -> Question:
+def _why_ended(test: Test, candidate: Candidate, options: Settings) -> Question:
     """What the outcome of a candidate's test means."""
+    if test.outcome == "pass" and options.iterations == 0 and options.accept_rate == "first":
+        return _reason("only pass", test.id)
+    # Of a single model nobody would be wrong to call it the smallest world.
+    most = 2 if test.outcome == "similar" and candidate.size == 1 else None
+    return _reason(test.outcome, test.id, most, goes=_goes(candidate, options))
+
+
+def _goes(candidate: Candidate, options: Settings) -> str:
+    """What f without some models says of these."""
     gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
-    if test.outcome == "similar":
-        # Of a single model nobody would be wrong to call it the smallest world.
-        return Question(
-            "f showed. What does that mean?", _turned(_of_f(gone, options)[: 3 if candidate.size > 1 else 2], test.id)
-        )
-    if test.outcome == "other":
-        return Question("It failed, but not as in f. What does that mean?", _turned(_OF_OTHER, test.id))
-    once = options.iterations == 0 and options.accept_rate == "first"
-    return Question("The goal was reached. What does that mean?", _turned(_OF_ONLY_MISS if once else _OF_MISS, test.id))
+    if options.accept_rate != "first":
+        return f"f can show without {gone}. Whether it shows often enough, more runs will say."
+    if options.iterations:
+        return f"f showed without {gone}. Here the first run with f decides, so they go."
+    return f"f shows without {gone}: they can go."
 
 
-def why_won(round: Round) -> Question:
-    """Why a candidate of a round showed f, or none did."""
-    if round.winner is None:
-        return Question("None of them showed f. What does that mean?", _turned(_of_vain_round(round), round.number))
-    won = round.candidates[round.winner]
-    before = "Those before it probably lack something." if won.index else "It was the first one to be tried."
-    answers = (
-        Answer("It still has everything that f needs.", True, before),
-        Answer(
-            "The models that it leaves out caused f.",
-            False,
-            "They were not there, and f showed all the same. So f does not need them.",
-            "part",
-        ),
-        Answer(
-            "It has more models than the others.",
-            False,
-            "It does not matter how many there are. If a single one that f needs is missing, f is gone.",
-            "fewer",
-        ),
-    )
-    return Question(f"{_capital(won.label)} showed f. Why?", _turned(answers, round.number))
-
-
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]
-
-
-def _of_f(gone: str, options: Settings) -> tuple[Answer, ...]:
-    goes = f"f shows without {gone}: they can go."
-    if options.iterations and options.accept_rate == "first":
-        goes = f"f showed without {gone}. Here the first run with f decides, so they go."
-    elif options.accept_rate != "first":
-        goes = f"f can show without {gone}. Whether it shows often enough, more runs will say."
-    return (
-        Answer("Everything that f needs is still there.", True, goes),
-        Answer(
-            "The models that were left out caused f.",
-            False,
-            "They were not there, and f showed all the same. So f does not need them.",
-            "part",
-        ),
-        Answer(
-            "This is the smallest world that shows f.",
-            False,
-            "Nobody knows: there are smaller ones that were not tried.",
-            "smallest",
-        ),
-    )
-
-
-def is_last(round: Round) -> bool:
+def _is_last(round: Round) -> bool:
     """Whether the round leaves out each model alone: without f it is the last one."""
     alone = {one.partition for one in round.candidates if one.kind == "complement"}
     return len(alone) == len(round.partitions) == len(round.environment)
 
 
-def _of_vain_round(round: Round) -> tuple[Answer, ...]:
-    lacks = "Each of them lacks something that f needs."
-    if is_last(round):
-        return (
-            Answer(lacks, True, "Each model was left out alone, and each time f was gone. None of them can go."),
-            Answer(
-                "What is left is the smallest world that shows f.",
-                False,
-                "Nobody tried all smaller worlds: only that no single model can go is known.",
-                "smallest",
-            ),
-            Answer(
-                "The search has failed.", False, "It has ended: it found models of which no single one can go.", "stuck"
-            ),
-        )
-    return (
-        Answer(lacks, True, "Smaller parts come next: leaving one out takes away less."),
-        Answer("f needs all models of E.", False, "It needs something in each of them, but perhaps not much.", "fewer"),
-        Answer("The search has failed.", False, "It goes on: the next round has smaller parts.", "stuck"),
-    )
+@cache
+def _reasons() -> dict[str, dict[str, Any]]:
+    return dict(yaml.safe_load(REASONS.read_text()))
 
 
-def _turned(answers: tuple[Answer, ...], by: int) -> tuple[Answer, ...]:
-    """In another order each time: the right answer has no place of its own."""
-    by %= len(answers)
-    return answers[by:] + answers[:by]
+def _reason(name: str, turn: int, most: int | None = None, **words: str) -> Question:
+    """A question of `REASONS` with `words` in it, and `most` of its answers at the most.
+
+    Each `turn` begins with another answer: the right one has no place of its own.
+    """
+    asked = _reasons()[name]
+    answers = [
+        Answer(each["say"], each.get("right", False), each["why"].format(**words), each.get("misconception", ""))
+        for each in asked["answers"][:most]
+    ]
+    first = turn % len(answers)
+    return Question(asked["ask"].format(**words), (*answers[first:], *answers[:first]))

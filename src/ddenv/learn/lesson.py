@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import yaml
+
 Foretold = Literal["outcome", "winner", "parts"]
 
 
@@ -72,46 +74,8 @@ class Lesson:
         return self.file.stem.lstrip("0123456789-")
 
 
-# What students often believe, and what is right instead.
-MISCONCEPTIONS = {
-    "part": (
-        "mixes up a partition with its complement",
-        "Part A is only the models of A. Without A is all the others. If f shows without A, it is A that goes.",
-    ),
-    "proof": (
-        "takes one miss for proof",
-        "A failure can be flaky. A test that misses f may be bad luck, so it is repeated with other seeds.",
-    ),
-    "smallest": (
-        "thinks minimal means smallest",
-        "1-minimal means that no single model can go. A different, smaller set may exist elsewhere.",
-    ),
-    "any": (
-        "takes any failure for f",
-        "Only the same failure counts: the robot must end where it ended in f. Another failure may have another cause.",
-    ),
-    "fewer": (
-        "thinks that fewer models always help the robot",
-        "Leaving something out can change the robot's path, and lead it into another trap.",
-    ),
-    "alone": (
-        "thinks that one model is the culprit",
-        "A failure can need several models at once: without any one of them the robot gets through.",
-    ),
-    "hit": (
-        "takes one run with f for its rate",
-        "One run with f shows that f can happen there. How often it does, only many runs show.",
-    ),
-    "took": (
-        "takes what took part for what is needed",
-        "What took part changed a bit of a run. Whether f needs it, only a test without it shows.",
-    ),
-    "never": (
-        "takes what was not seen for what cannot happen",
-        "Another seed may show what no run has shown so far. How likely that is, the interval says.",
-    ),
-    "stuck": (
-        "thinks that a round without f is wasted, or the end",
-        "After such a round E stays as it is, and the parts get smaller. Only with single models is it the end.",
-    ),
+# What students often believe, and what is right instead, by name.
+MISCONCEPTIONS: dict[str, tuple[str, str]] = {
+    name: (each["belief"], each["right"])
+    for name, each in yaml.safe_load(Path(__file__).with_name("misconceptions.yaml").read_text()).items()
 }

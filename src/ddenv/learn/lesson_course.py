@@ -32,12 +32,17 @@ Activity = Literal["try", "race"]
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """An open question. Its `key` is for the score; once it is answered, the event `until` is shown, and `then` is asked."""
+    """A question. Its `key` is for the score; once it is answered, the event `until` is shown, and `then` is asked.
+
+    `chosen` is the place of the given answer, -1 if it was skipped, None while it is open; `hint` says whether that is shown.
+    """
 
     key: str
     question: Question
     until: int | None = None
     then: Question | None = None
+    chosen: int | None = None
+    hint: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +79,12 @@ class Course:
         self.score = score or Score()
         self.step = 0
         self._asked: Asked | None = None
-        self._chosen: int | None = None
-        self._hint = False
         # Whether the step has something to do that was neither done nor skipped.
         self.due = False
         # Of which kinds the student was asked for the reason in predictions of one's own.
         self._explained: frozenset[str] = frozenset()
-        # The question of the step, with its answer, and where the run was, while a prediction stands in its place.
-        self._own: tuple[Asked | None, int | None, bool, int] | None = None
+        # The question of the step, and where the run was, while a prediction stands in its place.
+        self._own: tuple[Asked | None, int] | None = None
         position.go(position.ids[0])
         if opened is None:
             position.step("moment", 1)
@@ -101,8 +104,10 @@ class Course:
     @property
     def page(self) -> Page:
         """What is shown beside the run."""
-        question = None if self._asked is None else self._asked.question
-        return Page(blocks(self._text()), question, self._chosen, self._hint, blocks(self._after()))
+        text, after, asked = blocks(self._text()), blocks(self._after()), self._asked
+        if asked is None:
+            return Page(text, after=after)
+        return Page(text, asked.question, asked.chosen, asked.hint, after)
 
     def _text(self) -> str:
         if self._opened is None:
@@ -137,7 +142,7 @@ class Course:
     @property
     def is_open(self) -> bool:
         """Whether a question waits for its answer."""
-        return self._asked is not None and self._chosen is None
+        return self._asked is not None and self._asked.chosen is None
 
     def _said(self, words: str) -> str:
         if self._opened is None:
@@ -148,22 +153,19 @@ class Course:
 
     def go_on(self) -> bool:
         """To what comes next. False at the end, or while something is open that should be answered, done or skipped."""
-        if self.is_open:
+        asked, reason = self._asked, None if self._asked is None else self._asked.then
+        if self.is_open or (self.due and self._own is None):
             return False
-        if self._own is not None and (self._asked is None or self._asked.then is None):
+        if asked is not None and reason is not None:
+            self._asked = Asked(f"{asked.key}.reason", reason)
+        elif self._own is not None:
             self._return()
-            return True
-        if self.due:
+        elif asked is not None and self._opened is None:
+            self._asked = None
+        elif self.step >= self.last:
             return False
-        if self._asked is not None and self._asked.then is not None:
-            self._asked, self._chosen, self._hint = Asked(f"{self._asked.key}.reason", self._asked.then), None, False
-            return True
-        if self._asked is not None and self._opened is None:
-            self._asked = self._chosen = None
-            return True
-        if self.step >= self.last:
-            return False
-        self._come(self.step + 1)
+        else:
+            self._come(self.step + 1)
         return True
 
     def back(self) -> bool:
@@ -179,44 +181,43 @@ class Course:
     def _return(self) -> None:
         """From a prediction back to the step, as it was."""
         assert self._own is not None
-        (self._asked, self._chosen, self._hint, at), self._own = self._own, None
+        (self._asked, at), self._own = self._own, None
         self.position.go(at)
 
     def answer(self, place: int) -> Answer | None:
         """Gives an answer; None if no question is open or it has no such answer."""
-        if self._asked is None or self._chosen is not None or not 0 <= place < len(self._asked.question.answers):
+        if self._asked is None or not self.is_open or not 0 <= place < len(self._asked.question.answers):
             return None
         answer = self._asked.question.answers[place]
         # A lesson counts its own questions.
         if self._own is None:
             self.score = self.score.with_answer(self._asked.key, answer)
-        self._settle(place)
+        self._settle(replace(self._asked, chosen=place))
         return answer
 
     def skip(self) -> bool:
         """Shows the answer of an open question without a score, or passes over what there is to do; False if there is nothing."""
-        if self._asked is None or self._chosen is not None:
+        if self._asked is None or not self.is_open:
             skipped, self.due = self.due, False
             return skipped
         # A skipped prediction has no reason to give.
-        self._asked = replace(self._asked, then=None)
-        self._settle(-1)
+        self._settle(replace(self._asked, chosen=-1, then=None))
         return True
 
     def hint(self) -> bool:
         """Shows the hint of an open question; False if there is none."""
-        if self._asked is None or self._chosen is not None or not self._asked.question.hint:
+        if self._asked is None or not self.is_open or not self._asked.question.hint:
             return False
-        self._hint = True
+        self._asked = replace(self._asked, hint=True)
         return True
 
-    def _settle(self, place: int) -> None:
-        self._chosen = place
-        if self._asked is not None and self._asked.until is not None:
-            self.position.go(self._asked.until)
+    def _settle(self, asked: Asked) -> None:
+        self._asked = asked
+        if asked.until is not None:
+            self.position.go(asked.until)
 
     def _come(self, step: int) -> None:
-        self.step, self._asked, self._chosen, self._hint, self.due, self._own = step, None, None, False, False, None
+        self.step, self._asked, self.due, self._own = step, None, False, None
         self.score = self.score.at(step, self.last)
         if self._opened is None or step == self.last:
             return
@@ -279,7 +280,7 @@ class Course:
         if not self.position.step(what, by):
             return False
         if self._opened is None:
-            self._asked, self._chosen, self._hint = None, None, False
+            self._asked = None
         return True
 
     @property
@@ -292,8 +293,8 @@ class Course:
 
         In a lesson it counts for nothing, and going on leads back to the step.
         """
-        before = self._asked, self._chosen, self._hint, self.at
-        for id in self._ahead():
+        before = self._asked, self.at
+        for id in (id for id in self.position.ids if id >= self.at):
             moment = self.position.moment(id)
             what = None if moment is None else at_hand(moment)
             found = None if what is None else foretelling(self.position, id, what)
@@ -302,14 +303,11 @@ class Course:
                 # What was explained a moment ago is not asked again.
                 shown = found.told if found.kind in self._explained else found
                 self._explained |= {found.kind}
-                self._asked, self._chosen, self._hint = _asked(f"free.{id}", shown), None, False
+                self._asked = _asked(f"free.{id}", shown)
                 if self._opened is not None:
                     self._own = self._own or before
                 return True
         return False
-
-    def _ahead(self) -> Iterator[int]:
-        return (id for id in self.position.ids if id >= self.at)
 
 
 def _asked(key: str, found: Foretelling) -> Asked:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, get_args
+from typing import Any, cast, get_args
 
 import yaml
 
@@ -25,11 +25,8 @@ _DOES = ("ask", "foretell", "try", "race")
 _ANSWER = ("say", "why", "right", "misconception")
 
 
-class Places(Protocol):
-    """Knows the events of a run by the words of a lesson."""
-
-    def event(self, words: str) -> int:
-        """Raises UserError for words that are no place in the run."""
+# Says which event of a run the words of a lesson name. Raises UserError for words that are no place in the run.
+Places = Callable[[str], int]
 
 
 def read_lesson(file: Path, places: Callable[[Path], Places]) -> Lesson:
@@ -45,21 +42,19 @@ def read_lesson(file: Path, places: Callable[[Path], Places]) -> Lesson:
         raise UserError(f"{file}{line}: not valid YAML: {getattr(error, 'problem', None) or 'not text'}") from None
     except RecursionError:
         raise UserError(f"{file}: not valid YAML: nested too deeply") from None
-    top = _Node(file, root, "").keys(_KEYS)
-    for key in ("title", "aim", "run", "steps"):
-        top.need(key)
-    run = _beside(top.at["run"])
-    oracle = _beside(top.at["oracle"]) if "oracle" in top.at else None
-    found = top.at["run"].tried(lambda: places(run))
+    top = _Node(file, root, "").keys(_KEYS, "title", "aim", "run", "steps")
+    run = _beside(top["run"])
+    oracle = _beside(top["oracle"]) if "oracle" in top else None
+    found = top["run"].tried(lambda: places(run))
     return Lesson(
         file,
-        top.at["title"].words(),
-        top.at["aim"].words(),
-        top.at["minutes"].whole() if "minutes" in top.at else 10,
+        top["title"].words(),
+        top["aim"].words(),
+        top["minutes"].whole() if "minutes" in top else 10,
         run,
         oracle,
-        tuple(_step(each, found, oracle is not None) for each in top.at["steps"].entries()),
-        {name: _beside(node) for name, node in top.at["beside"].named()} if "beside" in top.at else {},
+        tuple(_step(each, found, oracle is not None) for each in top["steps"].entries()),
+        {name: _beside(node) for name, node in top["beside"].named()} if "beside" in top else {},
     )
 
 
@@ -86,7 +81,8 @@ class _Node:
         except UserError as error:
             raise self.wrong(str(error)) from None
 
-    def keys(self, known: tuple[str, ...]) -> _Keys:
+    def keys(self, known: tuple[str, ...], *needed: str) -> dict[str, _Node]:
+        """The values of a mapping, which has the keys `needed` and maybe others of those that are `known`."""
         if not isinstance(self.node, yaml.MappingNode):
             raise self.wrong(f"expected keys such as {', '.join(known[:3])}")
         found: dict[str, _Node] = {}
@@ -100,7 +96,10 @@ class _Node:
             if name in found:
                 raise _Node(self.file, key, path).wrong("stands twice")
             found[name] = one
-        return _Keys(self, found)
+        for key in needed:
+            if key not in found:
+                raise self.wrong(f"the key '{key}' is missing")
+        return found
 
     def entries(self) -> list[_Node]:
         if not isinstance(self.node, yaml.SequenceNode) or not self.node.value:
@@ -143,17 +142,6 @@ class _Node:
         return text
 
 
-@dataclass(frozen=True, slots=True)
-class _Keys:
-    node: _Node
-    at: Mapping[str, _Node]
-
-    def need(self, key: str) -> _Node:
-        if key not in self.at:
-            raise self.node.wrong(f"the key '{key}' is missing")
-        return self.at[key]
-
-
 def _beside(node: _Node) -> Path:
     """A file in the lesson's own folder."""
     name = node.raw()
@@ -166,31 +154,31 @@ def _beside(node: _Node) -> Path:
 
 
 def _step(node: _Node, places: Places, has_oracle: bool) -> Step:
-    keys = node.keys(_STEP)
-    at = keys.at.get("at")
-    if len(does := [key for key in _DOES if key in keys.at]) > 1:
-        raise keys.at[does[1]].wrong(f"a step has one of {', '.join(_DOES)}, found {' and '.join(does)}")
+    keys = node.keys(_STEP, "text")
+    at = keys.get("at")
+    if len(does := [key for key in _DOES if key in keys]) > 1:
+        raise keys[does[1]].wrong(f"a step has one of {', '.join(_DOES)}, found {' and '.join(does)}")
     for key in ("try", "race"):
-        if key in keys.at and not has_oracle:
-            raise keys.at[key].wrong("needs to know how every part of the world ends; give the lesson the key 'oracle'")
+        if key in keys and not has_oracle:
+            raise keys[key].wrong("needs to know how every part of the world ends; give the lesson the key 'oracle'")
     for key in ("answers", "hint"):
-        if key in keys.at and "ask" not in keys.at:
-            raise keys.at[key].wrong("belongs to a question; the key 'ask' is missing")
+        if key in keys and "ask" not in keys:
+            raise keys[key].wrong("belongs to a question; the key 'ask' is missing")
     foretell: Foretold | None = None
-    if "foretell" in keys.at:
-        foretell = _foretold(keys.at["foretell"])
+    if "foretell" in keys:
+        foretell = cast(Foretold, keys["foretell"].one_of(get_args(Foretold)))
         if at is None:
-            raise keys.at["foretell"].wrong("needs the key 'at': the place before it happens")
+            raise keys["foretell"].wrong("needs the key 'at': the place before it happens")
         wanted = "test" if foretell == "outcome" else "round"
         if not at.raw().startswith(wanted):
             raise at.wrong(f"to foretell the {foretell} it must be a {wanted}")
     return Step(
-        keys.need("text").words(),
-        None if at is None else int(at.tried(lambda: places.event(at.raw()))),
-        _question(keys) if "ask" in keys.at else None,
+        keys["text"].words(),
+        None if at is None else int(at.tried(lambda: places(at.raw()))),
+        _question(node, keys) if "ask" in keys else None,
         foretell,
-        keys.at["try"].keys(("budget",)).need("budget").whole() if "try" in keys.at else None,
-        _racers(keys.at["race"]) if "race" in keys.at else (),
+        keys["try"].keys(("budget",), "budget")["budget"].whole() if "try" in keys else None,
+        _racers(keys["race"]) if "race" in keys else (),
         node.line,
     )
 
@@ -207,26 +195,21 @@ def _racers(node: _Node) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _foretold(node: _Node) -> Foretold:
-    known: tuple[Foretold, ...] = get_args(Foretold)
-    text = node.one_of(known)
-    return next(each for each in known if each == text)
-
-
-def _question(keys: _Keys) -> Question:
-    entries = keys.need("answers").entries()
-    answers = tuple(_answer(each) for each in entries)
+def _question(node: _Node, keys: dict[str, _Node]) -> Question:
+    if "answers" not in keys:
+        raise node.wrong("the key 'answers' is missing")
+    answers = tuple(map(_answer, keys["answers"].entries()))
     if not ANSWERS[0] <= len(answers) <= ANSWERS[1]:
-        raise keys.at["answers"].wrong(f"expected {ANSWERS[0]} to {ANSWERS[1]} answers, found {len(answers)}")
+        raise keys["answers"].wrong(f"expected {ANSWERS[0]} to {ANSWERS[1]} answers, found {len(answers)}")
     if (right := sum(answer.right for answer in answers)) != 1:
-        raise keys.at["answers"].wrong(f"expected exactly one answer that is right, found {right}")
-    return Question(keys.at["ask"].words(), answers, keys.at["hint"].words() if "hint" in keys.at else "")
+        raise keys["answers"].wrong(f"expected exactly one answer that is right, found {right}")
+    return Question(keys["ask"].words(), answers, keys["hint"].words() if "hint" in keys else "")
 
 
 def _answer(node: _Node) -> Answer:
-    keys = node.keys(_ANSWER)
-    right = keys.at["right"].flag() if "right" in keys.at else False
-    belief = keys.at["misconception"].one_of(tuple(MISCONCEPTIONS)) if "misconception" in keys.at else ""
+    keys = node.keys(_ANSWER, "say", "why")
+    right = keys["right"].flag() if "right" in keys else False
+    belief = keys["misconception"].one_of(tuple(MISCONCEPTIONS)) if "misconception" in keys else ""
     if right and belief:
-        raise keys.at["misconception"].wrong("the right answer has none")
-    return Answer(keys.need("say").words(), right, keys.need("why").words(), belief)
+        raise keys["misconception"].wrong("the right answer has none")
+    return Answer(keys["say"].words(), right, keys["why"].words(), belief)

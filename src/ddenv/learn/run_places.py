@@ -7,7 +7,16 @@ from collections import Counter
 from collections.abc import Sequence
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import CandidateJudged, Implied, TestFinished, TestStarted
+from ddenv.runfile.events import (
+    BaselineFinished,
+    CandidateJudged,
+    CertificateFinished,
+    EngineStarted,
+    Implied,
+    RateLost,
+    TestFinished,
+    TestStarted,
+)
 from ddenv.runfile.position import Position
 from ddenv.runfile.store import Recorded
 
@@ -15,9 +24,6 @@ ALONE = ("start", "baseline", "end")
 COUNTED = ("round", "test", "result", "verdict", "reduction", "certificate", "claims", "back")
 EXPECTED = f"expected {', '.join((*ALONE[:-1], *(f'{word} N' for word in COUNTED)))} or {ALONE[-1]}"
 _WORDS = re.compile(rf"({'|'.join(ALONE)})|({'|'.join(COUNTED)}) (\d{{1,6}})")
-# Of these events each is a place of its own.
-_EACH = {"certificate_finished": "claims", "rate_lost": "back"}
-_Found = dict[tuple[str, int], int]
 
 
 class Places:
@@ -25,7 +31,7 @@ class Places:
 
     def __init__(self, position: Position, events: Sequence[Recorded]) -> None:
         """`events` are all of those that the position was made of."""
-        found = _of_tests(events) | _of_run(events)
+        found = _of_events(events)
         for chapter in position.chapters:
             if chapter.kind != "baseline":
                 found[chapter.kind, chapter.number] = chapter.first
@@ -46,35 +52,31 @@ class Places:
         return self._found[key]
 
 
-def _of_tests(events: Sequence[Recorded]) -> _Found:
-    """Where each test begins and ends, and where its candidate is judged after it."""
-    found: _Found = {}
+def _of_events(events: Sequence[Recorded]) -> dict[tuple[str, int], int]:
+    """The places that an event makes by itself."""
+    found: dict[tuple[str, int], int] = {}
+    numbers: Counter[str] = Counter()
     ended = 0
     for recorded in events:
+        id = recorded.id
         match recorded.event:
+            case EngineStarted():
+                found.setdefault(("start", 0), id)
+            case BaselineFinished():
+                found["baseline", 0] = id
             case TestStarted(test):
-                found["test", test] = recorded.id
+                found["test", test] = id
             case TestFinished(test):
                 ended = test
-                found["result", test] = recorded.id
+                found["result", test] = id
             case Implied(test):
                 ended = test
-                found["test", test] = found["result", test] = recorded.id
+                found["test", test] = found["result", test] = id
             case CandidateJudged():
                 # A later candidate may be judged at once, by what is known.
-                found.setdefault(("verdict", ended), recorded.id)
-    return found
-
-
-def _of_run(events: Sequence[Recorded]) -> _Found:
-    found: _Found = {}
-    numbers: Counter[str] = Counter()
-    for event in events:
-        if word := _EACH.get(event.kind):
-            numbers[word] += 1
-            found[word, numbers[word]] = event.id
-        elif event.kind == "baseline_finished":
-            found["baseline", 0] = event.id
-        elif event.kind == "engine_started":
-            found.setdefault(("start", 0), event.id)
+                found.setdefault(("verdict", ended), id)
+            case CertificateFinished() | RateLost() as event:
+                word = "back" if isinstance(event, RateLost) else "claims"
+                numbers[word] += 1
+                found[word, numbers[word]] = id
     return found

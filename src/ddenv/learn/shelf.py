@@ -1,11 +1,12 @@
-"""Where the lessons are, and how one is opened together with its run."""
+"""Where the lessons are, how one is opened together with its run, and how a new one begins."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from string import Template
 
 from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
@@ -21,8 +22,10 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.world.access import read_bytes, write_file
 
-LESSONS = Path(__file__).parent / "lessons"
+LESSONS = Path(__file__).with_name("lessons")
+TEMPLATE = Path(__file__).with_name("new_lesson.yaml")
 
 
 def bundled() -> tuple[Path, ...]:
@@ -90,27 +93,20 @@ class Opened:
         return tuple(found)
 
 
-class _Anywhere:
-    """The places of a run that is not read."""
-
-    def event(self, words: str) -> int:
-        return 0
-
-
 def glance(file: Path) -> Lesson:
     """A lesson for a list: its run is not read, and so its places are not known. Raises UserError as `open_lesson`."""
-    return read_lesson(file, lambda run: _Anywhere())
+    return read_lesson(file, lambda run: lambda words: 0)
 
 
 def open_lesson(file: Path) -> Opened:
     """Raises UserError, in one line, if anything is wrong with the lesson, its run or its oracle."""
     opened: list[Position] = []
 
-    def places(run: Path) -> Places:
+    def places(run: Path) -> Callable[[str], int]:
         with RunFile(run) as content:
             events = content.events()
         opened.append(position_in(events))
-        return Places(opened[0], events)
+        return Places(opened[0], events).event
 
     lesson = read_lesson(file, places)
     oracle = None if lesson.oracle is None else read_oracle(lesson.oracle)
@@ -124,8 +120,7 @@ def open_lesson(file: Path) -> Opened:
         raise UserError(f"{lesson.oracle}: f does not show with all models, so there is nothing to search")
     plays = {} if oracle is None else _plays(lesson, oracle)
     made = Opened(lesson, opened[0], oracle, {name: _end(run) for name, run in lesson.beside.items()}, plays)
-    _check_figures(made)
-    _check_foretold(made)
+    _check(made)
     return made
 
 
@@ -149,24 +144,37 @@ def _end(run: Path) -> RunState:
         return fold(content.events())
 
 
-def _check_foretold(opened: Opened) -> None:
-    """Raises UserError if nothing can be foretold where a step asks for it."""
-    for step, found in zip(opened.lesson.steps, opened.foretold, strict=True):
-        if step.foretell is not None and found is None:
-            raise UserError(
-                f"{opened.lesson.file}:{step.line}: foretell: nothing of this kind can be foretold there; "
-                "choose another place in the run"
-            )
-
-
-def _check_figures(opened: Opened) -> None:
-    """Raises UserError if a text has a figure that neither the runs nor the oracle know."""
-    for step, at in zip(opened.lesson.steps, opened.places, strict=True):
-        asked = step.question
-        answers = (
-            () if asked is None else (asked.text, asked.hint, *(f"{each.text} {each.why}" for each in asked.answers))
-        )
+def _check(opened: Opened) -> None:
+    """Raises UserError if a text has a figure that is not known, or nothing can be foretold where a step asks for it."""
+    for step, at, found in zip(opened.lesson.steps, opened.places, opened.foretold, strict=True):
+        texts = [step.text]
+        if (asked := step.question) is not None:
+            texts += [asked.text, asked.hint, *(f"{each.text} {each.why}" for each in asked.answers)]
         try:
-            opened.text(" ".join((step.text, *answers)), at)
+            opened.text(" ".join(texts), at)
+            if step.foretell is not None and found is None:
+                raise UserError("foretell: nothing of this kind can be foretold there; choose another place in the run")
         except UserError as error:
             raise UserError(f"{opened.lesson.file}:{step.line}: {error}") from None
+
+
+def write_template(file: Path, run: Path) -> tuple[Path, Path]:
+    """Writes a lesson to start from, beside a copy of its run; returns both paths.
+
+    Raises UserError, also for a run without a round.
+    """
+    copy = file.with_name(run.name)
+    for path in (file, copy):
+        if path.exists():
+            raise UserError(f"{path}: exists already; choose another name")
+    if file.suffix.lower() not in (".yaml", ".yml"):
+        raise UserError(f"{file}: a lesson's name must end in .yaml")
+    with RunFile(run) as content:
+        state = position_in(content.events()).end
+    first = next((test for test in state.tests if test.phase == "round" and test.implied_by is None), None)
+    if first is None or not state.rounds_done:
+        raise UserError(f"{run}: has no finished round yet, so there is nothing to predict")
+    words = {"file": file.name, "run": run.name, "test": f"test {first.id}", "round": f"round {first.round}"}
+    write_file(copy, read_bytes(run))
+    write_file(file, Template(TEMPLATE.read_text()).substitute(words).encode())
+    return file, copy
