@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -95,6 +95,13 @@ def parts(cell: Cell) -> tuple[Part, ...]:
 def say(*words: Part, notice: bool = False) -> Paragraph:
     """A paragraph of these words."""
     return Paragraph(words, notice)
+
+
+def named(models: Sequence[str], most: int) -> tuple[Part, ...]:
+    """a, b and 3 more: at most `most` of the models by name."""
+    words = [part for name in models[:most] for part in (", ", Name(name))][1:]
+    more = len(models) - most
+    return (*words, f" and {more} more") if more > 0 else tuple(words)
 
 
 def moment(time: float) -> str:

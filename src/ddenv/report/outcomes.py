@@ -7,7 +7,20 @@ from collections import Counter
 
 from ddenv.evidence.claims import current, drift, meaning, missed, missing, never_left_out, promise, verdict_on
 from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
-from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, percent, say, section, thousands
+from ddenv.page.blocks import (
+    Block,
+    Cell,
+    Name,
+    Picture,
+    Section,
+    Strong,
+    Table,
+    named,
+    percent,
+    say,
+    section,
+    thousands,
+)
 from ddenv.report.run_data import Record
 from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.events import DEEDS
@@ -194,15 +207,10 @@ def others_met(record: Record) -> Section | None:
 
 def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
     models = state.models_of(state.tests[failure.smallest - 1])
-    names: list[Part] = []
-    for name in models[:MOST_NAMES]:
-        names += [", ", Name(name)]
-    more = len(models) - MOST_NAMES
-    names += [f" and {more} more"] if more > 0 else []
     size = f"{count(failure.size, 'model')} (test {failure.smallest})"
     f = state.f_position
     away = "" if f is None else f"{math.dist(f, failure.position):.2f}"
-    return failure.name, away, thousands(len(failure.tests)), size, tuple(names[1:]) or "none"
+    return failure.name, away, thousands(len(failure.tests)), size, named(models, MOST_NAMES) or "none"
 
 
 def worth(record: Record) -> Section | None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, place, say
+from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, place, say
 from ddenv.report.report_map import CORNERS, close_up, picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
-from ddenv.text import count, plain
+from ddenv.text import count
 from ddenv.world.model import is_ground
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ def _models(state: RunState, drawn: tuple[Drawn, ...]) -> list[Block]:
     carried = {name: drops_without(state, frozenset({name})) for name in names[:MOST_MODELS]}
     drop = any(carried.values())
     rows = tuple(
-        (*_row(name, by_name.get(name), touched, state), *((_named(fallen),) if drop else ()))
+        (*_row(name, by_name.get(name), touched, state), *((named(fallen, MOST_DROPPED),) if drop else ()))
         for name, fallen in carried.items()
     )
     if not rows:
@@ -82,15 +81,6 @@ def _row(name: str, each: Drawn | None, touched: dict[str, float], state: RunSta
     return (shown, kind, place(each.center), size, *at)
 
 
-def _named(models: Sequence[str]) -> Cell:
-    """The names of `models`, the first ones if there are many."""
-    more = len(models) - MOST_DROPPED
-    words: list[Part] = []
-    for number, name in enumerate(models[:MOST_DROPPED]):
-        words += [", " if number else "", Name(name)]
-    return tuple([*words, f" and {more} more"] if more > 0 else words)
-
-
 def _touched(state: RunState) -> dict[str, float]:
     """When the robot first touched each model in the last similar run, s; empty in old files."""
     test = state.evidence_test
@@ -108,18 +98,11 @@ def _stay(record: Record) -> list[Block]:
         return []
     grounds = [model.name for model in others if is_ground(model)]
     protected = [model.name for model in others if not is_ground(model)]
-    words: list[Part] = [Strong("Always there:"), " "]
-    for number, name in enumerate((grounds + protected)[:MOST_NAMES]):
-        words += [", " if number else "", Name(name)]
-    more = len(others) - MOST_NAMES
-    return [say(*words, f" and {more} more." if more > 0 else ".")]
+    return [say(Strong("Always there:"), " ", *named(grounds + protected, MOST_NAMES), ".")]
 
 
 def _names_alone(state: RunState) -> tuple[Block, ...]:
     if state.baseline is None:
         return (say(f"{count(len(state.elements), 'model')} can be removed. No map: the world cannot be read."),)
-    words: list[Part] = [Strong("Left:"), " "]
-    for number, name in enumerate(state.environment[:MOST_MODELS]):
-        words += [", " if number else "", Name(plain(name))]
-    more = len(state.environment) - MOST_MODELS
-    return (say(*words, f" and {more} more." if more > 0 else "."), say("No map: the world cannot be read."))
+    left = say(Strong("Left:"), " ", *named(state.environment, MOST_MODELS), ".")
+    return (left, say("No map: the world cannot be read."))

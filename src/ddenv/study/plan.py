@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from ddenv import schemas
@@ -115,8 +115,10 @@ def make_plan(
     `options` are those of `ddenv.runs.subject.with_options` for all of it.
     """
     names = scenario_names(scenarios)
-    chosen_pairs, chosen_algorithms = _pairs(pairs), _algorithms(algorithms)
-    loaded = tuple(_loaded(name, options) for name in names)
+    chosen_pairs = _chosen("--pairs", pairs, schemas.split_pair, {"paper": PAIRS, "all": schemas.pairs()})
+    known = {"all": schemas.names("algorithm")}
+    chosen_algorithms = _chosen("--algorithms", algorithms, partial(schemas.check, "algorithm"), known)
+    loaded = tuple(with_options(load_scenario(find_scenario(name)), **options) for name in names)
     for number, scenario in enumerate(loaded):
         if scenario.name in (other.name for other in loaded[:number]):
             raise UserError(f"--scenarios: two of them are called '{scenario.name}'; give each a name of its own")
@@ -131,10 +133,6 @@ def scenario_names(words: Sequence[str]) -> tuple[str, ...]:
     return _names("--scenarios", ",".join(words)) if words else SCENARIOS
 
 
-def _loaded(name: str, options: dict[str, Any]) -> Scenario:
-    return with_options(load_scenario(find_scenario(name)), **options)
-
-
 def _names(option: str, words: str) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(word.strip() for word in words.split(",") if word.strip()))
     if not names:
@@ -142,31 +140,17 @@ def _names(option: str, words: str) -> tuple[str, ...]:
     return names
 
 
-def _pairs(words: str) -> tuple[str, ...]:
-    given = _names("--pairs", words)
-    named = {"paper": PAIRS, "all": schemas.pairs()}
-    pairs = tuple(dict.fromkeys(pair for name in given for pair in named.get(name, (name,))))
-    for pair in pairs:
+def _chosen(
+    option: str, words: str, check: Callable[[str], object], groups: Mapping[str, Sequence[str]]
+) -> tuple[str, ...]:
+    """The names in `words`, each once; that of a group stands for all in it. Raises UserError."""
+    names = tuple(dict.fromkeys(name for each in _names(option, words) for name in groups.get(each, (each,))))
+    for name in names:
         try:
-            schemas.split_pair(pair)
+            check(name)
         except UserError as error:
-            raise UserError(f"--pairs: {error}; or give 'paper' or 'all'") from None
-    return pairs
-
-
-def _algorithms(words: str) -> tuple[str, ...]:
-    given = _names("--algorithms", words)
-    algorithms = tuple(dict.fromkeys(name for each in given for name in _all_if_asked(each)))
-    for algorithm in algorithms:
-        try:
-            schemas.check("algorithm", algorithm)
-        except UserError as error:
-            raise UserError(f"--algorithms: {error}; or give 'all'") from None
-    return algorithms
-
-
-def _all_if_asked(algorithm: str) -> tuple[str, ...]:
-    return schemas.names("algorithm") if algorithm == "all" else (algorithm,)
+            raise UserError(f"{option}: {error}; or give {' or '.join(map(repr, groups))}") from None
+    return names
 
 
 def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method]:

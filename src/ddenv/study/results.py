@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -147,7 +147,7 @@ def read_cell(folder: Path, cell: Cell) -> Found:
         whole_runs=len(whole),
         misses=min(story.misses, default=1 + cell.scenario.reduction.iterations),
         steps_back=story.steps_back,
-        sizes=story.sizes,
+        sizes=tuple(story.sizes),
         certificate=certificate,
     )
 
@@ -160,37 +160,34 @@ def _problem(state: RunState) -> str:
     return state.reason if state.ended else "has not ended"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Story:
     """What a run's events add up to. `search` and `certificates` are the tests that those rest on, in order; each entry of `misses`
     is what a candidate without f cost.
     """
 
-    state: RunState
-    search: tuple[int, ...]
-    certificates: tuple[int, ...]
-    sizes: tuple[tuple[int, int], ...]
-    misses: tuple[int, ...]
-    steps_back: int
+    state: RunState = field(default_factory=RunState)
+    search: dict[int, None] = field(default_factory=dict)
+    certificates: dict[int, None] = field(default_factory=dict)
+    sizes: list[tuple[int, int]] = field(default_factory=list)
+    misses: list[int] = field(default_factory=list)
+    steps_back: int = 0
 
 
 def _story(events: Iterable[Recorded]) -> _Story:
-    state, steps_back = RunState(), 0
-    search: dict[int, None] = {}
-    certificates: dict[int, None] = {}
-    sizes: list[tuple[int, int]] = []
-    misses: list[int] = []
+    told = _Story()
     for recorded, _, state in steps(events):
+        told.state = state
         match event := recorded.event:
             case TestFinished(test) if state.tests[test - 1].phase == "baseline":
-                search[test] = None
+                told.search[test] = None
             case CandidateJudged():
-                search |= dict.fromkeys(event.tests)
+                told.search |= dict.fromkeys(event.tests)
                 if event.verdict == "dissimilar" and event.tests:
-                    misses.append(len(event.tests))
+                    told.misses.append(len(event.tests))
             case CertificateFinished() | RateLost():
-                certificates |= dict.fromkeys(event.tests)
-                steps_back += isinstance(event, RateLost)
+                told.certificates |= dict.fromkeys(event.tests)
+                told.steps_back += isinstance(event, RateLost)
         if isinstance(event, BaselineFinished | Reduced | RateLost | LeftOut | Finished):
-            sizes.append((len(search), len(state.environment)))
-    return _Story(state, tuple(search), tuple(certificates), tuple(sizes), tuple(misses), steps_back)
+            told.sizes.append((len(told.search), len(state.environment)))
+    return told

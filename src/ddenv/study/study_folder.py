@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from ddenv import __version__
 from ddenv.errors import UserError
@@ -38,6 +39,9 @@ class Sitting:
     tests: int
     versions: str
     machine: str
+
+
+_SITTINGS = TypeAdapter(tuple[Sitting, ...])
 
 
 def run_path(folder: Path, cell: Cell) -> Path:
@@ -69,20 +73,9 @@ def sittings(folder: Path) -> tuple[Sitting, ...]:
     if not path.exists():
         return ()
     try:
-        return tuple(_sitting(each) for each in json.loads(read_bytes(path))["sittings"])
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        return _SITTINGS.validate_python(json.loads(read_bytes(path))["sittings"])
+    except (ValueError, TypeError, KeyError, RecursionError):
         raise UserError(f"{path}: is damaged; delete it (the runs are not affected)") from None
-
-
-def _sitting(data: dict[str, Any]) -> Sitting:
-    return Sitting(
-        begun=float(data["begun"]),
-        seconds=float(data["seconds"]),
-        jobs=int(data["jobs"]),
-        tests=int(data["tests"]),
-        versions=str(data["versions"]),
-        machine=str(data["machine"]),
-    )
 
 
 def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:

@@ -37,15 +37,6 @@ from ddenv.world.access import write_file
 from ddenv.world.scenario import Scenario
 
 STEM = "study"
-# The columns of `study.csv`.
-HEADER = (
-    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "slices", "certified", "problem"),
-    *("models", "left", "reduction", "names", "tests", "simulated", "reruns"),
-    *("certificate_tests", "certificate_simulated", "ahead", "taken_over"),
-    *("seconds", "certificate_seconds", "steps_back", "baseline_runs", "baseline_f", "least_to_show", "least_to_find"),
-    *("keep_rate", "whole_runs", "whole_f", "left_runs", "left_f", "left_low", "left_high", "without_most"),
-    *("paper_tests", "paper_reduction", "paper_minutes", "ddenv", "simulator", "run"),
-)
 # These differ between cells.
 OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
 COLUMNS = (
@@ -178,51 +169,62 @@ def write_study(plan: Plan, folder: Path, sittings: Sequence[Sitting]) -> tuple[
 
 def table(folder: Path, found: Sequence[Found]) -> str:
     """All cells as CSV, a row each; missing values are empty."""
+    rows = [_row(folder, each) for each in found]
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(HEADER)
-    writer.writerows(_row(folder, each) for each in found)
+    writer = csv.DictWriter(out, rows[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     return out.getvalue()
 
 
-def _row(folder: Path, each: Found) -> tuple[object, ...]:
+def _row(folder: Path, each: Found) -> dict[str, object]:
     cell, base, paper = each.cell, each.baseline, theirs(each.cell)
-    used = dict(zip(("partitioning", "prioritization"), cell.method.parts, strict=True))
-    return (
-        *(
-            cell.scenario.name,
-            cell.method.algorithm,
-            *used.values(),
-            cell.seed,
-            cell.slices,
-            each.minimal,
-            each.problem,
-        ),
-        *(len(each.elements), len(each.left), round(each.smaller, 4), " ".join(each.left)),
-        *(each.tests, each.simulated, each.reruns),
-        *(each.certificate_tests, each.certificate_simulated, each.ahead, each.taken),
-        *(round(each.seconds, 2), round(each.certificate_seconds, 2), each.steps_back),
-        *(("", "") if base is None else (base.runs, base.failures)),
-        *((least_of(each, least_to_show), least_of(each, least_to_find)) if each.minimal else ("", "")),
-        *_of_certificate(each),
-        *(("", "", "") if paper is None else (paper.tests, paper.smaller, paper.minutes)),
-        *(
-            each.version,
-            each.simulator if cell.scenario.oracle is None else "",
-            run_path(folder, cell).relative_to(folder),
-        ),
-    )
-
-
-def _of_certificate(each: Found) -> tuple[object, ...]:
-    """The share to keep; the runs of the whole world and of what is left; the highest rate without one of its models."""
-    if each.certificate is None:
-        return ("",) * 8
-    left, *removals = each.certificate.claims
-    most = max((claim.shown / claim.runs for claim in removals if claim.runs), default=None)
-    of_left = (left.runs, left.shown, round(left.low, 4), round(left.high, 4))
-    whole = (each.certificate.keep_rate, each.whole_runs, each.whole_shown)
-    return (*whole, *of_left, "" if most is None else round(most, 4))
+    partitioning, prioritization = cell.method.parts
+    left, *removals = each.certificate.claims if each.certificate is not None else (None,)
+    most = max((claim.shown / claim.runs for claim in removals if claim and claim.runs), default=None)
+    return {
+        "scenario": cell.scenario.name,
+        "algorithm": cell.method.algorithm,
+        "partitioning": partitioning,
+        "prioritization": prioritization,
+        "seed": cell.seed,
+        "slices": cell.slices,
+        "certified": each.minimal,
+        "problem": each.problem,
+        "models": len(each.elements),
+        "left": len(each.left),
+        "reduction": round(each.smaller, 4),
+        "names": " ".join(each.left),
+        "tests": each.tests,
+        "simulated": each.simulated,
+        "reruns": each.reruns,
+        "certificate_tests": each.certificate_tests,
+        "certificate_simulated": each.certificate_simulated,
+        "ahead": each.ahead,
+        "taken_over": each.taken,
+        "seconds": round(each.seconds, 2),
+        "certificate_seconds": round(each.certificate_seconds, 2),
+        "steps_back": each.steps_back,
+        "baseline_runs": base and base.runs,
+        "baseline_f": base and base.failures,
+        "least_to_show": least_of(each, least_to_show) if each.minimal else None,
+        "least_to_find": least_of(each, least_to_find) if each.minimal else None,
+        "keep_rate": each.certificate and each.certificate.keep_rate,
+        "whole_runs": each.certificate and each.whole_runs,
+        "whole_f": each.certificate and each.whole_shown,
+        "left_runs": left and left.runs,
+        "left_f": left and left.shown,
+        "left_low": left and round(left.low, 4),
+        "left_high": left and round(left.high, 4),
+        # The highest rate without one of the models that are left.
+        "without_most": None if most is None else round(most, 4),
+        "paper_tests": paper and paper.tests,
+        "paper_reduction": paper and paper.smaller,
+        "paper_minutes": paper and paper.minutes,
+        "ddenv": each.version,
+        "simulator": each.simulator if cell.scenario.oracle is None else "",
+        "run": run_path(folder, cell).relative_to(folder),
+    }
 
 
 def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:

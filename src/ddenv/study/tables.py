@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.evidence.rates import wilson_interval
-from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, say
+from ddenv.page.blocks import Block, Cell, Paragraph, Part, Picture, Section, Strong, Table, named, percent, say
 from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
@@ -124,12 +124,8 @@ def _said(left: tuple[str, ...], cells: Sequence[Found], of_them: int) -> Iterat
     minimal = any(each.minimal for each in cells)
     yield f"{'The minimal world' if minimal else 'What is left, not shown to be minimal'} (the paper's Figure 3)"
     yield f", the end of {len(cells)} of {of_them} cells: " if of_them > 1 else ": "
-    if not left:
-        yield "nothing that can be removed"
-    for number, name in enumerate(left[:MOST_LEFT]):
-        yield ", " if number else ""
-        yield Name(name)
-    yield f" and {len(left) - MOST_LEFT} more." if len(left) > MOST_LEFT else "."
+    yield from named(left, MOST_LEFT) or ("nothing that can be removed",)
+    yield "."
 
 
 def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
@@ -169,29 +165,32 @@ def section(folder: Path, group: Group) -> Section:
 def numbers(group: Group) -> Table:
     """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has them."""
     beside, slices = _has_theirs(group), any(row.sliced for row in group.rows)
-    paper, sliced = ["paper"] if beside else [], ["with slices"] if slices else []
-    head = (
-        *("partitioning, prioritization", "certified", "search tests", *paper, *sliced),
-        *("certificate tests", *sliced, "% reduction", *paper, "search minutes", *paper, "certificate minutes"),
-    )
-    rows = tuple(_numbers(row, beside, slices) for row in group.rows)
-    return Table(head, rows, frozenset(range(2, len(head))))
+    rows = [tuple(_numbers(row, beside, slices)) for row in group.rows]
+    head = tuple(title for title, _ in rows[0])
+    return Table(head, tuple(tuple(cell for _, cell in row) for row in rows), frozenset(range(2, len(head))))
 
 
-def _numbers(row: Row, beside: bool, slices: bool) -> tuple[Cell, ...]:
+def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]:
+    """The titles and cells of a row."""
     over, sliced = row.over, [each for each in row.sliced if each.certificate is not None]
-    tests = spread([each.tests for each in over], _whole)
-    fresh = spread([each.certificate_tests for each in over], _whole)
-    smaller = spread([each.smaller for each in over], percent)
-    minutes = spread([each.seconds / 60 for each in over], _minutes)
-    more = spread([each.certificate_seconds / 60 for each in over], _minutes)
-    name = row.method.label, _certified(row)
     paper = theirs(row.found[0].cell)
-    said = ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
-    one, two, three = ([each] if beside else [] for each in said)
-    search = [spread([each.simulated for each in sliced], _whole)] if slices else []
-    proof = [spread([each.certificate_simulated for each in sliced], _whole)] if slices else []
-    return *name, tests, *one, *search, fresh, *proof, smaller, *two, minutes, *three, more
+    yield "partitioning, prioritization", row.method.label
+    yield "certified", _certified(row)
+    yield "search tests", spread([each.tests for each in over], _whole)
+    if beside:
+        yield "paper", "–" if paper is None else str(paper.tests)
+    if slices:
+        yield "with slices", spread([each.simulated for each in sliced], _whole)
+    yield "certificate tests", spread([each.certificate_tests for each in over], _whole)
+    if slices:
+        yield "with slices", spread([each.certificate_simulated for each in sliced], _whole)
+    yield "% reduction", spread([each.smaller for each in over], percent)
+    if beside:
+        yield "paper", "–" if paper is None else percent(paper.smaller)
+    yield "search minutes", spread([each.seconds / 60 for each in over], _minutes)
+    if beside:
+        yield "paper", "–" if paper is None else str(paper.minutes)
+    yield "certificate minutes", spread([each.certificate_seconds / 60 for each in over], _minutes)
 
 
 def _slices(group: Group) -> Iterator[Paragraph]:
@@ -244,7 +243,7 @@ def _in_short(group: Group) -> Iterator[Paragraph]:
         words = (
             f" are left in {len(cells)} of {count(len(group.over), 'cell')}, {certified}; {rates}, without one of them "
         )
-        yield say(*_names(left), f"{words}{_without(cells)}.")
+        yield say(*(named(left, MOST_NAMES) or ("none",)), f"{words}{_without(cells)}.")
 
 
 def _behind(row: Row) -> tuple[Cell, ...]:
@@ -291,19 +290,9 @@ def _left(over: tuple[Found, ...]) -> Cell:
     sets = Counter(each.left for each in over)
     words: list[Part] = []
     for left, times in sets.most_common():
-        words += ["; " if words else "", *_names(left)]
+        words += ["; " if words else "", *(named(left, MOST_NAMES) or ("none",))]
         words += [f" ({times} of {len(over)})"] if len(sets) > 1 else []
     return tuple(words)
-
-
-def _names(left: tuple[str, ...]) -> Iterator[Part]:
-    if not left:
-        yield "none"
-    for number, name in enumerate(left[:MOST_NAMES]):
-        yield ", " if number else ""
-        yield Name(name)
-    if len(left) > MOST_NAMES:
-        yield f" and {len(left) - MOST_NAMES} more"
 
 
 def _problems(group: Group) -> Iterator[Paragraph]:
