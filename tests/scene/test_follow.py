@@ -8,7 +8,8 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live
-from ddenv.scene.shot import HOLD, live_pose, shot, shot_of
+from ddenv.scene.shot import HOLD, shot, shot_of
+from ddenv.world.pose import pose_of
 
 
 def live(test: int, slot: int = 0) -> Live:
@@ -157,4 +158,4 @@ def test_rows_of_unknown_and_finished_tests_are_ignored(writer):
 
 
 def test_live_pose():
-    assert live_pose(Live(0, 1, 0.0, (1.0, 2.0, 3.0, 2.0, 0.0, 0.0, 0.0))).quaternion == (1, 0, 0, 0)
+    assert pose_of(Live(0, 1, 0.0, (1.0, 2.0, 3.0, 2.0, 0.0, 0.0, 0.0)).pose).quaternion == (1, 0, 0, 0)

@@ -11,7 +11,7 @@ from meshcat.geometry import Object
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
 from ddenv.scene.mesh import Surface
-from ddenv.scene.painted import Painted, edges_of, lines, merged, outline, paint, plain
+from ddenv.scene.painted import Painted, edges_of, joined, lines, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels
@@ -53,10 +53,9 @@ class Crowd:
         """What shows the environment of `shot`; None where nothing is left to show."""
         models, left_out, removed = self._paths
         parts = [item for name, items in self._painted.items() if name in shot.models for item in items]
-        solid = merged([item for item in parts if item.alpha == 1])
-        clear = merged([item for item in parts if item.alpha < 1])
-        yield (*models, "still"), solid
-        yield (*models, "still clear"), clear
+        solid, clear = [item for item in parts if item.alpha == 1], [item for item in parts if item.alpha < 1]
+        for name, items in (("still", solid), ("still clear", clear)):
+            yield (*models, name), joined(items).thing() if items else None
         yield (*left_out, "all"), self._outlines(shot.left_out, colors.LEFT_OUT)
         yield (*removed, "all"), self._outlines(shot.removed, colors.REMOVED)
 
@@ -297,32 +296,21 @@ def _height_of(plane: Pose, x: float, y: float) -> float | None:
     return pz - (a * (x - px) + b * (y - py)) / c if abs(c) > STEEP else None
 
 
-def mark(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:
-    """Draws a ring of `radius` m around `position` with a pin above it, visible from afar and from above."""
+# What stands in a ring.
+PIN = (
+    mesh.frustum(0.0, 0.13, 0.4).at(Pose((0.0, 0.0, 0.75))),
+    mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))),
+)
+FLAG = (
+    mesh.cylinder(0.025, 1.5).at(Pose((0.0, 0.0, 0.75))),
+    mesh.box((0.55, 0.02, 0.34)).at(Pose((0.28, 0.0, 1.33))),
+)
+
+
+def mark(
+    stage: Stage, name: str, position: Vector, radius: float, color: Color, inside: tuple[Surface, ...] = ()
+) -> None:
+    """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
     path = (*WORLD, name)
-    pin = [
-        mesh.ring(radius, 0.05),
-        mesh.frustum(0.0, 0.13, 0.4).at(Pose((0.0, 0.0, 0.75))),
-        mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))),
-    ]
-    stage.draw(path, plain(mesh.merge(pin), color, glow=0.35), shadow=False)
-    stage.move(path, Pose(position))
-
-
-def flag(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:
-    """Draws a ring of `radius` m around `position` with a flag in it."""
-    path = (*WORLD, name)
-    parts = [
-        mesh.ring(radius, 0.05),
-        mesh.cylinder(0.025, 1.5).at(Pose((0.0, 0.0, 0.75))),
-        mesh.box((0.55, 0.02, 0.34)).at(Pose((0.28, 0.0, 1.33))),
-    ]
-    stage.draw(path, plain(mesh.merge(parts), color, glow=0.35), shadow=False)
-    stage.move(path, Pose(position))
-
-
-def circle(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:
-    """Draws a ring of `radius` m around `position`."""
-    path = (*WORLD, name)
-    stage.draw(path, plain(mesh.ring(radius, 0.05), color, glow=0.35), shadow=False)
+    stage.draw(path, plain(mesh.merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))

@@ -19,7 +19,7 @@ from meshcat.geometry import (
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
 from ddenv.scene.mesh import Surface
-from ddenv.world.model import Collision, Link, Model, Plane, Visual
+from ddenv.world.model import Collision, Model, Plane, Visual
 
 # Corners of a box, numbered by bits, that its twelve edges join.
 _PAIRS = np.array([(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]).ravel()
@@ -41,28 +41,24 @@ class Painted:
 
 def paint(model: Model) -> list[Painted]:
     """All visuals of a model, in the frame of its poses. A link without visuals shows its collisions."""
-    groups: dict[float, list[tuple[Surface, Color]]] = {}
+    groups: dict[float, list[Painted]] = {}
     default = colors.default_color(model)
-    shown = [(item.shape, item.pose, _color(item) or default) for link in model.links for item in _shown(link)]
+    shown: list[Visual | Collision] = [item for link in model.links for item in link.visuals or link.collisions]
     vary = len(shown) > 20
-    for number, (shape, pose, color) in enumerate(shown):
-        if not isinstance(shape, Plane):
-            color = colors.varied(color, number) if vary else color
-            groups.setdefault(color[3], []).append((mesh.of_shape(shape).at(pose), color))
-    return [_painted(parts, alpha) for alpha, parts in groups.items() if alpha > 0]
+    for number, item in enumerate(shown):
+        if isinstance(item.shape, Plane):
+            continue
+        color = (item.color if isinstance(item, Visual) else None) or default
+        *tint, alpha = colors.varied(color, number) if vary else color
+        surface = mesh.of_shape(item.shape).at(item.pose)
+        groups.setdefault(alpha, []).append(Painted(surface, np.tile(tint, (len(surface.vertices), 1)), alpha))
+    return [joined(parts) for alpha, parts in groups.items() if alpha > 0]
 
 
-def _shown(link: Link) -> tuple[Visual, ...] | tuple[Collision, ...]:
-    return link.visuals or link.collisions
-
-
-def _color(item: Visual | Collision) -> Color | None:
-    return item.color if isinstance(item, Visual) else None
-
-
-def _painted(parts: list[tuple[Surface, Color]], alpha: float) -> Painted:
-    tints = np.concatenate([np.tile(color[:3], (len(part.vertices), 1)) for part, color in parts])
-    return Painted(mesh.merge([part for part, _ in parts]), tints, alpha)
+def joined(parts: Sequence[Painted]) -> Painted:
+    """All `parts`, at least one, which have one transparency."""
+    surface = mesh.merge([part.surface for part in parts])
+    return Painted(surface, np.concatenate([part.tints for part in parts]), parts[0].alpha)
 
 
 def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> Mesh:
@@ -95,11 +91,3 @@ def edges_of(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     corners = np.array([[(high if bit >> axis & 1 else low)[axis] for axis in range(3)] for bit in range(8)])
     ends: np.ndarray = corners[_PAIRS]
     return ends
-
-
-def merged(parts: Sequence[Painted]) -> Mesh | None:
-    """One object of all `parts`, which have one transparency; None without parts."""
-    if not parts:
-        return None
-    surface = mesh.merge([part.surface for part in parts])
-    return Painted(surface, np.concatenate([part.tints for part in parts]), parts[0].alpha).thing()

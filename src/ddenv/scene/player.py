@@ -23,8 +23,8 @@ from ddenv.runs.subject import read_parts
 from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
-from ddenv.scene.draw import PARTING, Scenery, circle, flag, mark
-from ddenv.scene.shot import Shot, live_pose, shot, shot_of, shot_of_test
+from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
+from ddenv.scene.shot import Shot, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
 from ddenv.world.placement import spawn_pose
@@ -40,63 +40,6 @@ LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
 def rows_of(samples: array[float]) -> np.ndarray:
     """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
     return np.asarray(samples, dtype=float).reshape(-1, COLUMNS)
-
-
-def play_of(run: RunFile, position: Position, shot: Shot, scenery: Scenery) -> dict[str, Any]:
-    """The finished test of `shot`: what is there, how it moves, and what the run file `lacks` of it, in sentences.
-
-    `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
-    started. `turned` has how far left and right wheels have turned at each row of the robot, rad, as its way makes them roll.
-    Raises UserError where the robot's way is missing or damaged.
-    """
-    one = played(run, position, shot.test or 0)
-    if not one.rows:
-        raise UserError(one.lacks[-1])
-    moving = {
-        key: [_row(row[0], scenery.moved(name, pose_of(row[1:]))) for row in rows]
-        for name, rows in one.moving.items()
-        if (key := scenery.key(name)) is not None
-    }
-    sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
-    return {
-        "test": shot.test,
-        "title": shot.title,
-        "models": len(shot.models),
-        "robot": [_row(row[0], pose_of(row[1:])) for row in one.robot],
-        "wheels": scenery.wheels.data(),
-        "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
-        "moving": moving,
-        "there": {kind: [key for name in sorted(names) if (key := scenery.key(name))] for kind, names in sets.items()},
-        "lacks": " ".join(one.lacks),
-    }
-
-
-def _row(time: float, pose: Pose) -> list[float]:
-    w, x, y, z = pose.quaternion
-    return [round(float(value), DIGITS) for value in (time, *pose.position, x, y, z, w)]
-
-
-def pairs_of(run: RunFile, state: RunState) -> list[dict[str, Any]]:
-    """Pairs of tests with the same seed that show why the robot fails, the ghost's last; empty before fresh runs show it.
-
-    `equal` is until when they are the same, `apart` when the robots are visibly apart, both s; None if they never are.
-    """
-    found: list[tuple[str, Parting]] = []
-    with suppress(UserError):
-        found += [(f"without {each.without}", each.parting) for each in reasons(run, state) if each.parting is not None]
-    near = nearest(run, state)
-    if near is not None and near.parting is not None:
-        found.append(("the nearest world that passes", near.parting))
-    return [
-        {
-            "title": f"{words} (tests {one.with_test} and {one.without_test}, seed {one.seed})",
-            "test": one.with_test,
-            "ghost": one.without_test,
-            "equal": one.equal,
-            "apart": one.apart,
-        }
-        for words, one in found
-    ]
 
 
 class Player:
@@ -130,9 +73,9 @@ class Player:
         start = (spawn.x, spawn.y, self._scenery.height(spawn.x, spawn.y))
         end = (goal.x, goal.y, self._scenery.height(goal.x, goal.y))
         set_up(self._stage, view(start, end))
-        circle(self._stage, "start", start, 0.6, colors.START)
-        flag(self._stage, "goal", end, goal.tolerance, colors.GOAL)
-        mark(self._stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL)
+        mark(self._stage, "start", start, 0.6, colors.START)
+        mark(self._stage, "goal", end, goal.tolerance, colors.GOAL, FLAG)
+        mark(self._stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL, PIN)
         self._stage.show(PARTING, False)
         self._scenery.place_robot(self._start)
 
@@ -147,12 +90,59 @@ class Player:
         self._position.go(wanted.at)
 
     def play(self, test: int) -> dict[str, Any]:
-        """A finished test for a browser. Raises UserError."""
-        return play_of(self._run, self._position, self._shot_of(test), self._scenery)
+        """A finished test for a browser: what is there, how it moves, and what the run file `lacks` of it, in sentences.
+
+        `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
+        started. `turned` has how far left and right wheels have turned at each row of the robot, rad, as its way makes them roll.
+        Raises UserError where the robot's way is missing or damaged.
+        """
+        shot, scenery = self._shot_of(test), self._scenery
+        one = played(self._run, self._position, test)
+        if not one.rows:
+            raise UserError(one.lacks[-1])
+        moving = {
+            key: [_row(row[0], scenery.moved(name, pose_of(row[1:]))) for row in rows]
+            for name, rows in one.moving.items()
+            if (key := scenery.key(name)) is not None
+        }
+        sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
+        return {
+            "test": test,
+            "title": shot.title,
+            "models": len(shot.models),
+            "robot": [_row(row[0], pose_of(row[1:])) for row in one.robot],
+            "wheels": scenery.wheels.data(),
+            "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
+            "moving": moving,
+            "there": {
+                kind: [key for name in sorted(names) if (key := scenery.key(name))] for kind, names in sets.items()
+            },
+            "lacks": " ".join(one.lacks),
+        }
 
     def pairs(self) -> dict[str, Any]:
-        """What a browser may choose: how many tests there are, and pairs of them that show why the robot fails."""
-        return {"tests": len(self._state.tests), "pairs": pairs_of(self._run, self._state)}
+        """What a browser may choose: how many tests there are, and pairs with the same seed that show why the robot fails.
+
+        There are none before fresh runs show it. The ghost's test is the last of a pair; `equal` is until when they are the same,
+        `apart` when the robots are visibly apart, both s; None if they never are.
+        """
+        found: list[tuple[str, Parting | None]] = []
+        with suppress(UserError):
+            found += [(f"without {each.without}", each.parting) for each in reasons(self._run, self._state)]
+        if (near := nearest(self._run, self._state)) is not None:
+            found.append(("the nearest world that passes", near.parting))
+        pairs = [
+            {
+                "title": f"{words} (tests {one.with_test} and {one.without_test}, seed {one.seed})",
+                "test": one.with_test,
+                "ghost": one.without_test,
+                "equal": one.equal,
+                "apart": one.apart,
+            }
+            for words, one in found
+            if one is not None
+        ]
+        return {"tests": len(self._state.tests), "pairs": pairs}
 
     def drawings(self, what: str, test: int) -> list[bytes]:
         """The messages that draw for one browser what is `still` in a finished test, or the `way` or `ghost-way` of its robot.
@@ -171,7 +161,7 @@ class Player:
         start, state = self._position.start_of(test), self._state
         if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")
-        return shot_of_test(start.after, state.tests[test - 1])
+        return shot_of_test(start.after, "replay", state.tests[test - 1])
 
     def tick(self, now: float) -> None:
         """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
@@ -188,7 +178,8 @@ class Player:
         self._live = self._run.live() if self._engine and self._wanted.at is None else []
         self._position.catch_up()
         row = row_of(self._state, self._wanted)
-        following = shot_of(self._state, row, self._live) if row else self._usual(now)
+        idle = now - self._ran_at
+        following = shot_of(self._state, row, self._live) if row else shot(self._state, self._live, self._shot, idle)
         if any(row.test == following.test for row in self._live):
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
@@ -196,9 +187,6 @@ class Player:
         self._show_parts()
         if following != self._shot:
             self._cut(following)
-
-    def _usual(self, now: float) -> Shot:
-        return shot(self._state, self._live, self._shot, now - self._ran_at)
 
     def _cut(self, following: Shot) -> None:
         before, self._shot = self._shot, following
@@ -219,14 +207,14 @@ class Player:
         row = next((row for row in self._live if row.test == shot.test), None)
         if row is None or (self._trail and row.time <= self._trail[-1][0]):
             return
-        pose = live_pose(row)
+        pose = pose_of(row.pose)
         self._trail.append((row.time, *pose.position, *pose.quaternion))
         trail = np.array(self._trail)
         left, right = self._scenery.wheels.turned(trail)[-1].tolist()
         self._scenery.place_robot(pose, (left, right))
         self._scenery.place_models({name: pose_of(values) for name, values in row.models.items()})
         self._scenery.trail(trail)
-        self._caption(shot, self._clock(row.time))
+        self._caption(shot, f"{row.time:.1f} s of {self._timeout:g} s")
 
     def _caption(self, shot: Shot, time: str) -> None:
         models = f"{len(shot.models)} of {len(self._elements)} models"
@@ -248,12 +236,14 @@ class Player:
         if self._shot is not None:
             self._caption(self._shot, "")
 
-    def _clock(self, time: float) -> str:
-        return f"{time:.1f} s of {self._timeout:g} s"
-
     def _show_evidence(self) -> None:
         self._evidence = self._state.evidence_test
         samples = None if self._evidence is None else self._run.motion(self._evidence)
         self._scenery.evidence(None if samples is None else rows_of(samples))
         if self._state.f_position is not None:
-            mark(self._stage, "failure", self._state.f_position, self._epsilon, colors.FAILURE)
+            mark(self._stage, "failure", self._state.f_position, self._epsilon, colors.FAILURE, PIN)
+
+
+def _row(time: float, pose: Pose) -> list[float]:
+    w, x, y, z = pose.quaternion
+    return [round(float(value), DIGITS) for value in (time, *pose.position, x, y, z, w)]

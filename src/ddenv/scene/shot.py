@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.store import Live
 from ddenv.runfile.tested import purpose
-from ddenv.world.pose import Pose, pose_of
 
 HOLD = 3.0  # how long a finished test stays on screen until the next one starts, s
 
@@ -35,19 +34,14 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
     if running:
         stays = previous is not None and previous.kind == "live" and previous.test in running
         number = previous.test if stays and previous is not None and previous.test else running[0]
-        return _of_test(state, "live", state.tests[number - 1])
+        return shot_of_test(state, "live", state.tests[number - 1])
     working = state.status in ("baseline", "running")
     if working and previous is not None and previous.kind == "live" and idle < HOLD:
         return previous
     test = _to_replay(state)
     if test is None:
         return _shot(state, "start", None, frozenset(state.environment), "the robot at its start")
-    return _of_test(state, "replay", test)
-
-
-def shot_of_test(state: RunState, test: Test) -> Shot:
-    """What to show of a finished test, which began in `state`."""
-    return _of_test(state, "replay", test)
+    return shot_of_test(state, "replay", test)
 
 
 def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Shot:
@@ -60,7 +54,7 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
     if not found:
         return _shot(state, "start", None, frozenset(row.models), f"{row.label} · not tested yet")
     kind = "live" if any(each.test == found[0].id for each in live) and running else "replay"
-    return _of_test(state, kind, found[0], row)
+    return shot_of_test(state, kind, found[0], row)
 
 
 def _is_running(state: RunState, test: int) -> bool:
@@ -78,7 +72,8 @@ def _to_replay(state: RunState) -> Test | None:
     return next((test for test in reversed(state.tests) if test.is_finished), None)
 
 
-def _of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:
+def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:
+    """What to show of a test, which belongs to `state`, and was made for `row` if that is given."""
     name, models = purpose(state, test) if row is None else row.label, frozenset(state.models_of(test))
     if test.id == state.evidence_test and kind == "replay" and row is None:
         name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
@@ -93,8 +88,3 @@ def _of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | No
 def _shot(state: RunState, kind: str, test: int | None, models: frozenset[str], title: str) -> Shot:
     kept = frozenset(state.environment)
     return Shot(kind, test, models, kept - models, frozenset(state.elements) - kept - models, title)
-
-
-def live_pose(row: Live) -> Pose:
-    """The robot's pose in a running test."""
-    return pose_of(row.pose)
