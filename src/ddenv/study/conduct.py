@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import mean
@@ -48,19 +48,15 @@ def _of_running(each: Work) -> float | None:
 
 def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
     """What one worker would need, s: the time of other cells of the scenario, or an estimate."""
-    same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
-    over = [_spent(each.state) for each in same if each.state.status == "finished"]
-    if over:
+    same = [each.state for each in others if each.cell.scenario.name == cell.scenario.name]
+    if over := [_spent(state) for state in same if state.status == "finished"]:
         return mean(over)
     size = worlds[cell.scenario.name]
-    one = [seconds for each in same if (seconds := _of_a_test(each.state)) is not None]
-    if not one:
-        costs = [
-            seconds * size.cost / worlds[each.cell.scenario.name].cost
-            for each in others
-            if (seconds := _of_a_test(each.state)) is not None
-        ]
-        one = [mean(costs)] if costs else []
+    one = [seconds for state in same if (seconds := _of_a_test(state)) is not None] or [
+        seconds * size.cost / worlds[each.cell.scenario.name].cost
+        for each in others
+        if (seconds := _of_a_test(each.state)) is not None
+    ]
     if not one:
         return None
     return mean(one) * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
@@ -82,25 +78,34 @@ LOOK_PERIOD = 2.0
 CLEAR = "\r\x1b[K"
 # Time between two lines of progress in logs and pipes, s.
 QUIET = 60.0
+# Time between two records of the study's time so far, s: a killed study loses the time since the last one.
+WRITE_PERIOD = 10.0
 # A shorter time left is not shown, s.
 LEAST = 5.0
 
 
 class Progress:
-    """Shows how far the study `plan` in `folder` is. `done` cells were finished before; `jobs` workers run tests."""
+    """Shows how far the study `plan` in `folder` is, and records there how long this session has worked on it.
+
+    `done` cells were finished before; `jobs` workers run tests. Raises UserError if earlier records cannot be read.
+    """
 
     def __init__(self, plan: Plan, folder: Path, done: int, worlds: dict[str, Size], jobs: int, out: TextIO) -> None:
         self._in_all, self._before = len(plan.cells), done
         self._folder, self._seeds = folder, plan.seeds
         self._worlds, self._jobs = worlds, jobs
         self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
+        self._earlier, self._begun = sittings(folder), Sitting(time.time(), 0.0, jobs, 0, versions(), machine())
+        self._began, self._written = time.monotonic(), 0.0
+        self._cells: tuple[Work, ...] = ()
         self._reported = 0
         self._next_look = 0.0
-        self._next_line = time.monotonic() + QUIET
+        self._next_line = self._began + QUIET
         self._left: float | None = None
 
     def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
         """Reports what is new."""
+        self._cells = (*running, *ended)
         for each in ended[self._reported :]:
             self._reported += 1
             seed = f", seed {each.cell.seed}" if self._seeds > 1 else ""
@@ -115,17 +120,26 @@ class Progress:
         elif now >= self._next_line and running:
             self._next_line = now + QUIET
             self._say(self._now(running))
+        if now > self._written + WRITE_PERIOD:
+            self._written = now
+            self._write()
 
     @property
     def _done(self) -> str:
         return f"{self._before + self._reported}/{self._in_all}"
 
     def close(self) -> None:
-        """Clears the last line."""
+        """Records the whole session, and clears the last line."""
+        self._write()
         if self._live:
             # The terminal may be gone.
             with contextlib.suppress(OSError):
                 print(CLEAR, end="", file=self._out, flush=True)
+
+    def _write(self) -> None:
+        tests = sum(tests_made(each.state) - each.made_before for each in self._cells)
+        session = replace(self._begun, seconds=time.monotonic() - self._began, tests=tests)
+        write_sittings(self._folder, (*self._earlier, session))
 
     def _say(self, line: str) -> None:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
@@ -133,8 +147,9 @@ class Progress:
     def _now(self, running: Sequence[Work], columns: int = 200) -> str:
         """The current state, as detailed as fits."""
         left = "" if self._left is None or self._left < LEAST else f" · about {duration(self._left)} left"
-        for said in (_fully, _short):
-            line = " · ".join((f"{self._done}{left}", *map(said, running)))
+        for names in ([each.cell.label for each in running], [each.cell.scenario.name for each in running]):
+            doing = (f"{name}: {_doing(each)}" for name, each in zip(names, running, strict=True))
+            line = " · ".join((f"{self._done}{left}", *doing))
             if cell_len(line) <= columns:
                 break
         return set_cell_size(line, columns).rstrip() if running else ""
@@ -152,24 +167,12 @@ class Progress:
         return f"{sizes}, {tests}, {duration(each.state.working_seconds)}{doubt}"
 
 
-def _fully(each: Work) -> str:
-    return f"{each.cell.label}: {_doing(each)}"
-
-
-def _short(each: Work) -> str:
-    return f"{each.cell.scenario.name}: {_doing(each)}"
-
-
 def _doing(each: Work) -> str:
     state = each.state
     if state.baseline is None:
         return f"{state.tests_done} of {each.cell.scenario.reduction.baseline_runs} baseline runs"
     models = f"{len(state.environment)} of {len(state.elements)} models"
     return f"{models}, {'certificate, ' if state.confirming else ''}{state.tests_done} tests"
-
-
-# Time between two records of the study's time so far, s.
-WRITE_PERIOD = 10.0
 
 
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
@@ -181,8 +184,13 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
     with opened(folder):
         interrupted = False
         names = {cell.name for cell in plan.cells if is_done(folder, cell)}
+        open_ones = [cell for cell in plan.cells if cell.name not in names]
         try:
-            _make(plan, names, folder, jobs, worlds, out)
+            if open_ones:
+                progress = Progress(plan, folder, len(names), worlds, jobs, out)
+                with contextlib.closing(progress):
+                    cells = longest_first(open_ones, worlds) if jobs > PER_CELL else open_ones
+                    work(folder, cells, jobs, progress.look)
         except KeyboardInterrupt:
             interrupted = True
         page, found = write_study(plan, folder, sittings(folder))
@@ -195,34 +203,3 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
         print("interrupted; the same command continues", file=sys.stderr)
         return 130
     return 0 if minimal == len(found) else 1
-
-
-def _make(plan: Plan, done: Set[str], folder: Path, jobs: int, worlds: dict[str, Size], out: TextIO) -> None:
-    """Makes the cells whose names are not in `done`. Raises UserError, and KeyboardInterrupt."""
-    began, earlier = time.monotonic(), sittings(folder)
-    open_ones = [cell for cell in plan.cells if cell.name not in done]
-    if not open_ones:
-        return
-    progress = Progress(plan, folder, len(done), worlds, jobs, out)
-    begun = Sitting(time.time(), 0.0, jobs, 0, versions(), machine())
-    cells: list[Work] = []
-    written = 0.0
-
-    def write() -> None:
-        tests = sum(tests_made(each.state) - each.made_before for each in cells)
-        write_sittings(folder, (*earlier, replace(begun, seconds=time.monotonic() - began, tests=tests)))
-
-    def look(running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
-        nonlocal written
-        cells[:] = (*running, *ended)
-        progress.look(running, waiting, ended)
-        # Regularly: a killed study loses the time since the last record.
-        if time.monotonic() > written + WRITE_PERIOD:
-            written = time.monotonic()
-            write()
-
-    try:
-        work(folder, longest_first(open_ones, worlds) if jobs > PER_CELL else open_ones, jobs, look)
-    finally:
-        write()
-        progress.close()
