@@ -7,9 +7,9 @@ import shutil
 import sqlite3
 import tempfile
 import zipfile
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from string import Template
 
 from ddenv import __version__
 from ddenv.errors import UserError
@@ -34,27 +34,8 @@ RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (
 )
 MOST_NAMES = 20
 NEEDS = f"needs ddenv {__version__}: {how_to_install()}"
-PROGRAM = f'''"""Exits with 1 where the robot fails as it did, with 0 where it does not, with 125 where that cannot be said.
-
-Needs ddenv, installed from its clone. In a repository: git bisect run python repro.py --folder .
-"""
-
-import subprocess
-import sys
-from pathlib import Path
-
-run = Path(__file__).resolve().with_name("{RUN}")
-# Without it Python itself exits with 1, and PyPI has another program of that name.
-if subprocess.call([sys.executable, "-c", "import ddenv.cli.reproduce_command"], stderr=subprocess.DEVNULL):
-    print("repro.py: {NEEDS}", file=sys.stderr)
-    sys.exit(125)
-sys.exit(subprocess.call([sys.executable, "-m", "ddenv", "reproduce", str(run), "--trust", *sys.argv[1:]]))
-'''
-
-TEST = """def test_{name}_no_longer_fails(ddenv_reproduce):
-    found = ddenv_reproduce("{file}")
-    assert found.fails is False, str(found)
-"""
+# What is written of each bundle; `$words` are filled in.
+TEMPLATES = Path(__file__).with_name("bundled")
 
 
 def write_bundle(run: Path, target: Path) -> list[Path]:
@@ -66,9 +47,7 @@ def write_bundle(run: Path, target: Path) -> list[Path]:
         raise UserError(f"{target}: exists already; choose another name")
     if not target.absolute().parent.is_dir():
         raise UserError(f"{target}: there is no folder {target.absolute().parent}; make it first")
-    record = read_run(run)
-    if current(record.state) is None:
-        raise UserError(f"{run}: no certificate says how often what is left fails; make one first: ddenv certify {run}")
+    record = _certified(run)
     # Complete or not there at all.
     with tempfile.TemporaryDirectory(prefix=".ddenv-bundle-", dir=target.absolute().parent) as temporary:
         folder = Path(temporary) / target.stem
@@ -102,7 +81,7 @@ def write_test(run: Path, folder: Path) -> list[Path]:
         made = Path(temporary) / copy.name
         _copy_run(run, made, record)
         made.replace(copy)
-    write_file(test, TEST.format(name=name, file=copy.name).encode())
+    write_file(test, _filled("test.py.txt", name=name, file=copy.name))
     return [test, copy]
 
 
@@ -132,8 +111,13 @@ def _fill(folder: Path, run: Path, record: Record) -> None:
     _copy_run(run, folder / RUN, record)
     needs = export_world(run, folder / WORLD, folder / SCENARIO).needs
     write_report(run, folder / REPORT)
-    write_file(folder / AGAIN, PROGRAM.encode())
-    write_file(folder / ISSUE, ("\n".join(_issue(record, needs)) + "\n").encode(errors="replace"))
+    write_file(folder / AGAIN, _filled("repro.py.txt", run=RUN, needs=NEEDS))
+    write_file(folder / ISSUE, _issue(record, needs))
+
+
+def _filled(template: str, **words: str) -> bytes:
+    """A file of `TEMPLATES` with these words."""
+    return Template((TEMPLATES / template).read_text()).substitute(words).encode(errors="replace")
 
 
 def _needed(record: Record) -> set[int]:
@@ -145,42 +129,34 @@ def _needed(record: Record) -> set[int]:
     return drawn | {by for test in drawn if (by := state.tests[test - 1].implied_by) is not None}
 
 
-def _issue(record: Record, needs: list[str]) -> Iterator[str]:
+def _issue(record: Record, needs: list[str]) -> bytes:
     """The text of an issue, as Markdown."""
     state, found = record.state, current(record.state)
     assert found is not None
-    position = state.f_position or ()
-    at = f" at ({', '.join(f'{value:.2f}' for value in position[:2])}) m" if position else ""
-    yield f"# {printable(content(record).verdict)}"
-    yield ""
-    yield f"The robot {deed(state.failure)}{at}: {rate(found.claims[0])}."
-    yield ""
-    yield "Models that are enough:"
-    yield ""
-    yield from (f"- `{_code(name)}`" for name in state.environment[:MOST_NAMES])
-    if len(state.environment) > MOST_NAMES:
-        yield f"- and {count(len(state.environment) - MOST_NAMES, 'more model')}"
-    yield ""
-    yield from (f"{printable(sentence(each))}" for each in record.reasons[:MOST_NAMES])
+    at = f" at ({', '.join(f'{value:.2f}' for value in state.f_position[:2])}) m" if state.f_position else ""
+    models = [f"- `{_code(name)}`" for name in state.environment[:MOST_NAMES]]
+    if (more := len(state.environment) - MOST_NAMES) > 0:
+        models.append(f"- and {count(more, 'more model')}")
+    reasons = [printable(sentence(each)) for each in record.reasons[:MOST_NAMES]]
     if record.nearest is not None:
-        yield ""
-        yield printable(record.nearest.sentences)
-    yield ""
-    yield "## Reproduce"
-    yield ""
-    yield f"    python {AGAIN}"
-    yield ""
-    yield f"It {NEEDS}."
-    yield "It runs what is left with fresh seeds until they decide. Its exit codes are those that `git bisect run` reads:"
-    yield "1 if it fails as it did, 0 if it does not, 125 if that cannot be said. `--folder FOLDER` has a controller of your own."
-    yield ""
-    yield f"`{REPORT}` opens in a browser and says why it fails and how that was found; `ddenv open {RUN}` shows the run itself."
-    yield f"`{WORLD}` is the world that is left; `ddenv test {SCENARIO}` runs the robot in it once."
-    if needs:
-        names = ", ".join(f"`{_code(uri)}`" for uri in needs[:MOST_NAMES])
-        yield f"Other programs also need the files that `{WORLD}` names: {names}."
-    yield ""
-    yield f"Made by ddenv {__version__}; {_code(state.simulator)}."
+        reasons += ["", printable(record.nearest.sentences)]
+    names = ", ".join(f"`{_code(uri)}`" for uri in needs[:MOST_NAMES])
+    return _filled(
+        ISSUE,
+        verdict=printable(content(record).verdict),
+        failed=f"{deed(state.failure)}{at}",
+        rate=rate(found.claims[0]),
+        models="\n".join(models),
+        reasons="\n".join(reasons),
+        program=AGAIN,
+        needs=NEEDS,
+        report=REPORT,
+        run=RUN,
+        world=WORLD,
+        scenario=SCENARIO,
+        files=f"Other programs also need the files that `{WORLD}` names: {names}.\n" if needs else "",
+        maker=f"ddenv {__version__}; {_code(state.simulator)}",
+    )
 
 
 def _code(text: str) -> str:

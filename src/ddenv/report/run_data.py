@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
@@ -21,6 +21,8 @@ from ddenv.runs.reasons import Parting, Reason, reasons
 
 if TYPE_CHECKING:
     from ddenv.world.model import World
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +54,22 @@ class Record:
 
 def read_run(path: Path) -> Record:
     """Reads a run file; of a damaged one, as much as is valid. Raises UserError if it is not a run file."""
+    from ddenv.runs.subject import read_parts
+
     alive = engine_is_alive(path)
     with RunFile(path) as file:
         first, state, rounds, trouble = _story(file)
         if first is None or not isinstance(first.event, Created):
             raise UserError(trouble or f"{path}: damaged run file: it has no data for a report")
         troubles = [trouble] if trouble else []
-        world = _world(file, troubles)
+        world = _tried(lambda: read_parts(file)[1], troubles)
         f = None if state.f_test is None else state.f_test.id
         original = _path(file, f, troubles)
         same = state.evidence_test == f
         evidence = original if same else _path(file, state.evidence_test, troubles)
-        why = _reasons(file, state, troubles)
+        why = None if current(state) is None else _tried(lambda: reasons(file, state), troubles)
         passing = nearest(file, state)
-        partings: list[Parting | None] = [*(each.parting for each in why), passing.parting if passing else None]
+        partings: list[Parting | None] = [*(each.parting for each in why or ()), passing.parting if passing else None]
         compared = [test for one in partings if one for test in (one.with_test, one.without_test)]
         ways = {test: file.trajectory(test) for test in compared}
     return Record(
@@ -81,7 +85,7 @@ def read_run(path: Path) -> Record:
         troubles=tuple(troubles),
         elements=frozenset(state.elements),
         kept=frozenset(state.environment),
-        reasons=why,
+        reasons=why or (),
         nearest=passing,
         ways=ways,
     )
@@ -106,30 +110,15 @@ def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...],
     return first, state, tuple(rounds.values()), trouble
 
 
-def _world(file: RunFile, troubles: list[str]) -> World | None:
-    from ddenv.runs.subject import read_parts
-
+def _tried(read: Callable[[], T], troubles: list[str]) -> T | None:
+    """What `read` returns; what it cannot read is one of the `troubles`."""
     try:
-        return read_parts(file)[1]
+        return read()
     except UserError as error:
         troubles.append(str(error))
         return None
-
-
-def _reasons(file: RunFile, state: RunState, troubles: list[str]) -> tuple[Reason, ...]:
-    if current(state) is None:
-        return ()
-    try:
-        return reasons(file, state)
-    except UserError as error:
-        troubles.append(str(error))
-        return ()
 
 
 def _path(file: RunFile, test: int | None, troubles: list[str]) -> array[float] | None:
-    try:
-        samples = None if test is None else file.motion(test)
-    except UserError as error:
-        troubles.append(str(error))
-        return None
+    samples = None if test is None else _tried(lambda: file.motion(test), troubles)
     return samples if samples and all(map(math.isfinite, samples)) else None

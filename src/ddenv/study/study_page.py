@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean
 
+import yaml
+
 from ddenv import __version__
 from ddenv.page.blocks import (
     Block,
@@ -39,40 +41,8 @@ from ddenv.world.scenario import Scenario
 STEM = "study"
 # These differ between cells.
 OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
-COLUMNS = (
-    (
-        "search tests",
-        "runs of the robot: the baseline, and those behind each verdict of the search. Runs that idle workers made ahead of time "
-        "and that were not needed do not count.",
-    ),
-    (
-        "certificate tests",
-        "runs with fresh seeds that the certificate rests on: of what is left, of that without each of its models, and of the "
-        "whole world; with steps back, those of all certificates.",
-    ),
-    (
-        "with slices",
-        "the tests of another reduction, which makes no test that a finished run implies: those that were simulated, with the "
-        "audits. All other columns are without slices, as the paper's.",
-    ),
-    ("% reduction", "the part of the models that was removed."),
-    ("search minutes, certificate minutes", "the time of these tests, one after another, as the paper made its tests."),
-    (
-        "certified",
-        "whether the certificate shows that what is left keeps the rate of f (keep rate, above), and that it does not without any "
-        "one of its models.",
-    ),
-    ("re-runs", "the share of the search tests that repeat a candidate (the paper's deflaking)."),
-    ("f in the whole world", "all runs of the whole world that ended as f did, with Wilson's 95 % interval."),
-    ("f in what is left", "runs with fresh seeds that ended so, with the interval."),
-    ("f without one of them", "the highest of these rates without one of the models that are left."),
-    ("steps back", "how often the search went back because a certificate showed that the rate of f was lost."),
-    (
-        "least tests",
-        "the minimum for any search: the baseline, f once in what is left, and each of its models left out without success, with "
-        "as many runs as a candidate without f takes.",
-    ),
-)
+# What the columns of the tables mean.
+COLUMNS = Path(__file__).with_name("columns.yaml")
 
 
 def content(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Report:
@@ -234,7 +204,7 @@ def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], fold
         *_sittings(sittings),
         *_computed(found),
         say("What the columns mean:"),
-        Table(("column", "meaning"), COLUMNS),
+        Table(("column", "meaning"), tuple(yaml.safe_load(COLUMNS.read_text()).items())),
         *_again(plan, folder),
     ]
     return Section("How it was made", tuple(blocks))
