@@ -3,8 +3,8 @@
 import pytest
 
 from ddenv.learn.lesson_figures import OF_RUN, Figures
+from ddenv.learn.reading import Places
 from ddenv.learn.recorded_oracle import read_oracle
-from ddenv.learn.run_places import Places
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile

@@ -9,8 +9,7 @@ from docs.lessons import delivery
 from docs.lessons.record_plays import record_plays
 
 from ddenv.errors import UserError
-from ddenv.learn.plays import Play, plays_of_runs, recorded_play
-from ddenv.learn.race import KINDS, Race, bet, result, tally, why
+from ddenv.learn.race import KINDS, Play, Race, bet, plays_of_runs, recorded_play, result, tally, why
 from ddenv.learn.recorded_oracle import RecordedRound, read_oracle
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.store import RunFile

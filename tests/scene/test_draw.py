@@ -13,8 +13,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runs.wanted import Wanted
 from ddenv.scene.camera import view
 from ddenv.scene.draw import MOST_LETTERS, Scenery, path_on_ground, safe_name
-from ddenv.scene.mesh import box, merge, sphere
-from ddenv.scene.painted import outline, paint
+from ddenv.scene.mesh import box, merge, outline, paint, sphere
 from ddenv.scene.player import Player
 from ddenv.scene.shot import Shot, shot
 from ddenv.scene.stage import Stage

@@ -28,7 +28,7 @@ from ddenv.runfile.store import Live
 from ddenv.runs import programs
 from ddenv.runs.remembered import state_file
 from ddenv.runs.wanted import Wanted, written
-from ddenv.scene import address
+from ddenv.scene import server
 from tests.tiers import slow
 from tests.waiting import PATIENCE, wait_until
 
@@ -281,28 +281,28 @@ def test_a_scene_that_is_started_again_has_its_address_and_proves_it(writer, sta
     first = start_scene(writer.path)
     url = url_of(first)
     port, token = int(url.split(":")[2].split("/")[0]), url.split("/")[-2]
-    kept = state_file(address.FILE)
+    kept = state_file(server.FILE)
     assert kept.stat().st_mode & 0o777 == 0o600
     second = url_of(start_scene(writer.path))
     assert second.endswith(f"/{token}/") and second != url
     first.kill()
     first.wait()
-    address.remember(writer.path, port, token)
+    server.remember(writer.path, port, token)
     assert url_of(start_scene(writer.path)) == url
     challenge, root = "0" * 32, f"http://127.0.0.1:{port}/alive"
-    with urlopen(f"{root}/{address.name_of(token)}/{challenge}") as answer:
+    with urlopen(f"{root}/{server.name_of(token)}/{challenge}") as answer:
         assert (
-            answer.read().decode() == address.proof(token, challenge, port) != address.proof(token, challenge, port + 1)
+            answer.read().decode() == server.proof(token, challenge, port) != server.proof(token, challenge, port + 1)
         )
     for path in (
-        f"{root}/{address.name_of('x')}/{challenge}",
+        f"{root}/{server.name_of('x')}/{challenge}",
         f"{root}/{token}/{challenge}",
-        f"{root}/{address.name_of(token)}/1",
+        f"{root}/{server.name_of(token)}/1",
     ):
         with pytest.raises(HTTPError):
             urlopen(path)
     kept.write_text('{"x": [1, 2, 3]')
-    assert address.last_address(writer.path)[0] == 0
+    assert server.last_address(writer.path)[0] == 0
 
 
 @pytest.mark.programs

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.study.rows import least_to_find, least_to_show
+from ddenv.study.results import least_to_find, least_to_show
 
 MANY = st.integers(1, 2000)
 

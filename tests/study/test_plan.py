@@ -11,7 +11,7 @@ from ddenv.reduction.procedure import MOST_STEPS_BACK
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.rows import theirs
+from ddenv.study.results import theirs
 from ddenv.study.study_folder import run_path
 from tests.study.made import LONGEST, crates, plan_of
 

@@ -10,8 +10,7 @@ from ddenv.page.blocks import Paragraph, Strong, Table
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.results import Found
-from ddenv.study.rows import groups, spread
+from ddenv.study.results import Found, groups, spread
 from ddenv.study.study_page import content
 from ddenv.study.tables import behind, best, chart, numbers, section
 from tests.study.made import crates, plan_of

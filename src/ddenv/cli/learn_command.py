@@ -85,8 +85,7 @@ def _new(file: Path, run: str | None) -> int:
 
 
 def _race(names: list[str]) -> int:
-    from ddenv.learn.plays import plays_of_runs
-    from ddenv.learn.race import RACERS
+    from ddenv.learn.race import RACERS, plays_of_runs
     from ddenv.runs.folder import find_run
     from ddenv.workbench.launch import run_workbench
     from ddenv.workbench.shared.messages import ShowRace

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import of_all_parts
-from ddenv.learn.plays import Play
+from ddenv.learn.race import Play
 from ddenv.learn.recorded_oracle import Oracle
 from ddenv.text import count, first_of
 

@@ -8,11 +8,9 @@ from typing import Literal
 
 from ddenv.learn.attempt import Attempt, in_one_sentence
 from ddenv.learn.foretelling import Foretelling, at_hand, foretelling
-from ddenv.learn.lesson import Answer, Question
+from ddenv.learn.lesson import Answer, Block, Question, blocks
 from ddenv.learn.lesson import Step as LessonStep
-from ddenv.learn.markup import Block, blocks
-from ddenv.learn.plays import Play
-from ddenv.learn.race import bet, result
+from ddenv.learn.race import Play, bet, result
 from ddenv.learn.score import Score, summary
 from ddenv.learn.shelf import Opened
 from ddenv.runfile.position import Position, Step

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -13,6 +15,18 @@ from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Foretold, Lesson, Question, Step
 from ddenv.learn.race import RACERS
+from ddenv.runfile.events import (
+    BaselineFinished,
+    CandidateJudged,
+    CertificateFinished,
+    EngineStarted,
+    Implied,
+    RateLost,
+    TestFinished,
+    TestStarted,
+)
+from ddenv.runfile.position import Position
+from ddenv.runfile.store import Recorded
 from ddenv.schemas import names, nearest, pairs
 from ddenv.world.access import read_bytes
 
@@ -23,13 +37,18 @@ _STEP = ("text", "at", "ask", "hint", "answers", "foretell", "try", "race")
 # A step has at most one of these.
 _DOES = ("ask", "foretell", "try", "race")
 _ANSWER = ("say", "why", "right", "misconception")
+# The places in a run, alone or with a number.
+ALONE = ("start", "baseline", "end")
+COUNTED = ("round", "test", "result", "verdict", "reduction", "certificate", "claims", "back")
+EXPECTED = f"expected {', '.join((*ALONE[:-1], *(f'{word} N' for word in COUNTED)))} or {ALONE[-1]}"
+_WORDS = re.compile(rf"({'|'.join(ALONE)})|({'|'.join(COUNTED)}) (\d{{1,6}})")
 
 
-# Says which event of a run the words of a lesson name. Raises UserError for words that are no place in the run.
-Places = Callable[[str], int]
+# Says which event of a run the words of a lesson name, such as `Places.event`. Raises UserError for other words.
+Event = Callable[[str], int]
 
 
-def read_lesson(file: Path, places: Callable[[Path], Places]) -> Lesson:
+def read_lesson(file: Path, places: Callable[[Path], Event]) -> Lesson:
     """The lesson in `file`; `places` opens its run. Raises UserError: file, line, key, what is wrong."""
     content = read_bytes(file)
     if len(content) > LONGEST:
@@ -153,7 +172,7 @@ def _beside(node: _Node) -> Path:
     return path
 
 
-def _step(node: _Node, places: Places, has_oracle: bool) -> Step:
+def _step(node: _Node, event: Event, has_oracle: bool) -> Step:
     keys = node.keys(_STEP, "text")
     at = keys.get("at")
     if len(does := [key for key in _DOES if key in keys]) > 1:
@@ -174,7 +193,7 @@ def _step(node: _Node, places: Places, has_oracle: bool) -> Step:
             raise at.wrong(f"to foretell the {foretell} it must be a {wanted}")
     return Step(
         keys["text"].words(),
-        None if at is None else int(at.tried(lambda: places(at.raw()))),
+        None if at is None else int(at.tried(lambda: event(at.raw()))),
         _question(node, keys) if "ask" in keys else None,
         foretell,
         keys["try"].keys(("budget",), "budget")["budget"].whole() if "try" in keys else None,
@@ -213,3 +232,59 @@ def _answer(node: _Node) -> Answer:
     if right and belief:
         raise keys["misconception"].wrong("the right answer has none")
     return Answer(keys["say"].words(), right, keys["why"].words(), belief)
+
+
+class Places:
+    """Finds the events of a run by words: `start`, `baseline`, `round 2`, `result 5`, `reduction 1`, `certificate 1` ..."""
+
+    def __init__(self, position: Position, events: Sequence[Recorded]) -> None:
+        """`events` are all of those that the position was made of."""
+        found = _of_events(events)
+        for chapter in position.chapters:
+            if chapter.kind != "baseline":
+                found[chapter.kind, chapter.number] = chapter.first
+        for number, id in enumerate(position.stops("reduction"), 1):
+            found["reduction", number] = id
+        found["end", 0] = position.end.revision
+        self._found = found
+
+    def event(self, words: str) -> int:
+        """The event that `words` name. Raises UserError."""
+        found = _WORDS.fullmatch(words.strip())
+        if found is None:
+            raise UserError(f"'{words[:40]}' is no place in a run; {EXPECTED}")
+        key = (found[1], 0) if found[1] else (found[2], int(found[3]))
+        if key not in self._found:
+            most = max((number for kind, number in self._found if kind == key[0]), default=0)
+            raise UserError(f"the run has no {words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}")
+        return self._found[key]
+
+
+def _of_events(events: Sequence[Recorded]) -> dict[tuple[str, int], int]:
+    """The places that an event makes by itself."""
+    found: dict[tuple[str, int], int] = {}
+    numbers: Counter[str] = Counter()
+    ended = 0
+    for recorded in events:
+        id = recorded.id
+        match recorded.event:
+            case EngineStarted():
+                found.setdefault(("start", 0), id)
+            case BaselineFinished():
+                found["baseline", 0] = id
+            case TestStarted(test):
+                found["test", test] = id
+            case TestFinished(test):
+                ended = test
+                found["result", test] = id
+            case Implied(test):
+                ended = test
+                found["test", test] = found["result", test] = id
+            case CandidateJudged():
+                # A later candidate may be judged at once, by what is known.
+                found.setdefault(("verdict", ended), id)
+            case CertificateFinished() | RateLost() as event:
+                word = "back" if isinstance(event, RateLost) else "claims"
+                numbers[word] += 1
+                found[word, numbers[word]] = id
+    return found

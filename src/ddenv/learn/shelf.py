@@ -14,10 +14,9 @@ from ddenv.learn.attempt import Attempt
 from ddenv.learn.foretelling import Foretelling, foretelling
 from ddenv.learn.lesson import Lesson, Step
 from ddenv.learn.lesson_figures import Figures
-from ddenv.learn.plays import Play, recorded_play
-from ddenv.learn.reading import read_lesson
+from ddenv.learn.race import Play, recorded_play
+from ddenv.learn.reading import Places, read_lesson
 from ddenv.learn.recorded_oracle import Oracle, read_oracle
-from ddenv.learn.run_places import Places
 from ddenv.runfile.fold import fold
 from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState

@@ -25,13 +25,11 @@ from ddenv.page.blocks import (
 )
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
-from ddenv.report.by_hand import guiding
 from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
 from ddenv.report.repeat import repeat, settings
-from ddenv.report.rounds import way
+from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
-from ddenv.report.what_is_left import what_is_left
-from ddenv.report.why import why
+from ddenv.report.what_is_left import what_is_left, why
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Place
 from ddenv.runfile.fold import spent

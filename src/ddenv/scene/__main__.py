@@ -17,9 +17,8 @@ from typing import NoReturn
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.wanted import read
-from ddenv.scene.address import last_address, remember
 from ddenv.scene.player import Player
-from ddenv.scene.server import Server
+from ddenv.scene.server import Server, last_address, remember
 from ddenv.scene.stage import Stage
 
 PERIOD = 0.05  # time between two updates of the scene, s

@@ -10,8 +10,7 @@ from meshcat.geometry import Object
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
-from ddenv.scene.mesh import Surface
-from ddenv.scene.painted import Painted, edges_of, joined, lines, outline, paint, plain
+from ddenv.scene.mesh import Painted, Surface, edges_of, joined, lines, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels

@@ -3,13 +3,21 @@
 Meshcat's own server listens on all interfaces, accepts drawing commands from any local program, and keeps every property
 ever set. This one listens on the loopback interface only, accepts no commands, and lets no foreign page read the scene. Its address
 has a token, so that other users of this machine cannot watch.
+
+The address of each run is remembered: pages that are still open come back to a scene that is started again there. A page must not
+tell its token to whoever has taken the port meanwhile. So it first asks for a proof: who serves the port has to sign a challenge
+with the token, and with its own port, so that nobody can have another scene sign.
 """
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import hmac
 import json
 import logging
+import os
+import re
 import secrets
 from collections.abc import Callable
 from pathlib import Path
@@ -25,8 +33,12 @@ import tornado.websocket
 from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
 from ddenv.runs.programs import FIRST_PORT
-from ddenv.scene.address import TOKEN_BYTES, name_of, proof
+from ddenv.runs.remembered import read_state, state_file
 
+# Where the scenes of runs were served last, so many of them.
+FILE, MOST = "scenes.json", 50
+TOKEN_BYTES = 16
+_TOKEN = re.compile(r"[\w-]{22}")
 LOOPBACK = "127.0.0.1"
 TRIES = 1000
 _LOCAL_NAMES = ("localhost", LOOPBACK, "::1")
@@ -57,16 +69,16 @@ class Server:
         self.play: Callable[[int], dict[str, Any]] = _nothing
         self.pairs: Callable[[], dict[str, Any]] = dict
         self.drawings: Callable[[str, int], list[bytes]] = lambda *_: []
-        self._token = token or secrets.token_urlsafe(TOKEN_BYTES)
+        self.token = token or secrets.token_urlsafe(TOKEN_BYTES)
         self.port = 0
         routes: list[Any] = [
-            (f"/{self._token}/feed", _Feed, {"server": self}),
-            (f"/{self._token}/", _Page, {"page": _PAGE.read_text()}),
-            (rf"/{self._token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
-            (rf"/{self._token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
-            (rf"/{self._token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
+            (f"/{self.token}/feed", _Feed, {"server": self}),
+            (f"/{self.token}/", _Page, {"page": _PAGE.read_text()}),
+            (rf"/{self.token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
+            (rf"/{self.token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
+            (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
         ]
-        routes.append((rf"/alive/{name_of(self._token)}/([0-9a-f]{{32}})", _Alive, {"server": self}))
+        routes.append((rf"/alive/{name_of(self.token)}/([0-9a-f]{{32}})", _Alive, {"server": self}))
         application = tornado.web.Application(
             routes,
             default_handler_class=_Stranger,
@@ -78,10 +90,6 @@ class Server:
         self._http = tornado.httpserver.HTTPServer(application)
         for name in ("tornado.general", "tornado.access"):
             logging.getLogger(name).setLevel(logging.ERROR)
-
-    def proof(self, challenge: str) -> str:
-        """That this is the scene of its token; see `address.py`."""
-        return proof(self._token, challenge, self.port)
 
     def listen(self, port: int, before: int = 0) -> str:
         """Starts on `port`, or for 0 on `before` or else the first free one from `FIRST_PORT` up; returns the URL.
@@ -98,7 +106,7 @@ class Server:
                 continue
             self._http.add_sockets(sockets)
             self.port = number
-            return f"http://{LOOPBACK}:{number}/{self._token}/"
+            return f"http://{LOOPBACK}:{number}/{self.token}/"
         if port:
             raise UserError(f"--port: port {port} is in use or not allowed; use 0 for a free one")
         raise UserError(f"no free port from {FIRST_PORT} to {FIRST_PORT + TRIES - 1}")
@@ -143,7 +151,7 @@ class _Alive(tornado.web.RequestHandler):
 
     def get(self, challenge: str) -> None:
         self.set_header("Cache-Control", "no-store")
-        self.finish(self._server.proof(challenge))
+        self.finish(proof(self._server.token, challenge, self._server.port))
 
 
 def _nothing(_: int) -> dict[str, Any]:
@@ -230,3 +238,43 @@ class _Feed(tornado.websocket.WebSocketHandler):
         self._on_the_way -= 1
         # Retrieved, or asyncio would warn about it; a broken connection closes itself.
         sent.exception()
+
+
+def last_address(run: Path) -> tuple[int, str]:
+    """The port, 0 for none, and the token with which the scene of `run` was served last; a new token if there was none."""
+    found = _known().get(str(run.resolve()))
+    match found:
+        case [int(port), str(token)] if 0 < port <= 65535 and _TOKEN.fullmatch(token):
+            return port, token
+    return 0, secrets.token_urlsafe(TOKEN_BYTES)
+
+
+def remember(run: Path, port: int, token: str) -> None:
+    """Remembers it, for this user alone, if it can be written."""
+    name = str(run.resolve())
+    known = {each: where for each, where in _known().items() if each != name}
+    kept = dict([*known.items(), (name, [port, token])][-MOST:])
+    place = state_file(FILE)
+    fresh = place.with_name(f"{place.name}.{os.getpid()}")
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w") as file:
+            json.dump(kept, file)
+        fresh.replace(place)
+    except OSError:
+        return
+
+
+def _known() -> dict[str, object]:
+    known = read_state(FILE)
+    return known if isinstance(known, dict) else {}
+
+
+def name_of(token: str) -> str:
+    """What a page calls the scene without telling its token."""
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+def proof(token: str, challenge: str, port: int) -> str:
+    """That the scene at `port` knows the token."""
+    return hmac.new(token.encode(), f"{challenge} {port}".encode(), "sha256").hexdigest()

@@ -12,8 +12,7 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.scene import mesh
-from ddenv.scene.mesh import Surface
-from ddenv.scene.painted import Painted, paint
+from ddenv.scene.mesh import Painted, Surface, paint
 from ddenv.world.drive import Drive, find_drive, rolled, turned_links, wheel_links
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector

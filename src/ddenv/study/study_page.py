@@ -30,8 +30,7 @@ from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.settings import SETTINGS, Setting
 from ddenv.study.plan import Plan
-from ddenv.study.results import Found, read_cell
-from ddenv.study.rows import groups, least_of, least_to_find, least_to_show, theirs
+from ddenv.study.results import Found, groups, least_of, least_to_find, least_to_show, read_cell, theirs
 from ddenv.study.study_folder import RUNS, Sitting, run_path
 from ddenv.study.tables import best, section
 from ddenv.text import count, plain

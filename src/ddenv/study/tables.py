@@ -15,8 +15,7 @@ from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, ste
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import Method, file_name
-from ddenv.study.results import Found
-from ddenv.study.rows import TABLES, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
+from ddenv.study.results import TABLES, Found, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
 from ddenv.study.study_folder import run_path
 from ddenv.text import count, plain
 

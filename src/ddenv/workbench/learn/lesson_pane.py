@@ -11,9 +11,8 @@ from textual.containers import VerticalScroll
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ddenv.learn.lesson import Question
+from ddenv.learn.lesson import Block, Question
 from ddenv.learn.lesson_course import LETTERS, Page
-from ddenv.learn.markup import Block
 from ddenv.learn.variables import Variable
 from ddenv.text import plain, truncated
 

@@ -15,8 +15,8 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.learn.attempt import Attempt
+from ddenv.learn.lesson import blocks
 from ddenv.learn.lesson_course import Course
-from ddenv.learn.markup import blocks
 from ddenv.learn.shelf import Opened
 from ddenv.learn.variables import variables
 from ddenv.runfile.position import Position, Step

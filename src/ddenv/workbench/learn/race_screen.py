@@ -13,8 +13,7 @@ from textual.containers import Container, Vertical, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import Static
 
-from ddenv.learn.plays import Play, Turn, plays_of_runs
-from ddenv.learn.race import Race, result, tally
+from ddenv.learn.race import Play, Race, Turn, plays_of_runs, result, tally
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.text import plain, shortened, truncated

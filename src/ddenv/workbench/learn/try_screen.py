@@ -15,7 +15,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.learn.attempt import BOUND, Attempt, Line, Tried, comparison, in_one_sentence
-from ddenv.learn.plays import Play
+from ddenv.learn.race import Play
 from ddenv.learn.variables import SIGNS
 from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter

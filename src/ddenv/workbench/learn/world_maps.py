@@ -9,7 +9,7 @@ from pathlib import Path
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.learn.plays import Turn
+from ddenv.learn.race import Turn
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round
 from ddenv.workbench.map.place import Place, place_of_run
