@@ -110,12 +110,9 @@ def _named(models: tuple[str, ...]) -> str:
 def _hint(candidate: Candidate) -> str:
     part = candidate.split.partitions[candidate.partition]
     if candidate.kind == "partition":
-        return f"Only the models of the part are there. Everything else is gone: {_named(_others(candidate, part))}."
+        others = tuple(name for name in candidate.split.environment if name not in part)
+        return f"Only the models of the part are there. Everything else is gone: {_named(others)}."
     return f"Everything of E is there except {_named(part)}."
-
-
-def _others(candidate: Candidate, part: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(name for name in candidate.split.environment if name not in part)
 
 
 def _seen(test: Test) -> str:

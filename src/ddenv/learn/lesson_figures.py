@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ddenv.errors import UserError
@@ -158,14 +158,9 @@ def names() -> tuple[str, ...]:
     return (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
 
 
-def named(text: str) -> Iterator[str]:
-    """The names between braces in a text."""
-    return iter(_FIGURE.findall(text))
-
-
 def check(text: str) -> None:
     """Raises UserError if `text` has a digit of its own, or a name that is not known."""
-    for name in named(text):
+    for name in _FIGURE.findall(text):
         other, bare = _parts(name)
         about = _ABOUT_CLAIM.fullmatch(bare) or _OF_SET.fullmatch(name)
         if bare not in (OF_RUN if other else names()) and not about:

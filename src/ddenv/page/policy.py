@@ -15,18 +15,9 @@ def policy(allowed: Mapping[str, str]) -> str:
     return "; ".join(f"{directive} {sources}" for directive, sources in {**_NOTHING, **allowed}.items())
 
 
-def of_styles(page: str) -> str:
-    """The sources of a page's own `<style>` elements."""
-    return _sources(page, "style")
-
-
 def of_scripts(page: str) -> str:
     """The sources of the `<script>` elements that a page has itself."""
-    return _sources(page, "script")
-
-
-def _sources(page: str, element: str) -> str:
-    return " ".join(hashed(text) for text in re.findall(rf"<{element}>(.*?)</{element}>", page, re.DOTALL))
+    return " ".join(hashed(text) for text in re.findall(r"<script>(.*?)</script>", page, re.DOTALL))
 
 
 def hashed(text: str) -> str:

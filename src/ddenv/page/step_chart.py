@@ -29,23 +29,40 @@ def chart(state: RunState) -> str:
     models = steps([(point.tests, point.models) for point in points])
     needed = steps([(point.tests, point.needed) for point in points])
 
-    def at(tests: float, number: float) -> tuple[float, float]:
-        x = LEFT + (WIDTH - LEFT - RIGHT) * tests / last
-        return x, HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * number / most
-
-    line = "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*each) for each in models))
+    at = scale(last, most)
+    line = path(models, at)
     (first, floor), (end, _) = at(0, 0), at(last, 0)
-    bound = "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*each) for each in needed))
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}">',
+        opening(HEIGHT),
         *axes(at, last, most),
         f'<path class="area" d="M{first:.1f} {floor:.1f}L{line}L{end:.1f} {floor:.1f}Z"/>',
         f'<path class="steps" d="M{line}"/>',
     ]
-    if any(number for _, number in needed):
-        parts.append(f'<path class="needed" d="M{bound}"/>')
-    parts += _labels(state, at, last, most, any(number for _, number in needed))
+    bounded = any(number for _, number in needed)
+    if bounded:
+        parts.append(f'<path class="needed" d="M{path(needed, at)}"/>')
+    parts += _labels(state, at, last, most, bounded)
     return "\n".join([*parts, "</svg>"])
+
+
+def opening(height: float) -> str:
+    """The beginning of a drawing."""
+    return f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {height:.0f}">'
+
+
+def scale(last: int, most: int, height: float = HEIGHT) -> At:
+    """Places on a chart of this height, pixels, for up to `last` tests and `most` models."""
+
+    def at(tests: float, models: float) -> tuple[float, float]:
+        x = LEFT + (WIDTH - LEFT - RIGHT) * tests / last
+        return x, height - BOTTOM - (height - TOP - BOTTOM) * models / most
+
+    return at
+
+
+def path(corners: Sequence[tuple[float, float]], at: At) -> str:
+    """A line through `corners` of tests and models, as in the `d` of an SVG path."""
+    return "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*corner) for corner in corners))
 
 
 def _thinned(history: Sequence[Point]) -> list[Point]:

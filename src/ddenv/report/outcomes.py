@@ -21,6 +21,7 @@ from ddenv.page.blocks import (
     section,
     thousands,
 )
+from ddenv.page.step_chart import WIDTH, opening
 from ddenv.report.run_data import Record
 from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.events import DEEDS
@@ -33,7 +34,7 @@ from ddenv.words.news import failed_in
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200
-WIDTH, HEIGHT, LEFT, RIGHT, LINE = 880.0, 58.0, 20.0, 36.0, 26.0
+HEIGHT, LEFT, RIGHT, LINE = 58.0, 20.0, 36.0, 26.0
 MEANING = {
     "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
     "other": "another failure",
@@ -66,7 +67,7 @@ def interval(base: Baseline) -> str:
         for each in (0.0, 0.25, 0.5, 0.75, 1.0)
     )
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}">'
+        f"{opening(HEIGHT)}"
         f'{ticks}<path class="grid" d="M{at(0):.1f} {LINE}H{at(1):.1f}"/>'
         f'<path class="span" d="M{at(base.low):.1f} {LINE}H{at(base.high):.1f}"/>'
         f'<circle class="dot" cx="{at(base.rate):.1f}" cy="{LINE}" r="6"/>'

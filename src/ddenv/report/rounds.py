@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, moment, say
@@ -81,14 +82,12 @@ def _is_on(state: RunState, round: Round) -> bool:
 
 def _table(judged: list[_Row]) -> list[Block]:
     shown = _shown(judged)
-    rows: list[tuple[Cell, ...]] = []
-    for first, last in _spans(len(judged), shown):
-        if first in shown:
-            rows.append(_row(judged[first]))
-        else:
-            rows.append(_summed(judged[first:last]))
+    rows = tuple(
+        _summed([judged[each] for each in others]) if number is None else _row(judged[number])
+        for number, others in groupby(range(len(judged)), lambda number: number if number in shown else None)
+    )
     head = ("round", "parts n", "tried", "first similar", "models left", "tests")
-    table = Table(head, tuple(rows), frozenset({0, 1, 2, 4, 5}))
+    table = Table(head, rows, frozenset({0, 1, 2, 4, 5}))
     explained = "A round tries one set of models after the other; the first one that shows f becomes the environment."
     if any(each.tried and not each.tests for each in judged):
         explained += " Sets judged before are not tested again."
@@ -104,17 +103,6 @@ def _shown(judged: list[_Row]) -> frozenset[int]:
     half = MOST_ROUNDS // 2
     kept = wins if len(wins) <= MOST_ROUNDS else wins[:half] + wins[-half:]
     return frozenset([*kept, 0, len(judged) - 1])
-
-
-def _spans(length: int, shown: frozenset[int]) -> Iterator[tuple[int, int]]:
-    """(first, behind the last) of each row: one round that is shown, or all between two of them."""
-    first = 0
-    while first < length:
-        last = first + 1
-        while first not in shown and last < length and last not in shown:
-            last += 1
-        yield first, last
-        first = last
 
 
 def _row(row: _Row) -> tuple[Cell, ...]:

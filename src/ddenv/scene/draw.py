@@ -37,8 +37,7 @@ ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 class Crowd:
     """The still elements of a large world: the surfaces of each one, and the ends of its edges."""
 
-    def __init__(self, models: Path, left_out: Path, removed: Path) -> None:
-        self._paths = models, left_out, removed
+    def __init__(self) -> None:
         self._painted: dict[str, list[Painted]] = {}
         self._edges: dict[str, np.ndarray] = {}
 
@@ -50,15 +49,14 @@ class Crowd:
 
     def objects(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
         """What shows the environment of `shot`; None where nothing is left to show."""
-        models, left_out, removed = self._paths
         parts = [item for name, items in self._painted.items() if name in shot.models for item in items]
         solid, clear = [item for item in parts if item.alpha == 1], [item for item in parts if item.alpha < 1]
         for name, items in (("still", solid), ("still clear", clear)):
-            yield (*models, name), joined(items).thing() if items else None
-        yield (*left_out, "all"), self._outlines(shot.left_out, colors.LEFT_OUT)
-        yield (*removed, "all"), self._outlines(shot.removed, colors.REMOVED)
+            yield (*MODELS, name), joined(items).thing() if items else None
+        yield (*LEFT_OUT, "all"), self._outlines(shot.left_out, colors.LEFT_OUT)
+        yield (*REMOVED, "all"), self._outlines(shot.removed, colors.REMOVED)
 
-    def _outlines(self, names: Iterable[str], color: colors.Color) -> Object | None:
+    def _outlines(self, names: Iterable[str], color: Color) -> Object | None:
         ends = [self._edges[name] for name in sorted(names) if name in self._edges]
         return lines(np.concatenate(ends), color) if ends else None
 
@@ -105,7 +103,7 @@ class Scenery:
         self._pieces = 0
         elements = frozenset(elements)
         self._movable = {model.name for model in world.models if not model.static and model.name in elements}
-        self._crowd = Crowd(MODELS, LEFT_OUT, REMOVED) if len(elements) > MOST_SINGLE else None
+        self._crowd = Crowd() if len(elements) > MOST_SINGLE else None
         surfaces = [
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
@@ -301,7 +299,7 @@ PIN = (
     mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))),
 )
 FLAG = (
-    mesh.cylinder(0.025, 1.5).at(Pose((0.0, 0.0, 0.75))),
+    mesh.frustum(0.025, 0.025, 1.5).at(Pose((0.0, 0.0, 0.75))),
     mesh.box((0.55, 0.02, 0.34)).at(Pose((0.28, 0.0, 1.33))),
 )
 

@@ -74,24 +74,19 @@ def box(size: Sequence[float]) -> Surface:
     return Surface(_UNIT_BOX.vertices * np.asarray(size, dtype=float), _UNIT_BOX.faces)
 
 
-def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Surface:
+def frustum(bottom: float, top: float, length: float) -> Surface:
     """A truncated cone along z, centred on its frame's origin, with radii `bottom` and `top`."""
-    angles = np.arange(sides) * 2 * math.pi / sides
+    angles = np.arange(SIDES) * 2 * math.pi / SIDES
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
-    low = np.column_stack([circle * bottom, np.full(sides, -length / 2)])
-    high = np.column_stack([circle * top, np.full(sides, length / 2)])
-    here, after = np.arange(sides), np.roll(np.arange(sides), -1)
+    low = np.column_stack([circle * bottom, np.full(SIDES, -length / 2)])
+    high = np.column_stack([circle * top, np.full(SIDES, length / 2)])
+    here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
     wall = np.concatenate(
-        [np.column_stack([here, after, after + sides]), np.column_stack([here, after + sides, here + sides])]
+        [np.column_stack([here, after, after + SIDES]), np.column_stack([here, after + SIDES, here + SIDES])]
     )
-    fan = np.column_stack([np.zeros(sides - 2, dtype=int), np.arange(1, sides - 1), np.arange(2, sides)])
+    fan = np.column_stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)])
     parts = [Surface(np.concatenate([low, high]), wall), Surface(low, fan[:, ::-1]), Surface(high, fan)]
     return merge(parts)
-
-
-def cylinder(radius: float, length: float, sides: int = SIDES) -> Surface:
-    """A cylinder along z, centred on its frame's origin."""
-    return frustum(radius, radius, length, sides)
 
 
 def sphere(radius: float, sides: int = SIDES) -> Surface:
@@ -137,8 +132,9 @@ def creased(mesh: Mesh) -> Surface:
     return Surface(np.concatenate([mesh.vertices, corners[sharp]])[used], number[faces].astype(np.uint32))
 
 
-def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Surface:
+def ring(radius: float, thickness: float) -> Surface:
     """A torus in the plane z = 0 around its frame's origin."""
+    sides = 2 * SIDES
     around, across = np.meshgrid(np.arange(sides + 1) * 2 * math.pi / sides, np.arange(8) * math.pi / 4, indexing="ij")
     distance = radius + thickness / 2 * np.cos(across)
     height = thickness / 2 * np.sin(across)
@@ -149,7 +145,18 @@ def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Surface:
 def tube(points: np.ndarray, radius: float) -> Surface:
     """A tube along the path `points` (N, 3), thinned to one point every `TUBE_STEP`; empty for a path without length."""
     path = thinned(points, TUBE_STEP)
-    return EMPTY if len(path) < 2 else _pipe(path, radius)
+    if len(path) < 2:
+        return EMPTY
+    ahead = np.gradient(path, axis=0)
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
+    # Sections are spanned from z, or from x where the path is vertical.
+    upright = np.abs(ahead[:, 2:]) > 0.99
+    aside = np.cross(np.where(upright, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), ahead)
+    aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-12)
+    over = np.cross(ahead, aside)
+    angles = -np.arange(8) * math.pi / 4
+    section = np.cos(angles)[None, :, None] * aside[:, None] + np.sin(angles)[None, :, None] * over[:, None]
+    return Surface((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), 8))
 
 
 def thinned(points: np.ndarray, step: float) -> np.ndarray:
@@ -167,7 +174,7 @@ def of_shape(shape: Shape) -> Surface:
         case Box(size):
             return box(size)
         case Cylinder(radius, length):
-            return cylinder(radius, length)
+            return frustum(radius, radius, length)
         case Sphere(radius):
             return sphere(radius)
         case Capsule(radius, length):
@@ -205,19 +212,6 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
     below, diagonal = here + columns, right + columns
     faces = np.stack([np.stack([here, below, diagonal], axis=-1), np.stack([here, diagonal, right], axis=-1)])
     return faces.reshape(-1, 3).astype(np.uint32)
-
-
-def _pipe(path: np.ndarray, radius: float, sides: int = 8) -> Surface:
-    ahead = np.gradient(path, axis=0)
-    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
-    # Sections are spanned from z, or from x where the path is vertical.
-    upright = np.abs(ahead[:, 2:]) > 0.99
-    aside = np.cross(np.where(upright, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), ahead)
-    aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-12)
-    over = np.cross(ahead, aside)
-    angles = -np.arange(sides) * 2 * math.pi / sides
-    section = np.cos(angles)[None, :, None] * aside[:, None] + np.sin(angles)[None, :, None] * over[:, None]
-    return Surface((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), sides))
 
 
 # Corners of a box, numbered by bits, that its twelve edges join.

@@ -11,7 +11,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.evidence.rates import wilson_interval
 from ddenv.page.blocks import Block, Cell, Paragraph, Part, Picture, Section, Strong, Table, named, percent, say
-from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
+from ddenv.page.step_chart import LEFT, At, axes, opening, path, scale, steps
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import Method, file_name
@@ -45,13 +45,10 @@ def chart(group: Group) -> str:
     last = max(1, *(each.tests for each in group.over))
     most = max(1, group.models)
 
-    def at(tests: float, models: float) -> tuple[float, float]:
-        x = LEFT + (WIDTH - LEFT - RIGHT) * tests / last
-        return x, HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * models / most
-
+    at = scale(last, most, HEIGHT)
     height = HEIGHT + LINE * (len(named) + bool(others)) + 4
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {height:.0f}">',
+        opening(height),
         *axes(at, last, most),
     ]
     for row in others:
@@ -76,12 +73,11 @@ def _looks(group: Group) -> tuple[list[Row], list[Row]]:
 def _lines(row: Row, at: At, look: str, width: float | None = None) -> Iterator[str]:
     wide = "" if width is None else f' stroke-width="{width:g}"'
     for each in row.over:
-        corners = [at(*corner) for corner in steps(each.sizes)]
-        line = "L".join(f"{x:.1f} {y:.1f}" for x, y in corners)
+        corners = steps(each.sizes)
         title = escape(f"{plain(each.cell.label)}, seed {each.cell.seed}")
-        yield f'<path class="{look}"{wide} d="M{line}"><title>{title}</title></path>'
+        yield f'<path class="{look}"{wide} d="M{path(corners, at)}"><title>{title}</title></path>'
         if width is not None:
-            x, y = corners[-1]
+            x, y = at(*corners[-1])
             yield f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" r="{1.5 + width / 2:g}"/>'
 
 
