@@ -16,9 +16,9 @@ import numpy as np
 from ddenv import schemas
 from ddenv.engine.sight import traits_of, trajectory_of
 from ddenv.errors import UserError
+from ddenv.learn.attempt import Oracle, read_oracle
 from ddenv.learn.lesson import Lesson
 from ddenv.learn.reading import Places, read_lesson
-from ddenv.learn.recorded_oracle import Oracle, read_oracle
 from ddenv.reduction.reduce import NamedRound, reduce
 from ddenv.runfile.fold import fold
 from ddenv.runfile.position import position_in

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.errors import UserError
-from ddenv.learn.attempt import Attempt, bound, comparison, in_one_sentence
+from ddenv.learn.attempt import Attempt
+from ddenv.learn.race import bound, comparison, in_one_sentence
 from ddenv.learn.score import Score, data_of, score_of, summary
 from tests.learn.lessons import course, opened
 

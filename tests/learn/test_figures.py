@@ -2,9 +2,9 @@
 
 import pytest
 
+from ddenv.learn.attempt import read_oracle
 from ddenv.learn.lesson_figures import OF_RUN, Figures
 from ddenv.learn.reading import Places
-from ddenv.learn.recorded_oracle import read_oracle
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile

@@ -9,9 +9,9 @@ import pytest
 from docs.lessons import delivery, quay, toys
 
 from ddenv.evidence.rates import wilson_interval
+from ddenv.learn.attempt import read_oracle
 from ddenv.learn.handout import handout
 from ddenv.learn.lesson import Answer
-from ddenv.learn.recorded_oracle import read_oracle
 from ddenv.learn.score import Score, data_of, score_of, summary
 from ddenv.learn.shelf import LESSONS
 from ddenv.page.html import html

@@ -9,8 +9,8 @@ from docs.lessons import delivery
 from docs.lessons.record_plays import record_plays
 
 from ddenv.errors import UserError
+from ddenv.learn.attempt import RecordedRound, read_oracle
 from ddenv.learn.race import KINDS, Play, Race, bet, plays_of_runs, recorded_play, result, tally, why
-from ddenv.learn.recorded_oracle import RecordedRound, read_oracle
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.store import RunFile
 from tests.learn.lessons import RUNS, opened

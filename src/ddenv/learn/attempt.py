@@ -1,19 +1,98 @@
-"""A student's own search in a small world whose every part is known: tests, what is held, the verdict, and a comparison."""
+"""A small world whose every part is known: what happens in each, recorded once, and a student's own search in it."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import of_all_parts
-from ddenv.learn.race import Play
-from ddenv.learn.recorded_oracle import Oracle
-from ddenv.text import count, first_of
+from ddenv.world.access import read_bytes
 
-NAMED = 5
-BOUND = "The last line: how many answers of yes or no it takes to single out such a set if nothing is known beforehand."
+OUTCOMES = ("similar", "other", "pass")
+# More models than this have too many parts.
+MOST_MODELS = 14
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRound:
+    """The parts of a round that an algorithm made, and the labels of the candidates that it tested, such as "without A"."""
+
+    parts: tuple[tuple[str, ...], ...]
+    tested: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """`outcomes` of the sets of `models` that do not end `otherwise`; every other set does.
+
+    `rates` of f, 0..1, are of sets where luck decides; elsewhere it is 0.
+    `rounds` is what algorithms did in this world, by their names.
+    """
+
+    models: tuple[str, ...]
+    outcomes: dict[frozenset[str], str]
+    otherwise: str
+    rates: dict[frozenset[str], float] = field(default_factory=dict)
+    rounds: Mapping[str, tuple[RecordedRound, ...]] = field(default_factory=dict)
+
+    def outcome(self, kept: Iterable[str]) -> str:
+        """How a test with these models ends: one of `OUTCOMES`."""
+        return self.outcomes.get(frozenset(kept), self.otherwise)
+
+    def rate(self, kept: Iterable[str]) -> float:
+        """How often f shows with these models, 0..1. Raises UserError for a model that the world does not have."""
+        there = frozenset(kept)
+        if unknown := there.difference(self.models):
+            raise UserError(f"the oracle's world has no model '{min(unknown)}'")
+        return self.rates.get(there, 1.0 if self.outcome(there) == "similar" else 0.0)
+
+    @cached_property
+    def showing(self) -> frozenset[frozenset[str]]:
+        """All sets that show f."""
+        return frozenset(kept for kept, outcome in self.outcomes.items() if outcome == "similar")
+
+    @cached_property
+    def minimal(self) -> tuple[tuple[str, ...], ...]:
+        """The 1-minimal sets, the smallest first, each in the order of the models."""
+        found = [kept for kept in self.showing if not any(kept - {name} in self.showing for name in kept)]
+        ordered = (tuple(name for name in self.models if name in kept) for kept in found)
+        return tuple(sorted(ordered, key=lambda kept: (len(kept), kept)))
+
+    def could_go(self, kept: Iterable[str]) -> tuple[str, ...]:
+        """The models of `kept` that can each be left out alone: f still shows."""
+        there = frozenset(kept)
+        return tuple(name for name in self.models if name in there and there - {name} in self.showing)
+
+
+def read_oracle(path: Path) -> Oracle:
+    """The oracle in a JSON file. Raises UserError if it is not one."""
+    try:
+        data = json.loads(read_bytes(path))
+        models = tuple(map(str, data["models"]))
+        outcomes = {frozenset(key.split()): str(value) for key, value in data["outcomes"].items()}
+        otherwise = str(data["otherwise"])
+        rates = {frozenset(key.split()): float(value) for key, value in data.get("rates", {}).items()}
+        rounds = {str(name): tuple(map(_round, each)) for name, each in data.get("plays", {}).items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise UserError(f"{path}: is not an oracle; expected models, outcomes and otherwise") from None
+    if len(models) > MOST_MODELS or len(set(models)) != len(models):
+        raise UserError(f"{path}: models: expected up to {MOST_MODELS} different names")
+    if not {*outcomes.values(), otherwise}.issubset(OUTCOMES) or otherwise == "similar":
+        raise UserError(f"{path}: outcomes: expected {', '.join(OUTCOMES)}")
+    if not all(0 <= rate <= 1 for rate in rates.values()):
+        raise UserError(f"{path}: rates: expected numbers from 0 to 1")
+    if not frozenset().union(*outcomes, *rates).issubset(models):
+        raise UserError(f"{path}: outcomes: a set has a model that is not among the models")
+    return Oracle(models, outcomes, otherwise, rates, rounds)
+
+
+def _round(data: Any) -> RecordedRound:
+    return RecordedRound(tuple(tuple(part.split()) for part in data["parts"]), tuple(map(str, data["tested"])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,19 +102,6 @@ class Tried:
     kept: tuple[str, ...]
     out: tuple[str, ...]
     outcome: str
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A line of the comparison: how many tests somebody made, what was left, and whether one of that can still go.
-
-    `left` is None for the bound.
-    """
-
-    name: str
-    tests: int
-    left: tuple[str, ...] | None = None
-    can_go: bool = False
 
 
 class Attempt:
@@ -137,42 +203,3 @@ class Attempt:
     def _was_left_out(self, name: str) -> bool:
         rest = frozenset(self.held) - {name}
         return any(rest == frozenset(each.kept) for each in self.tried)
-
-
-def comparison(oracle: Oracle, plays: Sequence[Play], attempt: Attempt | None) -> Iterator[Line]:
-    """The student, the algorithms, and the bound for what the student found, or else for the smallest set."""
-    if attempt is not None:
-        yield Line("you", len(attempt.tried), attempt.held, not attempt.found)
-    for play in plays:
-        yield Line(play.name, play.tests, play.left, bool(oracle.could_go(play.left)))
-    size = len(attempt.held) if attempt is not None and attempt.found else min(map(len, oracle.minimal), default=0)
-    yield Line(f"log2 C({len(oracle.models)}, {size})", bound(len(oracle.models), size))
-
-
-def bound(models: int, needed: int) -> int:
-    """How many answers of yes or no tell one set of `needed` models from all others of its size."""
-    return math.ceil(math.log2(math.comb(models, needed)))
-
-
-def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> str:
-    """How the student's search compares."""
-    tests, held = count(len(attempt.tried), "test"), count(len(attempt.held), "model")
-    done = sorted((play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests)
-    others = first_of([f"{play.name} {play.tests}" for play in done], NAMED)
-    sizes = {len(play.left) for play in done}
-    if sizes - {len(attempt.held)}:
-        low, high = min(sizes), max(sizes)
-        others += f", for {count(high, 'model')}" if low == high else f", for {low} to {high} models"
-    if not attempt.found:
-        behind = f" The algorithms went on until none could: {others}." if others else ""
-        return f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"
-    found, least = f"You found {held} in {tests}", bound(len(oracle.models), len(attempt.held))
-    if len(attempt.tried) < least:
-        luck = f"{found}, fewer than {least}: luck or a look at the map helped you."
-        return f"{luck} The algorithms: {others}." if others else luck
-    if not done:
-        return f"{found}; who knows nothing in advance needs at least {least}."
-    quicker = [play.name for play in done if play.tests < len(attempt.tried)]
-    if not quicker:
-        return f"{found}, and no algorithm needed fewer: {others}."
-    return f"{found}; {first_of(quicker, NAMED)} needed fewer: {others}."

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ddenv.learn.attempt import BOUND, comparison
 from ddenv.learn.lesson import MISCONCEPTIONS, Question, Step, blocks
-from ddenv.learn.race import result
+from ddenv.learn.race import BOUND, comparison, result
 from ddenv.learn.shelf import Opened
 from ddenv.page.blocks import Block, Name, Paragraph, Part, Picture, Report, Section, Strong, Table, say
 from ddenv.page.step_chart import chart

@@ -16,7 +16,7 @@ from ddenv.errors import UserError
 from ddenv.evidence import claims
 from ddenv.evidence.rates import miss_chance, wilson_interval
 from ddenv.evidence.took_part import slice_words
-from ddenv.learn.recorded_oracle import Oracle
+from ddenv.learn.attempt import Oracle
 from ddenv.runfile.events import deed
 from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings

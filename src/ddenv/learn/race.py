@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.learn.attempt import Attempt, Oracle
 from ddenv.learn.lesson import Answer, Question
-from ddenv.learn.recorded_oracle import Oracle
 from ddenv.runfile.events import TestFinished, TestStarted
 from ddenv.runfile.follow import steps
 from ddenv.runfile.run_settings import settings
@@ -17,7 +18,12 @@ from ddenv.runfile.state import BROKEN, Candidate, RunState, Split, Trial
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runfile.tested import made_for
 from ddenv.schemas import BOTH, uses
-from ddenv.text import count
+from ddenv.text import count, first_of
+
+# The least and the most searches of a race, and how many searches a sentence names.
+RACERS = (2, 4)
+NAMED = 5
+BOUND = "The last line: how many answers of yes or no it takes to single out such a set if nothing is known beforehand."
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +144,6 @@ def _method(state: RunState) -> str:
     chosen = settings(state)
     parts = dict(zip(BOTH, chosen.pair.partition("/")[::2], strict=True))
     return f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
-
-
-RACERS = (2, 4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,3 +287,55 @@ def bet(plays: Sequence[Play]) -> Question:
         tuple(answers),
         "What does each know of the world before its first test?",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the comparison: how many tests somebody made, what was left, and whether one of that can still go.
+
+    `left` is None for the bound.
+    """
+
+    name: str
+    tests: int
+    left: tuple[str, ...] | None = None
+    can_go: bool = False
+
+
+def comparison(oracle: Oracle, plays: Sequence[Play], attempt: Attempt | None) -> Iterator[Line]:
+    """The student, the algorithms, and the bound for what the student found, or else for the smallest set."""
+    if attempt is not None:
+        yield Line("you", len(attempt.tried), attempt.held, not attempt.found)
+    for play in plays:
+        yield Line(play.name, play.tests, play.left, bool(oracle.could_go(play.left)))
+    size = len(attempt.held) if attempt is not None and attempt.found else min(map(len, oracle.minimal), default=0)
+    yield Line(f"log2 C({len(oracle.models)}, {size})", bound(len(oracle.models), size))
+
+
+def bound(models: int, needed: int) -> int:
+    """How many answers of yes or no tell one set of `needed` models from all others of its size."""
+    return math.ceil(math.log2(math.comb(models, needed)))
+
+
+def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> str:
+    """How the student's search compares."""
+    tests, held = count(len(attempt.tried), "test"), count(len(attempt.held), "model")
+    done = sorted((play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests)
+    others = first_of([f"{play.name} {play.tests}" for play in done], NAMED)
+    sizes = {len(play.left) for play in done}
+    if sizes - {len(attempt.held)}:
+        low, high = min(sizes), max(sizes)
+        others += f", for {count(high, 'model')}" if low == high else f", for {low} to {high} models"
+    if not attempt.found:
+        behind = f" The algorithms went on until none could: {others}." if others else ""
+        return f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"
+    found, least = f"You found {held} in {tests}", bound(len(oracle.models), len(attempt.held))
+    if len(attempt.tried) < least:
+        luck = f"{found}, fewer than {least}: luck or a look at the map helped you."
+        return f"{luck} The algorithms: {others}." if others else luck
+    if not done:
+        return f"{found}; who knows nothing in advance needs at least {least}."
+    quicker = [play.name for play in done if play.tests < len(attempt.tried)]
+    if not quicker:
+        return f"{found}, and no algorithm needed fewer: {others}."
+    return f"{found}; {first_of(quicker, NAMED)} needed fewer: {others}."

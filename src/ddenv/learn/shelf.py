@@ -10,13 +10,12 @@ from string import Template
 
 from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
-from ddenv.learn.attempt import Attempt
+from ddenv.learn.attempt import Attempt, Oracle, read_oracle
 from ddenv.learn.foretelling import Foretelling, foretelling
 from ddenv.learn.lesson import Lesson, Step
 from ddenv.learn.lesson_figures import Figures
 from ddenv.learn.race import Play, recorded_play
 from ddenv.learn.reading import Places, read_lesson
-from ddenv.learn.recorded_oracle import Oracle, read_oracle
 from ddenv.runfile.fold import fold
 from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState

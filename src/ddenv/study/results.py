@@ -6,9 +6,13 @@ import json
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from statistics import median
+from typing import Any
+
+import yaml
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, is_minimal
@@ -206,31 +210,18 @@ class Theirs:
     minutes: int
 
 
-TABLES = {"ditch": "II", "rubble": "III", "friction": "IV"}
-_ROWS = {
-    "ditch": {
-        "model2model/failure-proximal": Theirs(268, 0.84, 420),
-        "model2model/avg-trajectory-proximal": Theirs(82, 0.95, 108),
-        "timeseg/avg-trajectory-proximal": Theirs(359, 0.84, 487),
-    },
-    "rubble": {
-        "model2model/failure-proximal": Theirs(179, 0.81, 274),
-        "model2model/avg-trajectory-proximal": Theirs(178, 0.78, 277),
-        "timeseg/avg-trajectory-proximal": Theirs(162, 0.89, 231),
-    },
-    "friction": {
-        "model2model/failure-proximal": Theirs(727, 0.44, 1098),
-        "model2model/avg-trajectory-proximal": Theirs(116, 0.76, 183),
-        "timeseg/avg-trajectory-proximal": Theirs(430, 0.68, 641),
-    },
-}
+@cache
+def paper() -> dict[str, Any]:
+    """The paper's tables by the names of their scenarios: `table` is the number, `rows` has what `Theirs` has for each pair."""
+    return dict(yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text()))
 
 
 def theirs(cell: Cell) -> Theirs | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
     if cell.method.algorithm != "ddenv" or cell.slices:
         return None
-    return _ROWS.get(cell.scenario.name, {}).get(cell.method.pair)
+    rows = paper()[cell.scenario.name]["rows"] if cell.scenario.name in paper() else {}
+    return Theirs(**rows[cell.method.pair]) if cell.method.pair in rows else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,6 +275,14 @@ class Group:
     def minimal(self) -> tuple[Found, ...]:
         """All cells that are minimal."""
         return tuple(each for row in self.rows for each in row.minimal)
+
+    @property
+    def ends(self) -> dict[tuple[str, ...], list[Found]]:
+        """The cells that came to an end, by the models that are left."""
+        ends: dict[tuple[str, ...], list[Found]] = {}
+        for each in self.over:
+            ends.setdefault(each.left, []).append(each)
+        return ends
 
     @property
     def models(self) -> int:

@@ -15,7 +15,7 @@ from ddenv.page.step_chart import LEFT, At, axes, opening, path, scale, steps
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import Method, file_name
-from ddenv.study.results import TABLES, Found, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
+from ddenv.study.results import Found, Group, Row, least_of, least_to_find, least_to_show, paper, spread, theirs
 from ddenv.study.study_folder import run_path
 from ddenv.text import count, plain
 
@@ -104,10 +104,8 @@ def _line_end(row: Row) -> str:
 
 def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
     """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
-    sets: dict[tuple[str, ...], list[Found]] = {}
-    for each in group.over:
-        sets.setdefault(each.left, []).append(each)
-    ranked = sorted(sets.items(), key=lambda one: (-sum(each.minimal for each in one[1]), -len(one[1])))
+    ends = group.ends
+    ranked = sorted(ends.items(), key=lambda one: (-sum(each.minimal for each in one[1]), -len(one[1])))
     for number, (left, cells) in enumerate(ranked[:MOST_WORLDS], start=1):
         yield say(*_said(left, cells, len(group.over)))
         yield from _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
@@ -143,9 +141,10 @@ def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
 def section(folder: Path, group: Group) -> Section:
     """The section on one scenario."""
     name = plain(group.scenario.name)
-    number = TABLES.get(name)
     models = f", {count(group.models, 'model')}" if group.models else ""
-    title = f"{name}{models}" + (f" (Table {number} of the paper)" if number and _has_theirs(group) else "")
+    title = f"{name}{models}"
+    if _has_theirs(group):
+        title += f" (Table {paper()[group.scenario.name]['table']} of the paper)"
     blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
     blocks += [numbers(group), *_slices(group)]
     blocks += _problems(group)
@@ -228,10 +227,7 @@ def behind(group: Group) -> Table:
 
 def _in_short(group: Group) -> Iterator[Paragraph]:
     """The details of many methods, a sentence for each set of models that is left."""
-    sets: dict[tuple[str, ...], list[Found]] = {}
-    for each in group.over:
-        sets.setdefault(each.left, []).append(each)
-    for left, cells in sets.items():
+    for left, cells in group.ends.items():
         reruns = spread([each.reruns / each.tests for each in cells], percent)
         certified = f"certified in {sum(each.minimal for each in cells)} of them; re-runs {reruns} of the search tests"
         rates = f"f in the whole world {_in_whole(cells)}, in what is left {_in_left(cells)}"

@@ -14,8 +14,8 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.learn.attempt import BOUND, Attempt, Line, Tried, comparison, in_one_sentence
-from ddenv.learn.race import Play
+from ddenv.learn.attempt import Attempt, Tried
+from ddenv.learn.race import BOUND, Line, Play, comparison, in_one_sentence
 from ddenv.learn.variables import SIGNS
 from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter
