@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -11,6 +11,7 @@ from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, moment, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
+from ddenv.runfile import branches
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import REFUSED, Candidate, Round, RunState, Trial
 from ddenv.text import count, plain
@@ -179,9 +180,9 @@ def _tree(state: RunState) -> list[Block]:
     straight = all(node.parent == node.number - 1 and node.how in ("reduced", "sliced") for node in nodes[1:])
     if straight and state.node == len(nodes) - 1 and not any(node.rejected or node.lost_rate for node in nodes):
         return [say(f"From environment to environment, without branches: {_steps(nodes)}.")]
-    order = list(_drawn(state))
-    rows = [_node(state, nodes[number], indent) for number, indent in order]
-    here = frozenset(index for index, (number, _) in enumerate(order) if number == state.node)
+    drawn = branches.rows(nodes, state.node)
+    rows = [_node(state, each.node, each.lines.replace("─", " ")) for each in drawn]
+    here = frozenset(place for place, each in enumerate(drawn) if each.node.number == state.node)
     head = ("environment", "models", "came by", "round", "tests", "f shown", "")
     if len(rows) > MOST:
         here = frozenset()
@@ -196,34 +197,6 @@ def _steps(nodes: Sequence[Node]) -> str:
     if len(sizes) > MOST_STEPS:
         sizes = [*sizes[: MOST_STEPS // 2], "…", *sizes[-MOST_STEPS // 2 :]]
     return f"{' → '.join(sizes)} models"
-
-
-def _drawn(state: RunState) -> Iterator[tuple[int, str]]:
-    """Each node's number with the lines before it. The branch where the run is now goes on without an indent."""
-    children: dict[int, list[int]] = {}
-    for node in state.nodes[1:]:
-        if node.parent is not None:
-            children.setdefault(node.parent, []).append(node.number)
-    path = _path(state)
-    waiting = [(0, "", "")]
-    while waiting:
-        number, line, below = waiting.pop()
-        yield number, line
-        mine = sorted(children.get(number, ()), key=lambda child: (child in path, child))
-        *branches, last = mine or (None,)
-        if last is not None:
-            waiting.append((last, f"{below}", below))
-        waiting += [(child, f"{below}├ ", f"{below}│ ") for child in reversed(branches)]
-
-
-def _path(state: RunState) -> frozenset[int]:
-    """The current node and all above it; a parent has a smaller number than its child."""
-    found: set[int] = set()
-    number: int | None = state.node
-    while number is not None and number not in found:
-        found.add(number)
-        number = state.nodes[number].parent
-    return frozenset(found)
 
 
 def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:

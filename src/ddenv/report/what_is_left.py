@@ -4,6 +4,7 @@ model that is left, and what the nearest world that passes lacks.
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,9 +15,9 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
 from ddenv.runs.nearest import Nearest
-from ddenv.runs.reasons import Reason, no_reasons, parting_sentence, sentence
+from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, sentence
 from ddenv.text import count, first_of, plain
-from ddenv.world.model import is_ground
+from ddenv.world.model import World, is_ground
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
@@ -33,9 +34,7 @@ def what_is_left(record: Record) -> Section:
         title = "The world"
     if record.world is None:
         return Section(title, _names_alone(state))
-    from ddenv.map.footprints import plan
-
-    drawn = plan(record.world, CORNERS)
+    drawn = _drawn(record.world)
     blocks: list[Block] = [Picture("map", picture(record, drawn), _alternative(state))]
     if near := close_up(record, drawn):
         blocks += [
@@ -119,11 +118,7 @@ def why(record: Record) -> Section | None:
     found = current(record.state)
     if found is None and record.nearest is None:
         return None
-    drawn: tuple[Drawn, ...] = ()
-    if record.world is not None:
-        from ddenv.map.footprints import plan
-
-        drawn = plan(record.world, CORNERS)
+    drawn = () if record.world is None else _drawn(record.world)
     blocks: list[Block] = []
     if found is not None and len(found.claims) == 1:
         blocks.append(say(plain(no_reasons(found))))
@@ -146,13 +141,14 @@ def _passing(record: Record, found: Nearest, drawn: tuple[Drawn, ...]) -> list[B
     if one is None:
         return blocks
     if drawn:
-        ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
         there = replace(record, kept=record.elements - frozenset(found.gone))
         words = (
             f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without, "
             f"seed {one.seed}."
         )
-        blocks.append(Picture("nearest", two_ways(there, drawn, ways, "nearest", found.gone), plain(words)))
+        blocks.append(
+            Picture("nearest", two_ways(there, drawn, _ways(record, one), "nearest", found.gone), plain(words))
+        )
     rows = tuple(
         (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
         for each in found.instants
@@ -168,7 +164,16 @@ def _place(point: tuple[float, float]) -> str:
 def _map(record: Record, drawn: tuple[Drawn, ...], reason: Reason, name: str) -> Picture:
     one = reason.parting
     assert one is not None
-    ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
     there = replace(record, kept=record.kept - frozenset(reason.gone))
     words = f"The world from above without {reason.without}: the robot's paths with it and without it, seed {one.seed}."
-    return Picture(name, two_ways(there, drawn, ways, name), plain(words))
+    return Picture(name, two_ways(there, drawn, _ways(record, one), name), plain(words))
+
+
+def _ways(record: Record, one: Parting) -> dict[str, array[float]]:
+    return {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
+
+
+def _drawn(world: World) -> tuple[Drawn, ...]:
+    from ddenv.map.footprints import plan
+
+    return plan(world, CORNERS)

@@ -19,6 +19,7 @@ from ddenv.evidence.took_part import slice_in_short
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
+from ddenv.runfile import branches
 from ddenv.runfile.progress import Decision, Node
 from ddenv.runfile.state import RunState
 from ddenv.text import first_of, plain, shortened
@@ -26,7 +27,6 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared import branches
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.wording import count
