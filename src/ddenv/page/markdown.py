@@ -7,20 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
-from ddenv.page.blocks import (
-    Block,
-    Cell,
-    Code,
-    Name,
-    Paragraph,
-    Part,
-    Picture,
-    Report,
-    Section,
-    Strong,
-    Table,
-    parts,
-)
+from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Section, Strong, Table, parts
 from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent

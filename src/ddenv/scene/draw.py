@@ -157,10 +157,10 @@ class Scenery:
 
     def way(self, samples: np.ndarray, ghost: bool) -> bytes:
         """The message that draws the robot's path in a whole run, for one browser."""
-        tube = mesh.tube(path_on_ground(samples, self._lowest), LINE)
-        color = colors.GHOST_TRAIL if ghost else colors.TRAIL
-        thing = plain(tube, color, glow=0.4) if len(tube.faces) else None
-        return self._stage.drawn(GHOST_TRAIL if ghost else TRAIL, thing)
+        points = path_on_ground(samples, self._lowest)
+        if ghost:
+            return self._stage.drawn(GHOST_TRAIL, _tube(points, colors.GHOST_TRAIL))
+        return self._stage.drawn(TRAIL, _tube(points, colors.TRAIL))
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`key`)."""
@@ -193,25 +193,23 @@ class Scenery:
     def evidence(self, samples: np.ndarray | None) -> None:
         """Draws the robot's path in the run that shows f."""
         self._stage.delete(EVIDENCE)
-        if samples is not None and len(samples):
-            path = mesh.tube(path_on_ground(samples, self._lowest), LINE)
-            self._draw_path(EVIDENCE, path, colors.EVIDENCE)
+        if samples is not None:
+            self._draw_path(EVIDENCE, path_on_ground(samples, self._lowest), colors.EVIDENCE)
 
     def trail(self, samples: np.ndarray) -> None:
         """Draws the robot's path so far; fewer `samples` than before start a new one."""
-        points = path_on_ground(samples, self._lowest) if len(samples) else np.zeros((0, 3))
+        points = path_on_ground(samples, self._lowest)
         pieces = -(-max(0, len(points) - 1) // PIECE)
         if pieces < self._pieces or not pieces:
             self._stage.delete(TRAIL)
             self._pieces = 0
         for piece in range(max(0, self._pieces - 1), pieces):
-            path = mesh.tube(points[piece * PIECE : (piece + 1) * PIECE + 1], LINE)
-            self._draw_path((*TRAIL, str(piece)), path, colors.TRAIL)
+            self._draw_path((*TRAIL, str(piece)), points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
         self._pieces = pieces
 
-    def _draw_path(self, at: Path, tube: Surface, color: Color) -> None:
-        if len(tube.faces):
-            self._stage.draw(at, plain(tube, color, glow=0.4), shadow=False)
+    def _draw_path(self, at: Path, points: np.ndarray, color: Color) -> None:
+        if (thing := _tube(points, color)) is not None:
+            self._stage.draw(at, thing, shadow=False)
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
@@ -264,6 +262,12 @@ class Scenery:
         return lowest
 
 
+def _tube(points: np.ndarray, color: Color) -> Object | None:
+    """A drawn trajectory; None for one without length."""
+    tube = mesh.tube(points, LINE)
+    return plain(tube, color, glow=0.4) if len(tube.faces) else None
+
+
 def _box_of(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
     """The corners of the box around a surface along the world's axes, m; None for an empty one."""
     return (surface.vertices.min(axis=0), surface.vertices.max(axis=0)) if len(surface.vertices) else None
@@ -294,10 +298,7 @@ def _height_of(plane: Pose, x: float, y: float) -> float | None:
 
 
 # What stands in a ring.
-PIN = (
-    mesh.frustum(0.0, 0.13, 0.4).at(Pose((0.0, 0.0, 0.75))),
-    mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))),
-)
+PIN = (mesh.frustum(0.0, 0.13, 0.4).at(Pose((0.0, 0.0, 0.75))), mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))))
 FLAG = (
     mesh.frustum(0.025, 0.025, 1.5).at(Pose((0.0, 0.0, 0.75))),
     mesh.box((0.55, 0.02, 0.34)).at(Pose((0.28, 0.0, 1.33))),

@@ -95,12 +95,7 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
             )
         )
     if missing := len(found) - len(minimal):
-        lead.append(
-            say(
-                f"{count(missing, 'cell')} not certified: the tables say why.",
-                notice=True,
-            )
-        )
+        lead.append(say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True))
     return lead
 
 

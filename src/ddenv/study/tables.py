@@ -47,10 +47,7 @@ def chart(group: Group) -> str:
 
     at = scale(last, most, HEIGHT)
     height = HEIGHT + LINE * (len(named) + bool(others)) + 4
-    parts = [
-        opening(height),
-        *axes(at, last, most),
-    ]
+    parts = [opening(height), *axes(at, last, most)]
     for row in others:
         parts += _lines(row, at, "faint")
     for number, row in enumerate(named):
