@@ -211,7 +211,7 @@ class Theirs:
 
 
 @cache
-def paper() -> dict[str, Any]:
+def paper_tables() -> dict[str, Any]:
     """The paper's tables by the names of their scenarios: `table` is the number, `rows` has what `Theirs` has for each pair."""
     return dict(yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text()))
 
@@ -220,7 +220,7 @@ def theirs(cell: Cell) -> Theirs | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
     if cell.method.algorithm != "ddenv" or cell.slices:
         return None
-    rows = paper()[cell.scenario.name]["rows"] if cell.scenario.name in paper() else {}
+    rows = paper_tables()[cell.scenario.name]["rows"] if cell.scenario.name in paper_tables() else {}
     return Theirs(**rows[cell.method.pair]) if cell.method.pair in rows else None
 
 

@@ -15,7 +15,7 @@ from ddenv.page.step_chart import LEFT, At, axes, opening, path, scale, steps
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import Method, file_name
-from ddenv.study.results import Found, Group, Row, least_of, least_to_find, least_to_show, paper, spread, theirs
+from ddenv.study.results import Found, Group, Row, least_of, least_to_find, least_to_show, paper_tables, spread, theirs
 from ddenv.study.study_folder import run_path
 from ddenv.text import count, plain
 
@@ -141,7 +141,7 @@ def section(folder: Path, group: Group) -> Section:
     models = f", {count(group.models, 'model')}" if group.models else ""
     title = f"{name}{models}"
     if _has_theirs(group):
-        title += f" (Table {paper()[group.scenario.name]['table']} of the paper)"
+        title += f" (Table {paper_tables()[group.scenario.name]['table']} of the paper)"
     blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
     blocks += [numbers(group), *_slices(group)]
     blocks += _problems(group)
