@@ -275,8 +275,8 @@ class Fan:
 def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats, Integers, Integers]:
     """Casts the beams of one scan from `origin` (3,) m, in the world frame; `axes` (3, 3) are the lidar's axes, as rows.
 
-    Returns how far the beams go, (B,) m, infinite where they hit nothing; and the numbers (N,) of the beams that end on a shape, with
-    those of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
+    Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and those
+    of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
     """
     local = _seen(shapes, origin, axes)
     # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two axes.

@@ -118,7 +118,7 @@ class Run:
             if self.reached:
                 self.reached.look(pose, self._speed(self.reached.radius))
             if self.watch:
-                self.watch.look(pose[:2], sleep.awake_boxes())
+                self.watch.look(pose[:2], sleep.awake_links()[:2])
             truth = self._truth(pose)
             end = self._end(pose, tick)
             if end is not None or tick.record:

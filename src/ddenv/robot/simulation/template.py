@@ -19,8 +19,8 @@ from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Progress, RunResult
-from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.beams import Obstacles
+from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.autonomy import Autonomy, setup_of
