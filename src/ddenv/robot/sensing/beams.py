@@ -8,7 +8,7 @@ tested only with the beams that point towards the box around it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
@@ -275,8 +275,8 @@ class Fan:
 def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats, Integers, Integers]:
     """Casts the beams of one scan from `origin` (3,) m, in the world frame; `axes` (3, 3) are the lidar's axes, as rows.
 
-    Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and those
-    of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
+    Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and
+    those of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
     """
     local = _seen(shapes, origin, axes)
     # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two axes.
@@ -328,7 +328,8 @@ def _cross(fan: Fan, shapes: Shapes, local: Floats, counts: Integers, beams: Int
     ends = [0, *counts.cumsum().tolist()]
     parts = [slice(ends[first], ends[last]) for first, last in pairwise(shapes.firsts)]
     lengths = shapes.lengths.repeat(counts)[parts[PILL]]
-    for part, crossing in zip(parts, (cube, ball, tube, partial(pill, lengths=lengths)), strict=False):
+    crossings: tuple[Callable[[Floats, Floats], Interval], ...] = (cube, ball, tube, partial(pill, lengths=lengths))
+    for part, crossing in zip(parts, crossings, strict=False):
         if part.start < part.stop:
             enter[part], leave[part] = crossing(start[:, part], way[:, part])
     for number, facets in shapes.facets.items():

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
-from ddenv.robot.controllers import BUILT_IN, Heard, Listener, controllers
+from ddenv.robot.controllers import BUILT_IN, Listener, controllers
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
@@ -19,11 +19,10 @@ from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
 from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
-from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
@@ -219,12 +218,10 @@ class Template:
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
-        controller = self._controllers(setup)
+        controller, skid = self._controllers(setup), scenario.controller.skid
         if listener is not None:
-            controller = Heard(controller, setup, listener)
-        return Autonomy(
-            scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
-        )
+            listener.begin(setup)
+        return Autonomy(scenario.sensors, suite, self._drive, skid, self._clock, setup.start, controller, listener)
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
