@@ -22,7 +22,7 @@ from ddenv.robot.external.process import BEGIN, Ended, running, watch
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import Progress, RunResult
 from ddenv.world.command import command_words, filled, has_placeholder, start_folder
-from ddenv.world.files.resolve import ENVIRONMENT
+from ddenv.world.files.resources import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
