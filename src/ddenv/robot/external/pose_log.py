@@ -34,7 +34,7 @@ class PoseLog:
     """Reads a log piece by piece. It keeps the first row, a row every 0.1 s, and the last one.
 
     Blank lines and lines that begin with # are skipped; the first line may be a header. `progress` gets each row that is kept,
-    except for the last.
+    except for the last. `size` is the number of bytes so far.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
@@ -44,17 +44,12 @@ class PoseLog:
         self._began = False
         self._rows: list[Row] = []
         self._last: Row | None = None
-        self._size = 0
+        self.size = 0
         self._problem = ""
-
-    @property
-    def size(self) -> int:
-        """The number of bytes so far."""
-        return self._size
 
     def add(self, piece: bytes) -> None:
         """Reads the next bytes. After a mistake, which `finish` reports, nothing more is read."""
-        self._size += len(piece)
+        self.size += len(piece)
         if self._problem:
             return
         *lines, self._rest = (self._rest + piece).split(b"\n")
@@ -83,7 +78,7 @@ class PoseLog:
             self.add(rest + b"\n")
         if self._problem:
             raise BadLog(self._problem)
-        if self._size > MOST_BYTES:
+        if self.size > MOST_BYTES:
             raise BadLog(TOO_LARGE)
         if not self._rows:
             raise BadLog(f"the pose log has no rows; {EXPECTED}")

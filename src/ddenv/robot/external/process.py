@@ -78,7 +78,6 @@ class Complaints:
 class Running:
     """A command under its supervisor. `line` is the socket to the supervisor, `stdout` and `stderr` are the command's output."""
 
-    supervisor: subprocess.Popen[bytes]
     line: socket.socket
     stdout: IO[bytes]
     stderr: IO[bytes]
@@ -114,7 +113,7 @@ def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], 
         assert stdout is not None and stderr is not None
         with stdout, stderr:
             try:
-                yield Running(supervisor, ours, stdout, stderr)
+                yield Running(ours, stdout, stderr)
             finally:
                 ours.close()
                 _end(supervisor)

@@ -152,7 +152,7 @@ class Template:
                 movers = [self._models[body.name] for body in kept]
                 lidar = Lidar(self._scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
             reached = None
-            if self._slices and self._sleeping and self._repertoire.learnt:
+            if self._slices and self._sleeping and self._repertoire.usual is not None:
                 reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
             run = Run(
                 context=self._context,
@@ -183,9 +183,7 @@ class Template:
 
     def learn_piles(self) -> None:
         """Finds out how the piles of the whole world move, if that is unknown. Raises LeftRegion."""
-        if not self._repertoire.learnt:
-            self._context.presence.remove(frozenset())
-            self._rehearsals.learn(self._names)
+        self._rehearsals.learn(self._names)
 
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
         """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
@@ -213,7 +211,7 @@ class Template:
 
     def _carriers(self, present: frozenset[str]) -> frozenset[str]:
         """What those models are tied to that are always kept, among the models `present`."""
-        ties = self._repertoire.ties if self._repertoire.learnt else {}
+        ties = self._repertoire.ties
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
