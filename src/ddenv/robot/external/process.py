@@ -58,9 +58,6 @@ class Complaints:
     def add(self, piece: bytes) -> None:
         self._end = (self._end + piece)[-KEPT:]
 
-    def last_line(self) -> str:
-        return "".join(self.last_lines(1))
-
     def last_lines(self, most: int) -> list[str]:
         """At most so many lines that are not empty, each shortened."""
         lines = [line.strip() for line in self._end.decode(errors="replace").splitlines()]
@@ -115,17 +112,13 @@ def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], 
             try:
                 yield Running(ours, stdout, stderr)
             finally:
+                # The supervisor ends by itself once its socket is closed.
                 ours.close()
-                _end(supervisor)
-
-
-def _end(supervisor: subprocess.Popen[bytes]) -> None:
-    """Waits for the supervisor, which ends by itself once its socket is closed."""
-    try:
-        supervisor.wait(STOP_WAIT)
-    except subprocess.TimeoutExpired:
-        supervisor.kill()
-        supervisor.wait()
+                try:
+                    supervisor.wait(STOP_WAIT)
+                except subprocess.TimeoutExpired:
+                    supervisor.kill()
+                    supervisor.wait()
 
 
 def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_much: Callable[[], str]) -> Ended:
@@ -157,7 +150,7 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             for _ in range(MOST_LEFT // PIECE):
                 taker(os.read(stream.fileno(), PIECE))
     code, reason = _read(said)
-    return Ended(None if why else code, why or reason, complaints.last_line(), complaints.is_exception())
+    return Ended(None if why else code, why or reason, "".join(complaints.last_lines(1)), complaints.is_exception())
 
 
 def _look(selector: selectors.BaseSelector, command: Running) -> str | None:

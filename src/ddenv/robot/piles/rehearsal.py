@@ -105,14 +105,10 @@ class Repertoire:
         self._by_use[known] = known.size
         self._size += known.size
         while self._size > MEMORY:
-            self._forget(next(iter(self._by_use)))
+            oldest = next(iter(self._by_use))
+            self._size -= self._by_use.pop(oldest)
+            self._known[oldest.names].remove(oldest)
         return known
-
-    def _forget(self, known: Known) -> None:
-        self._size -= self._by_use.pop(known)
-        self._known[known.names].remove(known)
-        if not self._known[known.names]:
-            del self._known[known.names]
 
     def _near(self, motions: Iterable[Motion], margin: float) -> Iterable[str]:
         """The static models that a pile could have touched while it moved."""

@@ -115,11 +115,6 @@ class Sleep:
         low, high = self._motion.low, self._motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
 
-    @property
-    def anything_awake(self) -> bool:
-        """Whether a kept model is simulated."""
-        return self._awake.size > 0 and bool(self._awake.any())
-
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
         """The K links that are simulated, at the last tick: corners (K, 3) m and (K, 3) m of the boxes around them, and bounds of
         their speeds (K,), m/s.

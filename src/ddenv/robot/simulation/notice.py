@@ -14,7 +14,7 @@ from ddenv.arrays import Booleans, Floats, Objects
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import bounds, filled_bounds, stacked
-from ddenv.world.model import Model, Plane, World, still_links
+from ddenv.world.model import Plane, World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
@@ -191,14 +191,10 @@ class Surroundings:
 
 def still_boxes(world: World) -> list[Still]:
     """The boxes around all parts of `world` that never move."""
-    return [(model.name, *box) for model in world.models for box in _boxes(model)]
-
-
-def _boxes(model: Model) -> Iterator[tuple[Floats, Floats, bool]]:
-    """The lowest and the highest corner (3,) of each box around the parts of `model` that never move, and if it is visible."""
-    collisions = [collision for link in still_links(model) for collision in link.collisions]
-    if (box := bounds(collisions)) is not None:
-        yield *box, True
-    for collision in collisions:
-        if isinstance(collision.shape, Plane):
-            yield *filled_bounds(collision), False
+    found: list[Still] = []
+    for model in world.models:
+        collisions = [collision for link in still_links(model) for collision in link.collisions]
+        if (box := bounds(collisions)) is not None:
+            found.append((model.name, *box, True))
+        found += [(model.name, *filled_bounds(one), False) for one in collisions if isinstance(one.shape, Plane)]
+    return found
