@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ddenv.robot.external import pose_log
-from ddenv.robot.external.pose_log import BadLog, PoseLog
+from ddenv.robot.external.simulator import BadLog, PoseLog
 
 ROW = "1,2,3,4,0,0,0,1\n"
 
