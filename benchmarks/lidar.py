@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.world import scenario
 from ddenv.world.model import Box, Collision, Cylinder, Link, Model, Plane, Shape, World
 from ddenv.world.pose import Pose

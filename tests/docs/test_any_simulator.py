@@ -8,8 +8,7 @@ import sys
 import pytest
 import yaml
 
-from ddenv.robot.external.pose_log import COLUMNS, EXPECTED, TOO_LARGE, PoseLog
-from ddenv.robot.external.simulator import ExternalSimulator
+from ddenv.robot.external.simulator import COLUMNS, EXPECTED, TOO_LARGE, ExternalSimulator, PoseLog
 from ddenv.robot.external.supervise import GRACE
 from ddenv.runs.subject import load_parts
 from ddenv.world.command import PLACEHOLDERS

@@ -17,10 +17,9 @@ from mjcf import Unsupported, mjcf, named
 from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import ControllerFailed, controllers
+from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, Truth, setup_of
+from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.sensing.obstacles import Obstacles
-from ddenv.robot.sensing.sensors import SensorSuite, Truth
-from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import model_bounds
 from ddenv.world.load import load_scenario

@@ -248,20 +248,3 @@ class Listener(Protocol):
 
     def hear(self, reading: Reading, command: Twist | WheelSpeeds) -> None:
         """What the controller was given, and its command."""
-
-
-class Heard:
-    """A controller with a listener."""
-
-    def __init__(self, controller: Drives, setup: Setup, listener: Listener) -> None:
-        self._controller, self._listener = controller, listener
-        listener.begin(setup)
-
-    @property
-    def arrived(self) -> bool:
-        return bool(getattr(self._controller, "arrived", False))
-
-    def step(self, reading: Reading) -> Twist | WheelSpeeds:
-        command = self._controller.step(reading)
-        self._listener.hear(reading, command)
-        return command

@@ -13,8 +13,7 @@ from ddenv.runs.nearest import removed_in_passing
 from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.world.access import Missing, Unusable, write_file
-from ddenv.world.files.resolve import find
-from ddenv.world.files.resources import Resources
+from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import parse_model, parse_world

@@ -8,7 +8,6 @@ import pytest
 
 from ddenv.robot.drake import region
 from ddenv.robot.result import RunResult
-from ddenv.robot.sensing import lidar
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose
@@ -103,15 +102,6 @@ def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
         assert "stop" in one._whole._context.built.static
     assert found == expected
     assert expected[0][3] != expected[1][3]
-
-
-def test_the_lidar_gathers_what_is_in_its_range_with_the_same_bits(variants, world, monkeypatch):
-    names = frozenset(world.elements())
-    monkeypatch.setattr(lidar, "AWAY", 1e9)
-    expected = bits(variants(EVERYTHING).run(names, seed=1))
-    assert {"crate 2 1", "pushed"} <= expected[-1][0].keys()
-    monkeypatch.setattr(lidar, "AWAY", 0.3)
-    assert bits(variants(EVERYTHING).run(names, seed=1)) == expected
 
 
 def test_what_rests_on_what_is_found_where_a_pile_leaves_the_region(variants, world):

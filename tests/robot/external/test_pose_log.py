@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ddenv.robot.external import pose_log
-from ddenv.robot.external.pose_log import BadLog, PoseLog
+from ddenv.robot.external import simulator
+from ddenv.robot.external.simulator import BadLog, PoseLog
 
 ROW = "1,2,3,4,0,0,0,1\n"
 
@@ -82,7 +82,7 @@ def test_nonsense_is_reported_with_its_line(text, complaint):
 
 
 def test_a_log_that_never_ends_is_too_large_and_takes_no_memory(monkeypatch):
-    monkeypatch.setattr(pose_log, "MOST_BYTES", 1000)
+    monkeypatch.setattr(simulator, "MOST_BYTES", 1000)
     log = PoseLog()
     for _ in range(100):
         log.add(ROW.encode())

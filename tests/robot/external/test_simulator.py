@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.external import pose_log, process
+from ddenv.robot.external import process, simulator
 from ddenv.world.load import load_scenario
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA, ROOT
@@ -172,7 +172,7 @@ def test_an_exception_is_no_failure_of_the_robot(simulator_of, code, outcome):
 
 
 def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkeypatch):
-    monkeypatch.setattr(pose_log, "MOST_BYTES", 3_000_000)
+    monkeypatch.setattr(simulator, "MOST_BYTES", 3_000_000)
     monkeypatch.setattr("ddenv.robot.external.simulator.MOST_BYTES", 3_000_000)
     flood = """
         import os, sys

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world import scenario
-from ddenv.world.files.hull import convex_hull
+from ddenv.world.files.meshes import convex_hull
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import wedge

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot.sensing import estimate as filter_module
-from ddenv.robot.sensing.estimate import Filter
-from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.robot.sensing import autonomy as filter_module
+from ddenv.robot.sensing.autonomy import Filter, SensorSuite, Truth
 from ddenv.world.pose import wrap
 from ddenv.world.scenario import Sensors
 

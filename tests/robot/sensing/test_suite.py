@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.robot.sensing.autonomy import SensorSuite, Truth
 from ddenv.world.scenario import Sensors
 
 TRUTH = Truth(0.5, 0.01, -0.02, 0.2, (1.0, 2.0))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.notice import Notice, first_in_view, in_view
+from ddenv.robot.simulation.notice import Notice, in_view
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
@@ -295,19 +295,6 @@ def test_in_view_agrees_with_looking_at_many_points_of_each_box():
     assert 30 < seen.sum() < 270
     assert (seen | ~some(view_range, view_angle)).all()
     assert (~seen | some(view_range + 0.15, view_angle + 0.1)).all()
-
-
-def test_the_first_row_in_view_is_found_whether_the_robot_moves_or_the_box():
-    rows = 3 * 32 + 5
-    eyes, headings = np.zeros((rows, 3)), np.zeros(rows)
-    eyes[:, 0] = np.arange(rows) * 0.1
-    low, high = boxes((5.55, -0.1, 6, 0.1), (50, 0, 51, 1), (0, 1, 1, 2))
-    still = [np.broadcast_to(side, (rows, 3, 3)) for side in (low, high)]
-    # 1 m before the box at 5.55 m; the second is never reached, the third is passed, on the left.
-    assert first_in_view(*still, eyes, headings, 1.0, math.pi).tolist() == [46, -1, 0]
-    moving = [side - eyes[:, None] for side in still]
-    assert first_in_view(*moving, np.zeros((rows, 3)), headings, 1.0, math.pi).tolist() == [46, -1, 0]
-    assert first_in_view(*still, eyes, headings, 0.9, math.pi).tolist() == [47, -1, -1]
 
 
 def reach_of(robot):

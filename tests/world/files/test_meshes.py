@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.access import Unusable
-from ddenv.world.files import hull, meshes
+from ddenv.world.files import meshes
 from ddenv.world.files.meshes import SUFFIXES, read_parts
 from tests.world.files.mesh_files import BOX, bounds, dae, gltf, mesh_of, solid
 
@@ -217,11 +217,11 @@ def test_the_hull_of_many_points_is_that_of_all(monkeypatch):
         "a line": ball * [5, 0, 0],
         "a box with a needle": np.vstack([spread.uniform(-1, 1, (3000, 3)), [[0.3, 0.2, 9]]]),
     }
-    usual = {name: hull.convex_hull(points) for name, points in shapes.items()}
-    monkeypatch.setattr(hull, "MANY_POINTS", 1000)
-    monkeypatch.setattr(hull, "CHUNK", 700)
+    usual = {name: meshes.convex_hull(points) for name, points in shapes.items()}
+    monkeypatch.setattr(meshes, "MANY_POINTS", 1000)
+    monkeypatch.setattr(meshes, "CHUNK", 700)
     for name, points in shapes.items():
-        vertices, faces = hull.convex_hull(points)
+        vertices, faces = meshes.convex_hull(points)
         assert np.array_equal(vertices, usual[name][0]), name
         # Faces in one plane can be cut in several ways.
         assert len(faces) == len(usual[name][1]), name

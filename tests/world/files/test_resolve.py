@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.access import Missing, Unusable, read
-from ddenv.world.files.resolve import ENVIRONMENT, PACKAGES, PREFIXES, find, model_file, model_named, search_folders
+from ddenv.world.files.resources import ENVIRONMENT, PACKAGES, PREFIXES, find, model_file, model_named, search_folders
 from tests.tiers import examples
 
 

@@ -4,8 +4,7 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.world.extent import model_bounds
-from ddenv.world.files.resolve import ENVIRONMENT, PACKAGES, PREFIXES
-from ddenv.world.files.resources import Resources
+from ddenv.world.files.resources import ENVIRONMENT, PACKAGES, PREFIXES, Resources
 from ddenv.world.model import Box, Cylinder, Plane
 from ddenv.world.sdf.read import parse_world
 from ddenv.world.sdf.standin import KNOWN_SIZES

@@ -39,7 +39,6 @@ class Presence:
         self._free += [twin.geometry for twin in built.twins.values()]
         self._removed: frozenset[str] = frozenset()
         self._kept = built.static
-        self._all_kept: GeometrySet | None = None
         self.part(tuple(built.moving.values()), ())
 
     def remove(self, removed: frozenset[str]) -> None:
@@ -53,15 +52,8 @@ class Presence:
         if back:
             self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._movers))
         if gone or back:
-            self._removed, self._all_kept = removed, None
+            self._removed = removed
             self._kept = {name: geometry for name, geometry in self._built.static.items() if name not in removed}
-
-    @property
-    def _ground(self) -> GeometrySet:
-        """Everything that never moves and is kept."""
-        if self._all_kept is None:
-            self._all_kept = _set(self._kept.values())
-        return self._all_kept
 
     def _static(self, names: frozenset[str]) -> list[tuple[GeometryId, ...]]:
         return [geometry for name in names if (geometry := self._built.static.get(name))]
@@ -90,8 +82,7 @@ class Presence:
             if robot:
                 yield mine, self._robot
             # A model does not touch its own links that never move: a door its frame.
-            not_its_own = (geometry for name, geometry in self._kept.items() if name != body.name)
-            yield mine, _set(not_its_own) if self._built.static.get(body.name) else self._ground
+            yield mine, _set(geometry for name, geometry in self._kept.items() if name != body.name)
             for one, other in body.own_pairs:
                 yield GeometrySet(list(one)), GeometrySet(list(other))
 

@@ -58,9 +58,6 @@ class Complaints:
     def add(self, piece: bytes) -> None:
         self._end = (self._end + piece)[-KEPT:]
 
-    def last_line(self) -> str:
-        return "".join(self.last_lines(1))
-
     def last_lines(self, most: int) -> list[str]:
         """At most so many lines that are not empty, each shortened."""
         lines = [line.strip() for line in self._end.decode(errors="replace").splitlines()]
@@ -78,7 +75,6 @@ class Complaints:
 class Running:
     """A command under its supervisor. `line` is the socket to the supervisor, `stdout` and `stderr` are the command's output."""
 
-    supervisor: subprocess.Popen[bytes]
     line: socket.socket
     stdout: IO[bytes]
     stderr: IO[bytes]
@@ -114,19 +110,15 @@ def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], 
         assert stdout is not None and stderr is not None
         with stdout, stderr:
             try:
-                yield Running(supervisor, ours, stdout, stderr)
+                yield Running(ours, stdout, stderr)
             finally:
+                # The supervisor ends by itself once its socket is closed.
                 ours.close()
-                _end(supervisor)
-
-
-def _end(supervisor: subprocess.Popen[bytes]) -> None:
-    """Waits for the supervisor, which ends by itself once its socket is closed."""
-    try:
-        supervisor.wait(STOP_WAIT)
-    except subprocess.TimeoutExpired:
-        supervisor.kill()
-        supervisor.wait()
+                try:
+                    supervisor.wait(STOP_WAIT)
+                except subprocess.TimeoutExpired:
+                    supervisor.kill()
+                    supervisor.wait()
 
 
 def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_much: Callable[[], str]) -> Ended:
@@ -158,7 +150,7 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             for _ in range(MOST_LEFT // PIECE):
                 taker(os.read(stream.fileno(), PIECE))
     code, reason = _read(said)
-    return Ended(None if why else code, why or reason, complaints.last_line(), complaints.is_exception())
+    return Ended(None if why else code, why or reason, "".join(complaints.last_lines(1)), complaints.is_exception())
 
 
 def _look(selector: selectors.BaseSelector, command: Running) -> str | None:

@@ -48,7 +48,13 @@ def run(words: list[str], worker: socket.socket) -> str:
     signal.signal(signal.SIGCHLD, lambda *_: None)
     prctl(PR_SET_CHILD_SUBREAPER, 1)
     try:
-        process = subprocess.Popen(words, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=die_with_us)
+        process = subprocess.Popen(
+            words,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+            # In the command's process, before the command runs: it dies with us.
+            preexec_fn=lambda: prctl(PR_SET_PDEATHSIG, signal.SIGKILL),
+        )
     except OSError as error:
         return f"error {error.errno}"
     sources: list[socket.socket | int] = [worker, woken]
@@ -99,11 +105,6 @@ def children() -> list[int]:
             if int(fields[1]) == os.getpid():
                 found.append(int(entry.name))
     return found
-
-
-def die_with_us() -> None:
-    """Runs in the command's process before the command does."""
-    prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def prctl(option: int, value: int) -> None:

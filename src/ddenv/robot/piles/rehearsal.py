@@ -64,28 +64,16 @@ class Repertoire:
             for model in world.models
             if any(link.collisions for link in still_links(model))
         }
-        # The static models near each pile of the whole world.
-        self._usual: dict[tuple[str, ...], frozenset[str]] | None = None
+        # The static models near each pile of the whole world; None while that is unknown.
+        self.usual: dict[tuple[str, ...], frozenset[str]] | None = None
 
     @property
     def ties(self) -> dict[str, frozenset[str]]:
         """What each model of a pile is tied to: the rest of its pile, and the static models near its motion.
 
-        Without these the pile would move otherwise than in the whole world.
-
-        Call it after `Rehearsals.learn`.
+        Without these the pile would move otherwise than in the whole world. Empty while `usual` is unknown.
         """
-        assert self._usual is not None
-        return {name: near.union(names) - {name} for names, near in self._usual.items() for name in names}
-
-    def learn(self, piles: Iterable[Known]) -> None:
-        """Stores which piles the whole world has."""
-        self._usual = {known.names: known.near for known in piles}
-
-    @property
-    def learnt(self) -> bool:
-        """Whether it knows the piles of the whole world."""
-        return self._usual is not None
+        return {name: near.union(names) - {name} for names, near in (self.usual or {}).items() for name in names}
 
     def unusual(self, piles: Iterable[Known], present: frozenset[str], held: frozenset[str]) -> frozenset[str]:
         """The models of those among `piles` that do not move as in the whole world, and the static ones near them.
@@ -93,7 +81,7 @@ class Repertoire:
         `present` are the models that are kept. A pile with one of `held`, which have no twin, counts as well: where such a door was
         played back while it lay against a falling pile, the robot's last bits were not those without the pile. Why is not known.
         """
-        usual = self._usual or {}
+        usual = self.usual or {}
         other = (
             known
             for known in piles
@@ -117,14 +105,10 @@ class Repertoire:
         self._by_use[known] = known.size
         self._size += known.size
         while self._size > MEMORY:
-            self._forget(next(iter(self._by_use)))
+            oldest = next(iter(self._by_use))
+            self._size -= self._by_use.pop(oldest)
+            self._known[oldest.names].remove(oldest)
         return known
-
-    def _forget(self, known: Known) -> None:
-        self._size -= self._by_use.pop(known)
-        self._known[known.names].remove(known)
-        if not self._known[known.names]:
-            del self._known[known.names]
 
     def _near(self, motions: Iterable[Motion], margin: float) -> Iterable[str]:
         """The static models that a pile could have touched while it moved."""
@@ -147,11 +131,10 @@ class Rehearsals:
         self._apart, self._to_robot = self._start_gaps()
 
     def learn(self, present: frozenset[str]) -> None:
-        """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has.
-
-        Call it after `Presence.remove` of nothing.
-        """
-        self._repertoire.learn(self.piles(self._bodies, present))
+        """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has."""
+        if self._repertoire.usual is None:
+            self._context.presence.remove(frozenset())
+            self._repertoire.usual = {known.names: known.near for known in self.piles(self._bodies, present)}
 
     def piles(self, kept: Sequence[Body], present: frozenset[str]) -> list[Known]:
         """All piles of `kept` that start away from the robot, in a world that keeps the models `present`.

@@ -20,7 +20,6 @@ from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.motion import NEAR, SLOW, Links, Motion, Script, Stillness, gaps, spread, tight_gaps
 from ddenv.world.extent import Bounds
 
-NO_BOXES = np.empty((0, 3)), np.empty((0, 3))
 TOUCH = 0.02  # m; models this near to each other may touch
 # A model at rest wakes when the robot is this near, m: it has a twin that the robot can touch.
 CLOSE = 0.01
@@ -96,7 +95,9 @@ class Sleep:
 
     def tick(self, step: int) -> None:
         """Applies the rules. Call it at each tick of the clock, from the start on; `step` is the plant's step."""
-        if len(self._kept) and not self._never:
+        if self._never:
+            self._look(np.arange(len(self._kept)), 0.0)
+        elif len(self._kept):
             seconds = (step - self._now) * self._step
             self._play()
             self._look(np.flatnonzero(self._awake), seconds)
@@ -111,22 +112,8 @@ class Sleep:
 
     def boxes(self) -> Bounds:
         """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at the last tick."""
-        if self._never:
-            self._look(np.arange(len(self._kept)), 0.0)
         low, high = self._motion.low, self._motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
-
-    def awake_boxes(self) -> Bounds:
-        """As `boxes`, for the models alone that are simulated."""
-        if not self._awake.any():
-            return NO_BOXES
-        low, high = self.boxes()
-        return low[self._awake], high[self._awake]
-
-    @property
-    def anything_awake(self) -> bool:
-        """Whether a kept model is simulated."""
-        return self._awake.size > 0 and bool(self._awake.any())
 
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
         """The K links that are simulated, at the last tick: corners (K, 3) m and (K, 3) m of the boxes around them, and bounds of
@@ -142,8 +129,6 @@ class Sleep:
 
     def poses(self) -> tuple[Floats, Floats]:
         """The poses of all L links of the kept models at the last tick: places (L, 3) m and rotations (L, 3, 3)."""
-        if self._never:
-            self._look(np.arange(len(self._kept)), 0.0)
         return self._motion.places, self._motion.turns
 
     def state(self) -> Floats:

@@ -1,21 +1,243 @@
-"""Casts the beams of a lidar: how far each one goes until it hits a shape.
+"""The collision shapes of a world as arrays, and how far the beams of a lidar go until they hit one.
 
-All beams of a scan start in one point and lie in one plane, the x-y plane of the lidar. Each shape is tested only with the beams
-that point towards the box around it.
+Each shape has its own frame, in which it lies between -1 and 1 along each axis: there all boxes are the same cube, and all spheres
+and ellipsoids the same ball. All beams of a scan start in one point and lie in one plane, the x-y plane of the lidar. Each shape is
+tested only with the beams that point towards the box around it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import pairwise
 
 import numpy as np
 
 from ddenv.arrays import Floats, Integers
-from ddenv.robot.sensing.obstacles import HULL, PILL, SPARE, Interval, Shapes, ball, cube, pill, tube
+from ddenv.world.extent import shape_bounds
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World, still_links
+from ddenv.world.pose import HERE, Pose, Vector, vector
 from ddenv.world.scenario import Lidar
 
-CROSSINGS = (cube, ball, tube)
+# The kinds of shapes that are cast in the same way, in the order in which they are sorted.
+CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
+# Where each kind begins in a sorted array of kinds, and where the last one ends.
+BOUNDS = np.arange(len(KINDS) + 1)
+# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
+# larger than rounding errors.
+SPARE = 1e-6
+# A plane is the top of a cube of this size, m: what lies below it is inside.
+PLANE = 2e4
+# The minimum half thickness of a shape, m.
+THINNEST = 1e-9
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """N shapes, sorted by kind, at some instant.
+
+    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
+    along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
+    half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
+    in units of their radius, `facets` the faces of meshes by the number of the shape.
+    """
+
+    kinds: Integers
+    centers: Floats
+    frames: Floats
+    squares: Floats
+    reaches: Floats
+    lengths: Floats
+    facets: Mapping[int, Facets]
+
+    @cached_property
+    def firsts(self) -> list[int]:
+        """Where each kind begins, and where the last one ends."""
+        firsts: list[int] = self.kinds.searchsorted(BOUNDS).tolist()
+        return firsts
+
+    def take(self, rows: Integers) -> Shapes:
+        """The shapes `rows` (K,) alone, in this order."""
+        return Shapes(
+            kinds=self.kinds[rows],
+            centers=self.centers.take(rows, axis=1),
+            frames=self.frames.take(rows, axis=2),
+            squares=self.squares.take(rows, axis=1),
+            reaches=self.reaches[rows],
+            lengths=self.lengths[rows],
+            facets={new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets},
+        )
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """All N collision shapes of a world, sorted by kind.
+
+    `names` are the world's models, `owners` (N,) the index of each shape's model in `names`. `links` (N,) is the index of the
+    shape's link in its model, -1 for a shape that never moves. `shapes` on moving links are still in their link's frame.
+    """
+
+    names: tuple[str, ...]
+    owners: Integers
+    links: Integers
+    shapes: Shapes
+
+    @classmethod
+    def of(cls, world: World) -> Obstacles:
+        found = [(owner, *one) for owner, model in enumerate(world.models) for one in _shapes(model)]
+        found.sort(key=lambda one: _kind(one[2]))
+        owners, links, shapes, poses = zip(*found, strict=True) if found else ((), (), (), ())
+        sizes = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
+        halves = sizes.T.copy()
+        squares = halves * halves
+        turns = np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0)
+        arrays = Shapes(
+            kinds=np.array([_kind(shape) for shape in shapes], dtype=int),
+            centers=np.array([pose.position for pose in poses]).reshape(-1, 3).T.copy(),
+            frames=turns / halves,
+            squares=squares,
+            reaches=np.sqrt(squares.sum(axis=0)) + SPARE,
+            lengths=sizes[:, 2] / sizes[:, 0],
+            facets={
+                number: Facets.of(shape, np.array(_extent(shape)[0]), sizes[number])
+                for number, shape in enumerate(shapes)
+                if isinstance(shape, Mesh)
+            },
+        )
+        names = tuple(model.name for model in world.models)
+        return cls(names, np.array(owners, dtype=int), np.array(links, dtype=int), arrays)
+
+
+def _shapes(model: Model) -> list[tuple[int, Shape, Pose]]:
+    """A model's shapes: the index of the link (-1 if it never moves), the shape, and its pose in the link or in the world."""
+    still = {link.name for link in still_links(model)}
+    found = []
+    for number, link in enumerate(model.links):
+        fixed = link.name in still
+        frame = Pose() if fixed else link.pose.inverse()
+        for one in link.collisions:
+            found.append((-1 if fixed else number, one.shape, frame @ one.pose @ Pose(_extent(one.shape)[0])))
+    return found
+
+
+def _kind(shape: Shape) -> int:
+    match shape:
+        case Box() | Plane():
+            return CUBE
+        case Sphere() | Ellipsoid():
+            return BALL
+        case Cylinder():
+            return TUBE
+        case Capsule():
+            return PILL
+        case Mesh():
+            return HULL
+    raise TypeError(type(shape).__name__)
+
+
+def _extent(shape: Shape) -> tuple[Vector, Vector]:
+    """Of the box around `shape` along its own axes: the middle, and half the size, m."""
+    if isinstance(shape, Plane):
+        return (0.0, 0.0, -PLANE / 2), (PLANE / 2, PLANE / 2, PLANE / 2)
+    low, high = shape_bounds(shape, HERE)
+    return vector((low + high) / 2), vector((high - low) / 2)
+
+
+# Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
+NEVER = 1e-200
+# The minimum half length of a capsule's straight part, as a part of its radius.
+SHORTEST = 1e-9
+
+Interval = tuple[Floats, Floats]
+
+
+def cube(start: Floats, way: Floats) -> Interval:
+    """The cube from -1 to 1; with fewer than three rows, what lies between -1 and 1 along these axes alone."""
+    metres = 1.0 / (way + NEVER)
+    middle, half = start * metres, np.abs(metres)
+    return -(middle + half).min(axis=0), (half - middle).min(axis=0)
+
+
+def ball(start: Floats, way: Floats) -> Interval:
+    """The ball of radius 1; with two rows, the endless cylinder about the third axis."""
+    speed = _dot(way, way) + NEVER
+    nearest = -_dot(start, way) / speed
+    # From the point of the beam nearest to the centre: seen from a far start, digits would be lost.
+    point = start + nearest * way
+    inside = 1.0 - _dot(point, point)
+    half = np.sqrt(np.maximum(inside, 0.0) / speed)
+    return nearest - half, np.where(inside < 0, -np.inf, nearest + half)
+
+
+def tube(start: Floats, way: Floats) -> Interval:
+    """The cylinder of radius 1 about the third axis, with its end faces."""
+    enter, leave = ball(start[:2], way[:2])
+    below, above = cube(start[2:], way[2:])
+    return np.maximum(enter, below), np.minimum(leave, above)
+
+
+def pill(start: Floats, way: Floats, lengths: Floats) -> Interval:
+    """The capsule about the third axis whose half length is `lengths` (P,) times its radius."""
+    start, way = start.copy(), way.copy()
+    start[2] *= lengths
+    way[2] *= lengths
+    ends = np.maximum(lengths - 1.0, SHORTEST)
+    parts = [tube(np.stack([start[0], start[1], start[2] / ends]), np.stack([way[0], way[1], way[2] / ends]))]
+    for end in (-ends, ends):
+        parts.append(ball(np.stack([start[0], start[1], start[2] - end]), way))
+    missed = [enter > leave for enter, leave in parts]
+    enters = [np.where(miss, np.inf, enter) for miss, (enter, _) in zip(missed, parts, strict=True)]
+    leaves = [np.where(miss, -np.inf, leave) for miss, (_, leave) in zip(missed, parts, strict=True)]
+    return np.min(enters, axis=0), np.max(leaves, axis=0)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    dot: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] if len(a) == 3 else a[0] * b[0] + a[1] * b[1]
+    return dot
+
+
+@dataclass(frozen=True)
+class Facets:
+    """A convex mesh as the intersection of the half spaces behind its faces, in the frame in which it lies between -1 and 1.
+
+    `corners` (3, V) are its vertices, `faces` (3, M) indices of vertices. A point p is behind face m if
+    `normals[:, m] @ p <= offsets[m]`; `normals` (3, M), `offsets` (M,).
+    """
+
+    corners: Floats
+    faces: Integers
+    normals: Floats
+    offsets: Floats
+
+    @classmethod
+    def of(cls, mesh: Mesh, middle: Floats, half: Floats) -> Facets:
+        """The facets of `mesh`, whose box has its centre at `middle` (3,) m and half the size `half` (3,) m."""
+        corners = (mesh.vertices - middle) / half
+        start, second, third = (corners[mesh.faces[:, number]] for number in range(3))
+        normals = np.cross(second - start, third - start)
+        sizes = np.sqrt((normals * normals).sum(axis=1))
+        faces, normals = mesh.faces[sizes > 0], normals[sizes > 0] / sizes[sizes > 0, None]
+        # A sliver's normal may be wrong: with this offset its face still cuts off no vertex.
+        offsets = (normals @ corners.T).max(axis=1)
+        return cls(corners.T.copy(), faces.T.copy(), normals.T.copy(), offsets)
+
+    def cast(self, start: Floats, way: Floats, normal: Floats) -> Interval:
+        """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and leave."""
+        corners = self.corners - start[:, None]
+        heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[self.faces]
+        (cut,) = ((heights.min(axis=0) <= 0) & (heights.max(axis=0) >= 0)).nonzero()
+        if not len(cut):
+            return np.full(way.shape[1], np.inf), np.full(way.shape[1], -np.inf)
+        out = self.normals.take(cut, axis=1)[:, :, None]
+        above = out[0] * start[0] + out[1] * start[1] + out[2] * start[2] - self.offsets[cut, None]
+        rise = out[0] * way[0] + out[1] * way[1] + out[2] * way[2] + NEVER
+        crossing = -above / rise
+        enter = np.where(rise < 0, crossing, -np.inf).max(axis=0)
+        return enter, np.where(rise > 0, crossing, np.inf).min(axis=0)
+
+
 # Directions that differ by a full turn are the same.
 TURNS = np.array([[-math.tau], [0.0], [math.tau]])
 
@@ -50,60 +272,34 @@ class Fan:
         return counts.reshape(-1, 3).sum(axis=1), beams + np.arange(len(beams))
 
 
-@dataclass(frozen=True)
-class Ends:
-    """Where the beams of S scans end: `distances` (S, B) m, infinite for beams that hit nothing.
+def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats, Integers, Integers]:
+    """Casts the beams of one scan from `origin` (3,) m, in the world frame; `axes` (3, 3) are the lidar's axes, as rows.
 
-    For each of M hits, of whatever shape along a beam, `beams` (M,) is the number of the beam, counted from the first beam of the
-    first scan, `depths` (M,) the distance (m), and `shapes` (M,) the number of the shape.
+    Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and
+    those of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
     """
-
-    distances: Floats
-    beams: Integers
-    depths: Floats
-    shapes: Integers
-
-    def first(self) -> tuple[Integers, Integers]:
-        """The beams (N,) that end on a shape, and these shapes (N,)."""
-        first = self.depths == self.distances.ravel()[self.beams]
-        return self.beams[first], self.shapes[first]
-
-
-def cast(fan: Fan, shapes: Shapes, origins: Floats, axes: Floats) -> Ends:
-    """Casts the beams of S scans from `origins` (S, 3) m, in the world frame; `axes` (S, 3, 3) are the lidar's axes, as rows.
-
-    Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
-    """
-    scans, count = len(origins), len(fan.angles)
-    distances = np.full((scans, count), np.inf)
-    local = _seen(shapes, origins, axes)
+    local = _seen(shapes, origin, axes)
     # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two axes.
-    edges = local[1:3] * shapes.squares[:, :, None]
+    edges = local[1:3] * shapes.squares
     centers = (edges * local[0]).sum(axis=1)
-    seen = len(shapes.kinds) * scans
-    local = local.reshape(4, 3, seen)
-    counts, beams = fan.between(*_span(np.negative(centers, out=centers).reshape(2, seen), edges.reshape(2, 3, seen)))
+    counts, beams = fan.between(*_span(-centers, edges))
     enter, leave = _cross(fan, shapes, local, counts, beams)
     np.minimum(leave, fan.range, out=leave)
     (met,) = ((enter >= 0) & (enter <= leave)).nonzero()
-    numbers = np.arange(seen).repeat(counts)[met]
-    beams, enter = beams[met], enter[met]
-    if scans > 1:
-        beams += numbers % scans * count
-    np.minimum.at(distances.ravel(), beams, enter)
-    return Ends(distances, beams, enter, numbers // scans)
+    beams, enter, numbers = beams[met], enter[met], np.arange(len(counts)).repeat(counts)[met]
+    distances = np.full(len(fan.angles), np.inf)
+    np.minimum.at(distances, beams, enter)
+    first = enter == distances[beams]
+    return distances, beams[first], numbers[first]
 
 
-def _seen(shapes: Shapes, origins: Floats, axes: Floats) -> Floats:
-    """The lidar's position and its three axes in the frame of each shape, for each scan, (4, 3, K, S)."""
-    view = np.empty((4, 3, len(shapes.kinds), len(origins)))
-    np.subtract(origins.T[:, None], shapes.centers[:, :, None], out=view[0])
-    view[1:] = axes.transpose(1, 2, 0)[:, :, None]
-    frames = shapes.frames[..., None]
-    local = view[:, :1] * frames[0]
-    local += view[:, 1:2] * frames[1]
-    local += view[:, 2:] * frames[2]
-    seen: Floats = local
+def _seen(shapes: Shapes, origin: Floats, axes: Floats) -> Floats:
+    """The lidar's position and its three axes in the frame of each shape, (4, 3, K)."""
+    view = np.empty((4, 3, len(shapes.kinds)))
+    np.subtract(origin[:, None], shapes.centers, out=view[0])
+    view[1:] = axes[:, :, None]
+    frames = shapes.frames
+    seen: Floats = view[:, :1] * frames[0] + view[:, 1:2] * frames[1] + view[:, 2:] * frames[2]
     return seen
 
 
@@ -122,29 +318,22 @@ def _span(centers: Floats, edges: Floats) -> tuple[Floats, Floats]:
 
 
 def _cross(fan: Fan, shapes: Shapes, local: Floats, counts: Integers, beams: Integers) -> Interval:
-    """Where `beams` (P,) enter and leave the shapes.
-
-    `counts` (K * S,) says how many of the beams belong to each shape in each scan, in this order.
-    """
+    """Where `beams` (P,) enter and leave the shapes; `counts` (K,) says how many of the beams belong to each shape, in order."""
     start, ahead, left = local[:3].repeat(counts, axis=2)
+    # In place: the system gives large new arrays slowly.
     ahead *= fan.cosines.take(beams)
     left *= fan.sines.take(beams)
     way = np.add(ahead, left, out=ahead)
     enter, leave = np.empty((2, len(beams)))
     ends = [0, *counts.cumsum().tolist()]
-    scans = len(counts) // max(len(shapes.kinds), 1)
-    firsts = [first * scans for first in shapes.firsts]
-    bounds = [ends[first] for first in firsts]
-    for kind, crossing in enumerate(CROSSINGS):
-        part = slice(bounds[kind], bounds[kind + 1])
+    parts = [slice(ends[first], ends[last]) for first, last in pairwise(shapes.firsts)]
+    lengths = shapes.lengths.repeat(counts)[parts[PILL]]
+    crossings: tuple[Callable[[Floats, Floats], Interval], ...] = (cube, ball, tube, partial(pill, lengths=lengths))
+    for part, crossing in zip(parts, crossings, strict=False):
         if part.start < part.stop:
             enter[part], leave[part] = crossing(start[:, part], way[:, part])
-    if bounds[PILL] < bounds[PILL + 1]:
-        part = slice(bounds[PILL], bounds[PILL + 1])
-        lengths = shapes.lengths.repeat(scans).repeat(counts)
-        enter[part], leave[part] = pill(start[:, part], way[:, part], lengths[part])
-    for one in range(firsts[HULL], len(counts)):
-        part, shape = slice(ends[one], ends[one + 1]), one // scans
-        normal = local[3, :, one] * shapes.squares[:, shape]
-        enter[part], leave[part] = shapes.facets[shape].cast(local[0, :, one], way[:, part], normal)
+    for number, facets in shapes.facets.items():
+        part = slice(ends[number], ends[number + 1])
+        normal = local[3, :, number] * shapes.squares[:, number]
+        enter[part], leave[part] = facets.cast(local[0, :, number], way[:, part], normal)
     return enter, leave

@@ -14,18 +14,13 @@ import numpy as np
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.protocol import Scan
 from ddenv.robot.result import PoseRow
-from ddenv.robot.sensing.beams import Ends, Fan, cast
-from ddenv.robot.sensing.obstacles import SPARE, Obstacles, Shapes
+from ddenv.robot.sensing.beams import SPARE, Fan, Obstacles, Shapes, cast
 from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
 
-# The maximum number of scans that are computed together.
-TOGETHER = 16
 # The lidar collects what is near for later scans only if it moved less than this part of near since the last scan.
 CALM = 0.5
-# How far the lidar goes before it looks again for shapes in its range, m: of thousands, this takes a while.
-AWAY = 10.0
 # Random numbers reserved for the noise of each scan.
 DRAWS = 2**40
 
@@ -33,7 +28,8 @@ DRAWS = 2**40
 class Lidar:
     """Measures the distances to the kept models of a world, never to the robot itself.
 
-    `present` are the names of the kept models, `moving` the ones among them that move.
+    `present` are the names of the kept models, `moving` the ones among them that move. `first_seen` has the time (s) when a beam
+    first ended on each model, including grounds.
     """
 
     def __init__(
@@ -51,34 +47,31 @@ class Lidar:
         self._turns = 0
         self._fan = Fan.of(settings)
         self._names = obstacles.names
-        self._first_seen: dict[str, float] = {}
+        self.first_seen: dict[str, float] = {}
         self._unseen: Booleans = np.ones(len(obstacles.names), dtype=bool)
+        # The models on which beams of scans ended that someone read.
+        self._read: Booleans = np.zeros(len(obstacles.names), dtype=bool)
 
         there = np.array([name in present for name in obstacles.names], dtype=bool)
-        self._obstacles = obstacles
-        (self._rows,) = there[obstacles.owners].nonzero()
+        (rows,) = there[obstacles.owners].nonzero()
+        self._owners, self._shapes = obstacles.owners[rows], obstacles.shapes.take(rows)
+        (self._movers,) = (obstacles.links[rows] >= 0).nonzero()
         firsts = accumulate((len(model.links) for model in moving), initial=0)
-        self._first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
-        self._gathered: Vector = (math.inf, math.inf, math.inf)
+        first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
+        owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
+        self._links = obstacles.links[rows][self._movers] + np.array([first[name] for name in owners], dtype=int)
+        self._poses: tuple[Floats, Floats] | None = None
+        # In the frames of their links, which do not change during the run.
+        self._centers = self._shapes.centers[:, self._movers]
+        self._frames = self._shapes.frames[:, :, self._movers]
         # The shapes that beams may hit from near the pose at which they were collected.
         self._near: Near | None = None
         self._place: Pose | None = None
-        # Whether one of their models was not seen yet, and the scans that may show it.
-        self._may_notice = True
-        self._waiting: list[Turn] = []
-        # The models on which beams of scans ended that someone read.
-        self._read: Booleans = np.zeros(len(obstacles.names), dtype=bool)
 
     @property
     def took_part(self) -> frozenset[str]:
         """The models without which a scan that was read would be another."""
         return frozenset(name for name, read in zip(self._names, self._read, strict=True) if read)
-
-    @property
-    def first_seen(self) -> dict[str, float]:
-        """When (s) a beam first ended on each model, including grounds."""
-        self._work_out_waiting()
-        return self._first_seen
 
     def scan(self, now: float, pose: PoseRow, places: Floats, turns: Floats) -> Scan:
         """The scan at the time `now` (s).
@@ -87,60 +80,38 @@ class Lidar:
         moving models, model after model. All are in the world frame.
         """
         place = Pose(pose[:3], pose[3:]) @ self._mount
-        if math.dist(place.position, self._gathered) > AWAY:
-            self._gather(place.position)
         moved, before, self._place = self._move(places, turns), self._place, place
         if moved or not (self._near and self._near.has(place)):
-            self._work_out_waiting()
             calm = not moved and before is not None and are_near(before, place, CALM)
             self._near = Near.of(self._fan, self._shapes, self._owners, place, calm)
-            self._may_notice = bool(self._unseen[self._near.owners].any())
-        turn = Turn(now, self._turns, place, self._near)
+        turn = Turn(self._turns, place, self._near)
         self._turns += 1
-        if self._may_notice:
-            self._waiting.append(turn)
-        if len(self._waiting) == TOGETHER:
-            self._work_out_waiting()
+        if self._unseen[turn.near.owners].any():
+            self._notice(turn, now)
         return LazyScan(now, self._fan.angles, partial(self._ranges, turn), self._mount.position)
 
     def _ranges(self, turn: Turn, limits: Floats | None = None) -> Floats:
         """The ranges of a scan, infinite where they exceed `limits` (B,) m."""
-        if turn.ranges is None:
-            self._work_out_waiting()
-        if turn.ranges is None:
-            self._measure([turn])
-        assert turn.ranges is not None
+        ranges = self._measured(turn)
         if limits is None:
             self._read[turn.owners] = True
-            return turn.ranges
+            return ranges
         # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
         near: Booleans = turn.measured <= limits
         self._read[turn.owners[near[turn.beams]]] = True
-        ranges: Floats = np.where(near, turn.ranges, np.inf)
-        return ranges
+        limited: Floats = np.where(near, ranges, np.inf)
+        return limited
 
-    def _work_out_waiting(self) -> None:
-        if self._waiting:
-            waiting, self._waiting = self._waiting, []
-            self._notice(waiting, self._measure(waiting))
-            self._may_notice = bool(self._unseen[waiting[0].near.owners].any())
-
-    def _measure(self, turns: list[Turn]) -> Ends:
-        """Computes the ranges of `turns`, which have the same shapes near, and returns where their beams end."""
-        nearest, farthest = self._settings.nearest, self._settings.range
-        origins = np.array([turn.place.position for turn in turns])
-        axes = np.array([turn.place.rotation() for turn in turns]).transpose(0, 2, 1)
-        ends = cast(self._fan, turns[0].near.shapes, origins, axes)
-        for turn, distances in zip(turns, ends.distances, strict=True):
+    def _measured(self, turn: Turn) -> Floats:
+        """The ranges of `turn`, computed when they are needed first."""
+        if turn.ranges is None:
+            origin, axes = np.array(turn.place.position), turn.place.rotation().T
+            distances, turn.beams, shapes = cast(self._fan, turn.near.shapes, origin, axes)
+            turn.owners = turn.near.owners[shapes]
             turn.measured = self._noise(turn.number) + distances
-            beyond = (turn.measured < nearest) | (turn.measured > farthest)
+            beyond = (turn.measured < self._settings.nearest) | (turn.measured > self._settings.range)
             turn.ranges = np.where(beyond, np.inf, turn.measured)
-        beams, shapes = ends.first()
-        count, owners = len(self._fan.angles), turns[0].near.owners[shapes]
-        for number, turn in enumerate(turns):
-            here = beams // count == number
-            turn.beams, turn.owners = beams[here] % count, owners[here]
-        return ends
+        return turn.ranges
 
     def _noise(self, number: int) -> Floats:
         """The errors of the ranges of a scan, (B,) m: the same whatever its beams hit, and whichever scans are computed."""
@@ -148,23 +119,6 @@ class Lidar:
         bits.state = self._state
         bits.advance(number * DRAWS)
         return self._settings.noise * self._random.standard_normal(len(self._fan.angles))
-
-    def _gather(self, position: Vector) -> None:
-        """Takes the shapes that move, and those that beams may reach until the lidar is `AWAY` m from `position`."""
-        obstacles, rows = self._obstacles, self._rows
-        away = obstacles.shapes.centers[:, rows] - np.array(position)[:, None]
-        gaps = np.sqrt((away * away).sum(axis=0)) - obstacles.shapes.reaches[rows]
-        rows = rows[(obstacles.links[rows] >= 0) | (gaps <= (self._settings.range + AWAY + AROUND) * (1.0 + SPARE))]
-        self._gathered = position
-        self._owners = obstacles.owners[rows]
-        self._shapes = obstacles.shapes.take(rows)
-        (self._movers,) = (obstacles.links[rows] >= 0).nonzero()
-        owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
-        self._links = obstacles.links[rows][self._movers] + np.array([self._first[name] for name in owners], dtype=int)
-        self._poses: tuple[Floats, Floats] | None = None
-        # In the frames of their links, which do not change during the run.
-        self._centers = self._shapes.centers[:, self._movers]
-        self._frames = self._shapes.frames[:, :, self._movers]
 
     def _move(self, places: Floats, turns: Floats) -> bool:
         """Moves the shapes to where their links are. Returns whether anything moved."""
@@ -182,29 +136,24 @@ class Lidar:
         self._shapes.frames[:, :, self._movers] = frames
         return True
 
-    def _notice(self, turns: list[Turn], ends: Ends) -> None:
+    def _notice(self, turn: Turn, now: float) -> None:
         """Notes the models on which a beam ended for the first time, with a measured range."""
-        beams, shapes = ends.first()
-        owners = turns[0].near.owners[shapes]
-        (fresh,) = self._unseen[owners].nonzero()
-        count = len(self._fan.angles)
-        for beam, owner in sorted(zip(beams[fresh].tolist(), owners[fresh].tolist(), strict=True)):
-            turn = turns[beam // count]
-            ranges = turn.ranges
-            if self._unseen[owner] and ranges is not None and math.isfinite(ranges[beam % count]):
+        met = np.isfinite(self._measured(turn)[turn.beams]) & self._unseen[turn.owners]
+        # In the order of the beams, and for one beam in that of the models.
+        for _, owner in sorted(zip(turn.beams[met].tolist(), turn.owners[met].tolist(), strict=True)):
+            if self._unseen[owner]:
                 self._unseen[owner] = False
-                self._first_seen[self._names[owner]] = turn.time
+                self.first_seen[self._names[owner]] = now
 
 
 @dataclass(slots=True, eq=False)
 class Turn:
-    """Scan `number` of a lidar, at `time` (s): its pose and the shapes that its beams may hit.
+    """Scan `number` of a lidar: its pose and the shapes that its beams may hit.
 
     Once computed: its ranges, the distances (B,) m that its beams measured, also too small and too large ones, and the models
     `owners` (H,) on which the beams `beams` (H,) ended.
     """
 
-    time: float
     number: int
     place: Pose
     near: Near

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import Context, OutputPort
 
-from ddenv.arrays import Booleans, Floats, Integers, Objects
+from ddenv.arrays import Booleans, Floats, Objects
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import bounds, filled_bounds, stacked
-from ddenv.world.model import Model, Plane, World, still_links
+from ddenv.world.model import Plane, World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
@@ -33,17 +33,17 @@ class Notice:
     ) -> None:
         """`present` are the models that are kept; `kept` are the moving ones among them, in the order of `sleep`."""
         self.first_touched: dict[str, float] = {}
+        self._first_seen: dict[str, float] = {}
         self._around = around
         self._sensors = sensors
         self._context = plant_context
         self._sleep = sleep
-        self._moving = np.array([body.name for body in kept], dtype=object)
-        self._present: Booleans = np.array([name in present for name in around.names], dtype=bool)
-        self._untouched = self._present.copy()
-        self._solid: Booleans = np.array([any(body.bounds) for body in kept], dtype=bool)
-        self._untouched_moving = self._solid.copy()
-        self._views: list[tuple[float, Vector, float]] = []
-        self._boxes: list[tuple[Floats, Floats]] = []
+        # The owners of all boxes: those around what never moves, then one around each moving model.
+        self._names = np.array([*around.names, *(body.name for body in kept)], dtype=object)
+        there = np.array([name in present for name in around.names], dtype=bool)
+        solid = [any(body.bounds) for body in kept]
+        self._untouched: Booleans = np.array([*there, *solid], dtype=bool)
+        self._unseen: Booleans = np.array([*(there & around.visible), *solid], dtype=bool)
 
     def feel(self, now: float, place: Vector) -> None:
         """Notes what the robot touches at the time `now` (s); `place` (m) is the position of its first link.
@@ -51,38 +51,41 @@ class Notice:
         Call it after the motors got their command: then Drake computes the contacts that the next step needs in any case, once and
         with the same bits. Contacts that begin and end between two calls are missed.
         """
-        if not self._may_touch(np.array(place)):
-            return
-        for name in self._touched():
-            self.first_touched[name] = now
-            self._untouched &= self._around.names != name
-            self._untouched_moving &= self._moving != name
+        if self._may_touch(np.array(place)):
+            for name in self._touched():
+                self.first_touched[name] = now
+                self._untouched &= self._names != name
 
     def look(self, now: float, place: Vector, heading: float) -> None:
-        """Notes where the robot is at the time `now` (s), and in which direction (rad) it looks."""
-        if not self._sensors.view_range:
+        """Notes what is in view at the time `now` (s) from `place` (m), in the direction `heading` (rad)."""
+        sensors, unseen = self._sensors, self._unseen
+        if not (sensors.view_range and unseen.any()):
             return
-        self._views.append((now, place, heading))
-        if len(self._moving):
-            self._boxes.append(self._sleep.boxes())
+        low, high = self._boxes()
+        eye, direction = np.array(place), np.array(heading)
+        seen = in_view(low[unseen], high[unseen], eye, direction, sensors.view_range, sensors.view_angle)
+        for name in self._names[unseen][seen]:
+            self._first_seen.setdefault(name, now)
+            self._unseen &= self._names != name
 
     def first_sensed(self, measured: Mapping[str, float]) -> dict[str, float]:
         """When (s) each model was first in view or touched, in order of time; `measured` is when the lidar first hit it."""
-        # All rows at once: checking each at its time would cost many times as much.
         first = dict(self.first_touched)
-        for name, met in measured.items():
-            first[name] = min(met, first.get(name, math.inf))
-        for name, seen in self._seen():
-            first[name] = min(seen, first.get(name, math.inf))
+        for found in (measured, self._first_seen):
+            for name, time in found.items():
+                first[name] = min(time, first.get(name, math.inf))
         return dict(sorted(first.items(), key=lambda item: item[1]))
+
+    def _boxes(self) -> tuple[Floats, Floats]:
+        """The lowest and the highest corners, (N, 3) m each, of all boxes now."""
+        low, high = self._sleep.boxes()
+        return np.vstack([self._around.low, low]), np.vstack([self._around.high, high])
 
     def _may_touch(self, place: Floats) -> bool:
         """Whether the robot might touch something that it has not touched yet."""
-        around = self._around
-        if (distances(around.low, around.high, place)[self._untouched] < around.reach).any():
-            return True
-        moving = self._untouched_moving
-        return bool(moving.any() and (distances(*self._sleep.boxes(), place)[moving] < around.reach).any())
+        low, high = self._boxes()
+        near = distances(low[self._untouched], high[self._untouched], place) < self._around.reach
+        return bool(near.any())
 
     def _touched(self) -> Iterator[str]:
         """The models that the robot touches for the first time."""
@@ -101,46 +104,9 @@ class Notice:
             if name is not None and name not in self.first_touched and other.get_value() in robot:
                 yield name
 
-    def _seen(self) -> Iterator[tuple[str, float]]:
-        """The models that were in view, with the time (s) when they first were; a model may come twice."""
-        if not self._views:
-            return
-        times, places, headings = zip(*self._views, strict=True)
-        eyes = np.array(places)
-        # Thousands of boxes would take as long as the run.
-        far = np.maximum(self._around.low - eyes.max(axis=0), eyes.min(axis=0) - self._around.high).max(axis=1)
-        shown = self._present & self._around.visible & (far <= self._sensors.view_range)
-        still: list[Floats] = [
-            np.broadcast_to(side[shown], (len(times), shown.sum(), 3)) for side in (self._around.low, self._around.high)
-        ]
-        groups: list[tuple[Objects, Floats, Floats]] = [(self._around.names[shown], still[0], still[1])]
-        if self._boxes:
-            low, high = (np.array(sides)[:, self._solid] for sides in zip(*self._boxes, strict=True))
-            groups.append((self._moving[self._solid], low, high))
-        for names, low, high in groups:
-            rows = first_in_view(
-                low, high, eyes, np.array(headings), self._sensors.view_range, self._sensors.view_angle
-            )
-            yield from ((name, times[row]) for name, row in zip(names, rows, strict=True) if row >= 0)
-
 
 # The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
 PARALLEL = 1e-12
-
-
-def first_in_view(
-    low: Floats, high: Floats, eyes: Floats, headings: Floats, view_range: float, view_angle: float
-) -> Integers:
-    """The first row (N,) in which each of N boxes is in view, see `in_view`; -1 for boxes that never are.
-
-    `low` and `high` (T, N, 3) m, `eyes` (T, 3) m and `headings` (T,) rad have a row for each of T instants, world frame.
-    """
-    first = np.full(low.shape[1], -1)
-    for row, (eye, heading) in enumerate(zip(eyes, headings, strict=True)):
-        (unseen,) = (first < 0).nonzero()
-        seen = in_view(low[row, unseen], high[row, unseen], eye, heading, view_range, view_angle)
-        first[unseen[seen]] = row
-    return first
 
 
 def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float) -> Booleans:
@@ -225,14 +191,10 @@ class Surroundings:
 
 def still_boxes(world: World) -> list[Still]:
     """The boxes around all parts of `world` that never move."""
-    return [(model.name, *box) for model in world.models for box in _boxes(model)]
-
-
-def _boxes(model: Model) -> Iterator[tuple[Floats, Floats, bool]]:
-    """The lowest and the highest corner (3,) of each box around the parts of `model` that never move, and if it is visible."""
-    collisions = [collision for link in still_links(model) for collision in link.collisions]
-    if (box := bounds(collisions)) is not None:
-        yield *box, True
-    for collision in collisions:
-        if isinstance(collision.shape, Plane):
-            yield *filled_bounds(collision), False
+    found: list[Still] = []
+    for model in world.models:
+        collisions = [collision for link in still_links(model) for collision in link.collisions]
+        if (box := bounds(collisions)) is not None:
+            found.append((model.name, *box, True))
+        found += [(model.name, *filled_bounds(one), False) for one in collisions if isinstance(one.shape, Plane)]
+    return found

@@ -19,9 +19,8 @@ from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
+from ddenv.robot.sensing.autonomy import Autonomy, Truth
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.sensing.sensors import Truth
-from ddenv.robot.simulation.autonomy import Autonomy
 from ddenv.robot.simulation.notice import Notice
 from ddenv.robot.simulation.taking_part import Reached
 from ddenv.world.drive import Drive
@@ -118,7 +117,7 @@ class Run:
             if self.reached:
                 self.reached.look(pose, self._speed(self.reached.radius))
             if self.watch:
-                self.watch.look(pose[:2], sleep.awake_boxes())
+                self.watch.look(pose[:2], sleep.awake_links()[:2])
             truth = self._truth(pose)
             end = self._end(pose, tick)
             if end is not None or tick.record:

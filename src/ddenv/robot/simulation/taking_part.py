@@ -95,9 +95,9 @@ class Reached:
         self._find(near)
 
     def _look_around_models(self) -> None:
-        if not self._sleep.anything_awake:
-            return
         low, high, speed = self._sleep.awake_links()
+        if not len(low):
+            return
         margin = (SLACK + speed * self._period)[:, None]
         low, high = low - margin, high + margin
         lowest, highest = low.min(axis=0), high.max(axis=0)

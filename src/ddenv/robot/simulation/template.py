@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
-from ddenv.robot.controllers import BUILT_IN, Heard, Listener, controllers
+from ddenv.robot.controllers import BUILT_IN, Listener, controllers
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
@@ -19,11 +19,10 @@ from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
+from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.sensing.obstacles import Obstacles
-from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
-from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
@@ -153,7 +152,7 @@ class Template:
                 movers = [self._models[body.name] for body in kept]
                 lidar = Lidar(self._scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
             reached = None
-            if self._slices and self._sleeping and self._repertoire.learnt:
+            if self._slices and self._sleeping and self._repertoire.usual is not None:
                 reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
             run = Run(
                 context=self._context,
@@ -184,9 +183,7 @@ class Template:
 
     def learn_piles(self) -> None:
         """Finds out how the piles of the whole world move, if that is unknown. Raises LeftRegion."""
-        if not self._repertoire.learnt:
-            self._context.presence.remove(frozenset())
-            self._rehearsals.learn(self._names)
+        self._rehearsals.learn(self._names)
 
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
         """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
@@ -214,17 +211,15 @@ class Template:
 
     def _carriers(self, present: frozenset[str]) -> frozenset[str]:
         """What those models are tied to that are always kept, among the models `present`."""
-        ties = self._repertoire.ties if self._repertoire.learnt else {}
+        ties = self._repertoire.ties
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
-        controller = self._controllers(setup)
+        controller, skid = self._controllers(setup), scenario.controller.skid
         if listener is not None:
-            controller = Heard(controller, setup, listener)
-        return Autonomy(
-            scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
-        )
+            listener.begin(setup)
+        return Autonomy(scenario.sensors, suite, self._drive, skid, self._clock, setup.start, controller, listener)
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:

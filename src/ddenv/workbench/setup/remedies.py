@@ -58,8 +58,8 @@ def remedy(text: str) -> str:
         if not is_folder(folder):
             raise UserError(f"{folder} is a file; name a folder" if folder.exists() else f"there is no folder {folder}")
         return str(folder)
-    stand_in = parse_stand_in(text, "remedy") if text else None
-    if stand_in is not None and stand_in.shape is None and stand_in.word not in (AUTO, NONE):
+    stand_in = parse_stand_in(text, "remedy") if text else AUTO
+    if isinstance(stand_in, str) and stand_in not in (AUTO, NONE):
         raise UserError(f"{text} is for single meshes, with --stand-in; auto takes the box around the visuals, too")
     return text
 

@@ -1,14 +1,22 @@
-"""The files that an SDF file refers to, from disk or from what an earlier reading stored."""
+"""The files that an SDF file refers to: found by URI and read from disk, or taken from what an earlier reading stored.
+
+Nothing is ever downloaded, and no URI leaves the folder it is relative to.
+"""
 
 from __future__ import annotations
 
+import errno
 import json
-from collections.abc import Callable, Mapping, Sequence
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
 
-from ddenv.world.access import Missing, Unusable, is_folder, read, size_of
+from ddenv.world.access import Missing, Unusable, is_folder, read, reason, size_of, without_tilde
 from ddenv.world.files.meshes import MESH_LIMIT, build, origin, read_parts, unpack
-from ddenv.world.files.resolve import find, model_file, model_named, search_folders
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
 
@@ -17,19 +25,27 @@ SLOW_MESH = 3_000_000  # bytes; reading a larger mesh is announced
 
 
 class Resources:
-    """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from the `disk`, if there is one.
+    """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from disk, if there are `folders`.
 
-    `base` is the folder of the file that contains the URI. Both methods raise Missing if there is no such file, and Unusable if it
-    cannot be used, or if its stored bytes are damaged. Equal requests return the same object. Failures are kept too: a world may
-    name one broken file a thousand times.
+    `base` is the folder of the file that contains the URI; `folders` are from `search_folders`, and `announce` gets a line before
+    slow steps. Both methods raise Missing if there is no such file, and Unusable if it cannot be used, or if its stored bytes are
+    damaged. Equal requests return the same object. Failures are kept too: a world may name one broken file a thousand times.
     """
 
-    def __init__(self, taken: Mapping[str, bytes], disk: _Reader | None = None) -> None:
+    def __init__(
+        self,
+        taken: Mapping[str, bytes],
+        folders: Sequence[Path] | None = None,
+        announce: Callable[[str], None] | None = None,
+    ) -> None:
         self.taken = dict(taken)
-        self._disk = disk
+        self._folders = folders
+        self._announce = announce
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._failed: dict[str, Missing | Unusable] = {}
+        # A collision and its visual mostly use the same file, one after the other.
+        self._last: tuple[Path, list[Part]] | None = None
         # All requests so far: the URI, and its base.
         self.asked: dict[tuple[str, Path], None] = {}
 
@@ -38,7 +54,7 @@ class Resources:
         self.asked[uri, base] = None
         key = _key("sdf", uri, str(base))
         if key not in self._files:
-            path, end, text = self._bytes(key, lambda disk: disk.sdf(uri, base)).partition(b"\0")
+            path, end, text = self._bytes(key, lambda folders: _sdf(uri, base, folders)).partition(b"\0")
             if not end or not path:
                 raise Unusable("its stored file is damaged")
             self._files[key] = Path(path.decode("utf-8", "surrogateescape")), text
@@ -49,62 +65,58 @@ class Resources:
         self.asked[uri, base] = None
         key = _key("mesh", uri, str(base), submesh, center, convex)
         if key not in self._meshes:
-            packed = self._bytes(key, lambda disk: disk.mesh(uri, base, submesh, center, convex))
+            packed = self._bytes(
+                key,
+                lambda folders: build(
+                    self._parts(find(uri, base, folders)), submesh=submesh, center=center, convex=convex
+                ),
+            )
             self._meshes[key] = unpack(origin(uri, submesh, center, convex), packed)
         return self._meshes[key]
 
-    def _bytes(self, key: str, ask: Callable[[_Reader], bytes]) -> bytes:
+    def _bytes(self, key: str, ask: Callable[[Sequence[Path]], bytes]) -> bytes:
         if key in self._failed:
             # A new exception each time: an exception raised again would collect a traceback of all its uses.
             raise type(self._failed[key])(str(self._failed[key]))
         if key not in self.taken:
-            if self._disk is None:
+            if self._folders is None:
                 raise Missing("was not found when the world was read")
             try:
-                self.taken[key] = ask(self._disk)
+                self.taken[key] = ask(self._folders)
             except (Missing, Unusable) as error:
                 self._failed[key] = error
                 raise
         return self.taken[key]
 
-
-class _Reader:
-    """Reads files from disk, as bytes to be stored."""
-
-    def __init__(self, folders: Sequence[Path], announce: Callable[[str], None] | None) -> None:
-        self._folders = folders
-        self._announce = announce
-        # A collision and its visual mostly use the same file, one after the other.
-        self._last: tuple[Path, list[Part]] | None = None
-
-    def sdf(self, uri: str, base: Path) -> bytes:
-        try:
-            path = find(uri, base, self._folders)
-            path = model_file(path) if is_folder(path) else path
-            text = read(path, SDF_LIMIT)
-        except Missing:
-            found = built_in(uri)
-            if found is None:
-                raise
-            path, text = found
-        return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
-
-    def mesh(self, uri: str, base: Path, submesh: str, center: bool, convex: bool) -> bytes:
-        path = find(uri, base, self._folders)
+    def _parts(self, path: Path) -> list[Part]:
         if self._last is None or self._last[0] != path:
             size = size_of(path)
             if self._announce is not None and SLOW_MESH < size <= MESH_LIMIT:
                 self._announce(f"reading mesh {path.name} ({size / 1e6:.0f} MB)")
             self._last = None
             self._last = (path, read_parts(path))
-        return build(self._last[1], submesh=submesh, center=center, convex=convex)
+        return self._last[1]
 
 
 def on_disk(
     world_folder: Path, model_path: Sequence[Path] = (), announce: Callable[[str], None] | None = None
 ) -> Resources:
     """The files beside a world and in the folders of `model_path`, Gazebo and ROS; `announce` gets a line before slow steps."""
-    return Resources({}, _Reader(search_folders(model_path, world_folder), announce))
+    return Resources({}, search_folders(model_path, world_folder), announce)
+
+
+def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
+    """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
+    try:
+        path = find(uri, base, folders)
+        path = model_file(path) if is_folder(path) else path
+        text = read(path, SDF_LIMIT)
+    except Missing:
+        found = built_in(uri)
+        if found is None:
+            raise
+        path, text = found
+    return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
 
 
 def _key(*request: str | bool) -> str:
@@ -132,3 +144,249 @@ def built_in(uri: str) -> tuple[Path, bytes] | None:
     name = model_named(uri)
     text = _TEXTS.get(name)
     return None if text is None else (FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{text}</sdf>".encode())
+
+
+HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
+CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
+ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
+DOWNLOADS = "~/.gazebo/models"  # of Gazebo Classic
+# ROS packages are in the folders of the one, and in `share` of those of the other.
+PACKAGES, PREFIXES = "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"
+# The owner of Gazebo's own models in Fuel.
+GAZEBO = "openrobotics"
+# The newest supported SDF version: a model's folder may hold one file per version.
+NEWEST_SDF = (1, 12)
+MODEL_CONFIG_LIMIT = 1_000_000  # bytes
+CLIMBS = "leaves its folder with '..' (give the target folder with --model-path)"
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
+# Errors of the file system for files that do not exist.
+_ABSENT = (errno.ENOENT, errno.ENOTDIR)
+
+
+def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path, ...]:
+    """The folders searched for models: `model_path`, the world's own folder, then those of Gazebo and ROS.
+
+    They are absolute, exist, and are listed once.
+    """
+    gazebo = [folder for variable in ENVIRONMENT for folder in _listed_in(variable)]
+    packages = [*_listed_in(PACKAGES), *(str(Path(prefix, "share")) for prefix in _listed_in(PREFIXES))]
+    named = [*map(str, (*model_path, world_folder)), *gazebo, DOWNLOADS, *packages]
+    absolute = [_absolute(without_tilde(name)) for name in named]
+    return tuple(dict.fromkeys(folder for folder in absolute if is_folder(folder)))
+
+
+def _listed_in(variable: str) -> list[str]:
+    return [folder for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
+
+
+def model_named(uri: str) -> str:
+    """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called; "" if it names none."""
+    match = _SCHEME.fullmatch(uri.strip())
+    if match is None:
+        return ""
+    words = unquote(match[2], errors="replace").strip("/").split("/")
+    if match[1].lower() in ("http", "https"):
+        words = words[4:] if words[3:4] == ["models"] else []
+    elif match[1].lower() not in ("model", "package"):
+        words = []
+    return _plain(words[0]).replace(" ", "_") if words else ""
+
+
+def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
+    """The file or folder that `uri`, in a file of the folder `base`, refers to; `folders` are from `search_folders`.
+
+    Raises Missing if there is none, and Unusable if the URI is invalid or not supported.
+    """
+    scheme, rest = _split(uri.strip())
+    if scheme in ("model", "package"):
+        path = _inside(rest)
+        return _first(
+            chain(_of_model(path, folders), _cached(path)), f"looked in {_listed(folders)} and the Fuel cache"
+        )
+    if scheme in ("http", "https"):
+        return _downloaded(rest, folders)
+    if scheme not in ("", "file"):
+        raise Unusable(f"scheme '{scheme[:30]}:' is not supported")
+    if rest.startswith("/"):
+        return _first([Path(os.path.normpath(rest))], "there is no such file")
+    where = f"looked beside the file that names it and in {_listed(folders)}"
+    return _first(_beside(rest, base, folders), where)
+
+
+def _split(uri: str) -> tuple[str, str]:
+    """The scheme in lower case (empty for a plain path) and the rest, percent-decoded. Raises Unusable."""
+    match = _SCHEME.fullmatch(uri)
+    scheme, rest = ("", uri) if match is None else (match[1].lower(), match[2].removeprefix("//"))
+    rest = unquote(rest, errors="surrogateescape")
+    if not rest.strip("/ "):
+        raise Unusable("names no file")
+    if "\0" in rest:
+        raise Unusable("has a NUL byte")
+    return scheme, rest
+
+
+def _inside(rest: str) -> str:
+    """`rest` as a normalised relative path. Raises Unusable if it would leave its folder."""
+    path = os.path.normpath(rest.lstrip("/") or ".")
+    if Path(path).parts[:1] == ("..",):
+        raise Unusable(CLIMBS)
+    return path
+
+
+def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
+    if path == ".":
+        raise Unusable("names no file")
+    name, _, rest = path.partition(os.sep)
+    for folder in folders:
+        yield folder / path
+        if folder.name == name:
+            yield folder / rest
+
+
+def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:
+    """`rest` below `base` and each search folder. Raises Unusable if it leaves all of them."""
+    allowed = [_absolute(folder) for folder in (base, *folders)]
+    candidates = [Path(os.path.normpath(folder / rest)) for folder in (base, *folders)]
+    staying = [path for path in candidates if any(_absolute(path).is_relative_to(folder) for folder in allowed)]
+    if not staying:
+        raise Unusable(CLIMBS)
+    yield from staying
+
+
+def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
+    """`rest` is HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE]: a model that was downloaded from Fuel before."""
+    words = rest.split("/")
+    if words[0].lower() not in HOSTS or len(words) < 5 or words[3] != "models" or not (words[2] and words[4]):
+        raise Missing("is not downloaded; name a file or folder of this machine instead")
+    if any(word in (".", "..") for word in words):
+        raise Unusable(CLIMBS if ".." in words else "names no file")
+    owner, name, tail = words[2], words[4], words[5:]
+    version = tail.pop(0) if tail and tail[0] != "files" else ""
+    path = _inside("/".join(tail[1:] if tail[:1] == ["files"] else tail))
+    models = (*in_cache(owner, name, version), *of_name(name, tuple(folders)))
+    where = f"looked in the Fuel cache and in {_listed(folders)}; nothing is downloaded"
+    return _first((model / path for model in models), where)
+
+
+def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
+    """Folders where the Fuel cache may hold the model: `version`, or the newest if that is empty or "tip"."""
+    for host in _caches():
+        folder = host / owner.lower() / "models" / name.lower()
+        yield from [folder / version] if version.isdecimal() else _newest(folder)
+
+
+def _cached(path: str) -> Iterator[Path]:
+    """`path`, which begins with a model's name, in the newest version of each such model in the Fuel cache."""
+    name, _, rest = path.partition(os.sep)
+    for host in _caches():
+        for owner in sorted(folders_of(host), key=lambda each: each != GAZEBO):
+            models = of_name(name, (host / owner / "models",))
+            yield from (version / rest for model in models for version in _newest(model))
+
+
+def _caches() -> Iterator[Path]:
+    """The Fuel caches, by host: $GZ_FUEL_CACHE_PATH, by default `CACHES`. Fuel moved from one host to the other."""
+    chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
+    for cache in (chosen,) if chosen else CACHES:
+        yield from (without_tilde(cache) / host for host in HOSTS)
+
+
+def _newest(folder: Path) -> list[Path]:
+    """The newest version of a model in the Fuel cache, if there is one."""
+    versions = [entry for entry in folders_of(folder) if entry.isdecimal()]
+    return [folder / max(versions, key=int)] if versions else []
+
+
+def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
+    """Folders called `name` in any of `folders`; then those that differ only in case, or in `_` for a space."""
+    for folder in folders:
+        yield folder / name
+    for folder in folders:
+        yield from (folder / entry for entry in folders_of(folder) if _plain(entry) == _plain(name))
+
+
+def folders_of(folder: Path) -> list[str]:
+    """The sorted names of the folders in `folder`; none if it is not accessible."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries if entry.is_dir())
+    except (OSError, ValueError):
+        return []
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("_", " ")
+
+
+def _first(candidates: Iterable[Path], where: str) -> Path:
+    """The first candidate that exists. Raises Missing, or Unusable if one that is not accessible may be it."""
+    problem = ""
+    for path in candidates:
+        try:
+            path.stat()
+        except OSError as error:
+            problem = problem or ("" if error.errno in _ABSENT else reason(error))
+        except ValueError:
+            raise Unusable("is not a valid file name") from None
+        else:
+            return path
+    if problem:
+        raise Unusable(problem)
+    raise Missing(where)
+
+
+def _absolute(path: Path) -> Path:
+    """`path` made absolute and without `..`; symbolic links are not followed."""
+    return Path(os.path.normpath(path.absolute()))
+
+
+def _listed(folders: Sequence[Path]) -> str:
+    """The first three folders by name."""
+    names = ", ".join(str(folder)[:100] for folder in folders[:3])
+    return names if len(folders) <= 3 else f"{names} and {len(folders) - 3} more"
+
+
+def model_file(folder: Path) -> Path:
+    """The SDF file of a model's folder: the newest supported one in its model.config, or else model.sdf.
+
+    Raises Unusable for an invalid model.config, and Missing if there is no SDF file.
+    """
+    try:
+        config = _first([folder / "model.config"], "")
+    except Missing:
+        return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
+    name = _configured(read(config, MODEL_CONFIG_LIMIT))
+    if not name:
+        return _first(
+            [folder / "model.sdf"], f"model.config names no file for SDF {'.'.join(map(str, NEWEST_SDF))} or older"
+        )
+    try:
+        path = _inside(name)
+    except Unusable as error:
+        raise Unusable(f"model.config: <sdf> {error}") from None
+    return _first([folder / path], f"model.config names '{name[:60]}', which does not exist")
+
+
+def _configured(text: bytes) -> str:
+    """The file that a model.config names for the newest supported SDF version; empty if there is none."""
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        root = fromstring(text)
+    except ElementTree.ParseError as error:
+        raise Unusable(f"model.config:{error.position[0]}: not well-formed XML") from None
+    except DefusedXmlException:
+        raise Unusable("model.config: DOCTYPE is not allowed (its entities can read other files)") from None
+    except (LookupError, ValueError):
+        raise Unusable("model.config: cannot be decoded; save it as UTF-8") from None
+    entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]
+    # `max` takes the first of two entries for one version.
+    usable = [entry for entry in entries if entry[0] <= NEWEST_SDF and entry[1] and "\0" not in entry[1]]
+    return max(usable, key=lambda entry: entry[0], default=((), ""))[1]
+
+
+def _version(text: str) -> tuple[int, ...]:
+    """The version as numbers, since 1.12 is newer than 1.9; (0, 0) for anything else."""
+    match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", text)
+    return (0, 0) if match is None else (int(match[1]), int(match[2] or 0))

@@ -11,7 +11,7 @@ from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
 from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.joints import JointSite, LinkPose, check_tree, read_joints
-from ddenv.world.sdf.links import Site, read_link
+from ddenv.world.sdf.links import read_link
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, text_of, truth
 
 # Maximum speed of a link at rest in `<state>`, m/s and rad/s.
@@ -129,8 +129,9 @@ class _Builder:
             pose = LinkPose(pose.nominal, spot.saved.links[own])
         self.poses[name] = pose
         self.elements.append(element)
-        site = Site(name, pose.actual, local, spot.scale, not self.static)
-        self.links.append(read_link(element, scope, site, self.context))
+        at, scale, moving = pose.actual, spot.scale, not self.static
+        link = read_link(element, scope, self.context, name=name, pose=at, local=local, scale=scale, moving=moving)
+        self.links.append(link)
 
     def _add_part(self, part: Part, scope: Scope, spot: Spot) -> None:
         local = scope.placed(part)

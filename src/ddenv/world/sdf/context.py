@@ -113,7 +113,7 @@ class Context:
     def stand_in(self, uri: str) -> tuple[str, StandIn] | None:
         """The stand-in for `uri`, with the text that the user gave for it; None if there is none."""
         key = matching(self.stand_ins, uri)
-        if key is None or self.stand_ins[key].word == AUTO:
+        if key is None or self.stand_ins[key] == AUTO:
             return None
         self.used.add(key)
         return self.reading.stand_ins[key], self.stand_ins[key]
@@ -121,7 +121,7 @@ class Context:
     def may_guess(self, uri: str) -> bool:
         """Whether the user wants a guessed shape for `uri`, which is missing."""
         key = matching(self.stand_ins, uri)
-        return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key].word == AUTO
+        return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
 
     def root(self, element: Element, uri: str) -> Element:
         """The `<sdf>` of the file that `element` includes. Raises Missing, and UserError for a file that is not SDF."""

@@ -12,9 +12,9 @@ import numpy as np
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import convex_hull, polygon_area
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
+from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
-from ddenv.world.sdf.standin import AUTO, NONE, SIZES, StandIn
+from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
 from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, truth
 
 SIDES = 32  # of a cone
@@ -23,16 +23,8 @@ SMALLEST, LARGEST = 1e-6, 1e6  # m
 
 
 @dataclass(frozen=True)
-class Placed:
-    """A shape and where it is in the frame of its `<collision>` or `<visual>`."""
-
-    shape: Shape
-    offset: Pose = HERE
-
-
-@dataclass(frozen=True)
 class Lost:
-    """A mesh that is not available, and the reason; `word` is what the user wants in its place, as in `StandIn`.
+    """A mesh that is not available, and the reason; `word` is what the user wants in its place, a word of `StandIn`.
 
     `scale` is its own, times that of its model.
     """
@@ -130,11 +122,11 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     given = context.stand_in(uri)
     if given is not None:
         text, stand_in = given
-        if stand_in.shape is None:
-            reason = "left out" if stand_in.word == NONE else f"the {stand_in.word} shapes replace it"
-            return Lost(element, uri, reason, stand_in.word)
+        if isinstance(stand_in, str):
+            reason = "left out" if stand_in == NONE else f"the {stand_in} shapes replace it"
+            return Lost(element, uri, reason, stand_in)
         context.note("replaced", element, f"'{uri}' by the stand-in {text}")
-        return scaled_stand_in(stand_in, scale)
+        return scaled(stand_in, scale)
     submesh = element.find("submesh")
     name = "" if submesh is None else text_of(submesh.find("name"))
     center = submesh is not None and truth(submesh, "center", False)
@@ -151,10 +143,9 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     return Placed(_checked(_scaled(mesh, _times(own, scale)), element))
 
 
-def scaled_stand_in(stand_in: StandIn, scale: Vector) -> Placed:
-    """The shape of a stand-in that has one."""
-    assert stand_in.shape is not None
-    return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.center, scale)))
+def scaled(stand_in: Placed, scale: Vector) -> Placed:
+    """A stand-in in a model of this scale."""
+    return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.offset.position, scale)))
 
 
 def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:

@@ -94,7 +94,7 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
     given = context.stand_in(uri)
     if given is not None:
         text, stand_in = given
-        if stand_in.word == NONE:
+        if stand_in == NONE:
             context.note("ignored", include, f"'{uri}' is left out as asked")
             return None
         _note(include, uri, f"the stand-in {text}", context)
@@ -143,11 +143,11 @@ def _only_model(root: Element, include: Element, context: Context) -> Element | 
 
 def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:
     """A file with one static model of the stand-in's shape."""
-    if stand_in.shape is None:
+    if isinstance(stand_in, str):
         raise complain(include, f"the stand-in '{text}' is for meshes; use one of {', '.join(SIZES)} for a whole model")
     kind, sizes = primitive(stand_in.shape)
     words = "".join(f"<{tag}>{' '.join(map(repr, values))}</{tag}>" for tag, values in sizes.items())
-    pose = " ".join(repr(value) for value in (*stand_in.center, 0.0, 0.0, 0.0))
+    pose = " ".join(repr(value) for value in (*stand_in.offset.position, 0.0, 0.0, 0.0))
     inside = f"<pose>{pose}</pose><geometry><{kind}>{words}</{kind}></geometry>"
     sdf = (
         '<sdf version="1.12"><model name="stand-in"><static>true</static><link name="link">'

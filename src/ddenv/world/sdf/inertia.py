@@ -11,7 +11,7 @@ from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Iner
 from ddenv.world.pose import Pose, Vector, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
-from ddenv.world.sdf.xml import Element, complain, floats, numbers, text_of
+from ddenv.world.sdf.xml import Element, complain, number_or_nan, numbers, text_of
 
 WATER = 1000.0  # kg/m^3, SDF's default density
 DEFAULT_MASS = 1.0  # kg, SDF's default for a link without an <inertial>
@@ -30,7 +30,7 @@ def read_inertia(
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
         return spread(collisions, density, link_pose, DEFAULT_MASS)
-    mass = _number(element, "mass", DEFAULT_MASS)
+    mass = number_or_nan(element, "mass", DEFAULT_MASS)
     if (element.get("auto") or "").strip().lower() in ("1", "true"):
         given = element.find("mass") is not None and LIGHTEST <= mass <= HEAVIEST
         return spread(collisions, density, link_pose, mass if given else None)
@@ -47,8 +47,8 @@ def read_inertia(
     if place is not None and (place.get("relative_to") or place.get("frame")):
         context.note("ignored", place, "the centre of mass is read in the frame of its link")
     if tensor is not None:
-        moments = vector(_number(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
-        products = vector(_number(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+        moments = vector(number_or_nan(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
+        products = vector(number_or_nan(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
         rounded = _rounded_up(moments, products)
         if is_possible(rounded, products):
             return Inertia(mass, link_pose @ pose, rounded, products)
@@ -66,12 +66,6 @@ def read_density(parent: Element, default: float) -> float:
     if not THINNEST <= density <= DENSEST:
         raise complain(element, f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}")
     return density
-
-
-def _number(parent: Element, tag: str, default: float) -> float:
-    child = parent.find(tag)
-    values = (default,) if child is None else floats(child)
-    return values[0] if len(values) == 1 else math.nan
 
 
 def _shown(tensor: Element) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 
 from ddenv.world.extent import around, shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
-from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
+from ddenv.world.pose import HERE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import Scope, pose_of
-from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies, scaled_stand_in
+from ddenv.world.sdf.geometry import Lost, read_shape, remedies, scaled
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
-from ddenv.world.sdf.standin import AUTO, NONE, guess
+from ddenv.world.sdf.standin import AUTO, NONE, Placed, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
@@ -52,21 +52,16 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 }
 
 
-@dataclass(frozen=True)
-class Site:
-    """The place of a link: its full `name`, its `pose` in the world, `local` in its model, and the `scale` from `<state>`."""
+def read_link(
+    element: Element, scope: Scope, context: Context, *, name: str, pose: Pose, local: Pose, scale: Vector, moving: bool
+) -> Link:
+    """The link of `element`, with its full `name`, its `pose` in the world, `local` in its model, and the `scale` from `<state>`.
 
-    name: str
-    pose: Pose
-    local: Pose
-    scale: Vector = ONE
-    moving: bool = False
-
-
-def read_link(element: Element, scope: Scope, site: Site, context: Context) -> Link:
-    """The link of `element` at `site`. Raises UserError."""
+    Raises UserError.
+    """
     note_unread(element, context)
-    items = [_item(child, scope, site, context) for child in element if child.tag in ("collision", "visual")]
+    children = (child for child in element if child.tag in ("collision", "visual"))
+    items = [_item(child, scope, local, scale, context) for child in children]
     collisions, density = [], []
     inertial = element.find("inertial")
     usual = WATER if inertial is None else read_density(inertial, WATER)
@@ -74,15 +69,15 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
         if item.element.tag == "collision":
             placed = _settled(item, items, element, context)
             if placed is not None and can_be_touched(item.element, context):
-                pose = site.pose @ item.pose @ placed.offset
                 mu = read_friction(item.element, context)
-                collisions.append(Collision(name_of(item.element), placed.shape, pose, mu))
+                place = pose @ item.pose @ placed.offset
+                collisions.append(Collision(name_of(item.element), placed.shape, place, mu))
                 density.append(read_density(item.element, usual))
-    inertia = read_inertia(element, site.pose, collisions, density, context) if site.moving else None
+    inertia = read_inertia(element, pose, collisions, density, context) if moving else None
     kinematic = element.find("kinematic")
-    if kinematic is not None and site.moving and truth(element, "kinematic", False):
+    if kinematic is not None and moving and truth(element, "kinematic", False):
         context.note("ignored", kinematic, "forces move it like any other link")
-    return Link(site.name, site.pose, inertia, tuple(collisions), tuple(_visuals(items, site, context)))
+    return Link(name, pose, inertia, tuple(collisions), tuple(_visuals(items, pose, context)))
 
 
 @dataclass(frozen=True)
@@ -94,13 +89,14 @@ class _Item:
     shape: Placed | Lost | None
 
 
-def _item(child: Element, scope: Scope, site: Site, context: Context) -> _Item:
+def _item(child: Element, scope: Scope, link: Pose, scale: Vector, context: Context) -> _Item:
+    """`link` is the pose of the link in its model."""
     note_unread(child, context)
     name_of(child)
-    pose, local = child.find("pose"), scope.place(child)
+    pose, place = child.find("pose"), scope.place(child)
     if pose is not None and (pose.get("relative_to") or pose.get("frame")):
-        local = site.local.inverse() @ local
-    return _Item(child, local, read_shape(child, context, site.scale))
+        place = link.inverse() @ place
+    return _Item(child, place, read_shape(child, context, scale))
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
@@ -136,11 +132,9 @@ def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed
     context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {found.text}: {found.why}")
     if found.at_mass:
         mass = link.find("inertial/pose")
-        return Placed(
-            scaled_stand_in(found.stand_in, ONE).shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass))
-        )
+        return Placed(found.stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
     by = [abs(own / usual) for own, usual in zip(lost.scale, found.scale, strict=True)]
-    return scaled_stand_in(found.stand_in, vector(by))
+    return scaled(found.stand_in, vector(by))
 
 
 def _box_around(items: list[_Item]) -> Placed | None:
@@ -153,7 +147,7 @@ def _box_around(items: list[_Item]) -> Placed | None:
     return Placed(Box(vector(np.maximum(high - low, 1e-3))), Pose(vector((low + high) / 2)))
 
 
-def _visuals(items: list[_Item], site: Site, context: Context) -> Iterator[Visual]:
+def _visuals(items: list[_Item], link: Pose, context: Context) -> Iterator[Visual]:
     for item in items:
         if item.element.tag != "visual" or item.shape is None:
             continue
@@ -161,7 +155,7 @@ def _visuals(items: list[_Item], site: Site, context: Context) -> Iterator[Visua
             lost = item.shape
             context.note("ignored", lost.element, f"'{lost.uri}' is not drawn: {lost.reason}")
             continue
-        pose = site.pose @ item.pose @ item.shape.offset
+        pose = link @ item.pose @ item.shape.offset
         yield Visual(name_of(item.element), item.shape.shape, pose, read_color(item.element))
 
 

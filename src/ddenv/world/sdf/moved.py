@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Model, World
@@ -66,7 +65,7 @@ def _written(world: World, places: Mapping[str, Sequence[Pose]]) -> tuple[bytes,
                 edits.append(_inserted(world.text, entries[0], turn @ model.pose))
         else:
             edits.append(_placed(world.text, at, model, turn))
-    return _edited(world.text, sorted(edits)), wanted
+    return _edited(world.text, edits), wanted
 
 
 def is_same(one: Pose, other: Pose) -> bool:
@@ -117,8 +116,8 @@ def _numbers(pose: Pose) -> bytes:
 
 
 def _edited(text: bytes, edits: Sequence[Edit]) -> bytes:
-    starts = [0, *(end for _, end, _ in edits)]
-    ends = [*(start for start, _, _ in edits), len(text)]
-    kept = [text[start:end] for start, end in zip(starts, ends, strict=True)]
-    assert all(one[1] <= other[0] for one, other in pairwise(edits))
-    return b"".join([part for pair in zip(kept, (*(new for _, _, new in edits), b""), strict=True) for part in pair])
+    parts, at = [], 0
+    for start, end, new in sorted(edits):
+        parts += [text[at:start], new]
+        at = end
+    return b"".join([*parts, text[at:]])

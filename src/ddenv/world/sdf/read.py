@@ -102,7 +102,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     context.complain_of_missing()
     context.model = ""
     # An unused stand-in is probably a typing error; `auto` asks for nothing as long as nothing is missing.
-    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in.word != AUTO}
+    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in != AUTO}
     for uri in sorted(asked - context.used):
         context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")
     anchors = scope.references()

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.world.extent import shape_bounds
-from ddenv.world.files.resolve import model_named
+from ddenv.world.files.resources import model_named
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
-from ddenv.world.pose import HERE, ONE, Vector, vector
-from ddenv.world.sdf.xml import Element, floats
+from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
+from ddenv.world.sdf.xml import Element, number_or_nan
 
 # The sizes (m) of each kind, as shown in error messages.
 SIZES = {
@@ -33,22 +33,22 @@ HOW = (
 
 
 @dataclass(frozen=True)
-class StandIn:
-    """A `shape` with its `center` in the frame of what it replaces, m; or (None) a `word`.
+class Placed:
+    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for."""
 
-    `visual` and `collision` are the box around these shapes of the link, `none` leaves it out, and `auto` guesses a shape for
-    what is missing, but leaves what is there.
-    """
+    shape: Shape
+    offset: Pose = HERE
 
-    shape: Shape | None
-    center: Vector
-    word: str = ""
+
+# A shape, or a word: `visual` and `collision` are the box around these shapes of the link, `none` leaves it out, and `auto` guesses
+# a shape for what is missing, but leaves what is there.
+StandIn = Placed | str
 
 
 def parse_stand_ins(texts: Mapping[str, str]) -> dict[str, StandIn]:
     """The stand-ins of a scenario by the URI that they replace. Raises UserError."""
     found = {uri: parse_stand_in(text, f"stand-in for '{uri}'") for uri, text in texts.items()}
-    if ALL_MISSING in found and found[ALL_MISSING].word != AUTO:
+    if ALL_MISSING in found and found[ALL_MISSING] != AUTO:
         raise UserError(f"stand-in for '{ALL_MISSING}': only {AUTO} can stand for all that is missing")
     return found
 
@@ -74,7 +74,7 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     It stands on the origin of the frame that it replaces, as most meshes of props do; `@x,y,z` sets its centre instead.
     """
     if text in (*SIBLINGS, AUTO, NONE):
-        return StandIn(None, (0.0, 0.0, 0.0), text)
+        return text
     kind, _, rest = text.partition(":")
     words, at, center = rest.partition("@")
     if kind not in SIZES:
@@ -83,10 +83,8 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     if min(sizes) <= 0:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
     shape = _shape(kind, sizes)
-    middle = (
-        _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
-    )
-    return StandIn(shape, vector(middle))
+    above = (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
+    return Placed(shape, Pose(vector(_numbers(center, "x,y,z", f"{where}: the centre after @") if at else above)))
 
 
 def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
@@ -130,7 +128,7 @@ class Guess:
     It stands where the mesh would, or with `at_mass` at the link's centre of mass.
     """
 
-    stand_in: StandIn
+    stand_in: Placed
     text: str
     why: str
     scale: Vector
@@ -145,7 +143,9 @@ def guess(uri: str, link: Element | None = None) -> Guess:
         box = None if link is None else _box_of_inertia(link)
         text, at_mass = box or SOME, box is not None
         why = "the box that has the link's inertia" if at_mass else "nothing says how large it is"
-    return Guess(parse_stand_in(text, "guess"), text, why, scale, at_mass)
+    stand_in = parse_stand_in(text, "guess")
+    assert isinstance(stand_in, Placed)
+    return Guess(stand_in, text, why, scale, at_mass)
 
 
 def _box_of_inertia(link: Element) -> str | None:
@@ -153,18 +153,12 @@ def _box_of_inertia(link: Element) -> str | None:
     inertial = link.find("inertial")
     if inertial is None:
         return None
-    mass, x, y, z = (_value(inertial, path) for path in ("mass", "inertia/ixx", "inertia/iyy", "inertia/izz"))
+    mass, x, y, z = (number_or_nan(inertial, path) for path in ("mass", "inertia/ixx", "inertia/iyy", "inertia/izz"))
     squares = [6 * (y + z - x), 6 * (x + z - y), 6 * (x + y - z)]
     if not mass > 0 or x == y == z == DEFAULT_MOMENT or not all(1e-6 * mass < square < math.inf for square in squares):
         return None
     sides = ",".join(f"{math.sqrt(square / mass):.3g}" for square in squares)
     return f"box:{sides}@0,0,0"
-
-
-def _value(inertial: Element, path: str) -> float:
-    element = inertial.find(path)
-    values = () if element is None else floats(element)
-    return values[0] if len(values) == 1 else math.nan
 
 
 # From the collisions and meshes in github.com/osrf/gazebo_models: the box around the model, or the cylinder. Of the barrel

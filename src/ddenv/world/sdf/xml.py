@@ -162,6 +162,13 @@ def number(parent: Element, tag: str, default: float) -> float:
     return default if child is None else numbers(child, 1)[0]
 
 
+def number_or_nan(parent: Element, path: str, default: float = math.nan) -> float:
+    """The number in the child `path` of `parent`, NaN if it is not one number; `default` if there is no such child."""
+    child = parent.find(path)
+    values = (default,) if child is None else floats(child)
+    return values[0] if len(values) == 1 else math.nan
+
+
 def truth(parent: Element, tag: str, default: bool) -> bool:
     """The boolean (true, false, 1, 0) in child `tag` of `parent`, or `default`. Raises UserError."""
     child = parent.find(tag)
