@@ -22,7 +22,7 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool, Workers
-from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
+from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError
 from ddenv.runfile.events import (
     AcceptModeChanged,
@@ -107,15 +107,13 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
         control = Control(journal, terminated, after, disk)
-        workers = _workers(scenario, world, robot, jobs, cluster, journal)
-        pool = workers
-        if options.share is not None:
-            pool = SharingPool(workers, tests_of_others(file, scenario, options.share))
+        pool = _workers(scenario, world, robot, jobs, cluster, journal)
+        others = None if options.share is None else tests_of_others(file, scenario, options.share)
         try:
             if scenario.oracle is None:
-                check_repeats(journal, workers, control, options.bits == "mixed")
+                check_repeats(journal, pool, control, options.bits == "mixed")
             note_start(scenario, world, robot, journal)
-            bench = Bench(journal, pool, control)
+            bench = Bench(journal, pool, control, others)
             if options.certify:
                 Driver(scenario, world, journal, bench, control).certify(options.certify)
             elif options.isolate is not None or journal.state.isolating is not None:

@@ -10,8 +10,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import rows_of
-from ddenv.engine.limits import wall_limit
-from ddenv.engine.noting import note
+from ddenv.engine.limits import note, wall_limit
 from ddenv.engine.pool import Broken, Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult

@@ -7,7 +7,7 @@ controllers may not be deterministic, so their tests are not reused.
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -16,14 +16,12 @@ from typing import Any
 import numpy as np
 
 from ddenv import __version__
-from ddenv.engine.pool import Broken, Pace, Workers
-from ddenv.engine.worker import Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY, Test
-from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
 from ddenv.world.scenario import Scenario
@@ -121,57 +119,8 @@ def _asked(scenario: dict[str, Any]) -> Any:
     }
 
 
-class SharingPool:
-    """Runs new tests in `pool`; a `known` test has its result at once, and takes no worker."""
-
-    def __init__(self, pool: Workers, known: dict[Key, Place]) -> None:
-        self._pool = pool
-        self._known = known
-        self._ready: list[tuple[int, RunResult | Broken]] = []
-
-    @property
-    def idle(self) -> int:
-        """How many more tests can start now."""
-        return self._pool.idle
-
-    @property
-    def busy(self) -> int:
-        return self._pool.busy + len(self._ready)
-
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
-        """Reuses the test, or starts it on an idle worker."""
-        result = _result(self._known.pop((keep, seed, full), None))
-        if result is None:
-            self._pool.submit(test, keep, seed, full, limit)
-        else:
-            self._ready.append((test, result))
-
-    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
-        """Tests that have ended, waiting at most `seconds` for one."""
-        ready, self._ready = self._ready, []
-        return sorted([*ready, *self._pool.finished(0.0 if ready else seconds)], key=lambda one: one[0])
-
-    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
-        """As `Pool.settle`."""
-        return self._pool.settle(elements)
-
-    def live(self) -> list[Live]:
-        """The running tests that have begun to move."""
-        return self._pool.live()
-
-    def paces(self) -> list[Pace]:
-        """How far the running tests are."""
-        return self._pool.paces()
-
-    def close(self) -> None:
-        """Kills what runs."""
-        self._pool.close()
-
-
-def _result(place: Place | None) -> RunResult | None:
+def result_of(place: Place) -> RunResult | None:
     """The result of a test; None if it can no longer be read."""
-    if place is None:
-        return None
     test = place.test
     try:
         with RunFile(place.path) as other:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import pickle
 import signal
@@ -18,15 +17,13 @@ from typing import Any, Protocol, cast, runtime_checkable
 from ddenv.errors import UserError
 from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
-from ddenv.runfile.store import COLUMNS
 from ddenv.text import printable
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
 NICENESS = 5
-POSE = COLUMNS - 1
-# Time between two looks at where the models of a running test are, s.
-MODELS_PERIOD = 0.1
+# Time between two moments of a running test, s.
+PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
 
@@ -60,34 +57,6 @@ class Start:
     supports: list[tuple[str, str]]
     settled: Settled
     ties: list[tuple[str, str]] | None = None
-
-
-@dataclass(frozen=True)
-class Shared:
-    """Memory that a pool shares with its workers, with a part for each slot.
-
-    `progress` has `COLUMNS` doubles a slot; `begun` one, when the robot began to move, s of `time.monotonic`, and 0 before that.
-    `models` has a pose for each of `names`, the models that can move; its x is NaN while the model is where it started.
-    """
-
-    progress: Any
-    begun: Any
-    models: Any = None
-    names: tuple[str, ...] = ()
-
-    def moved(self, slot: int) -> dict[str, PoseRow]:
-        """Where the models of a slot's test are that are no longer where they started."""
-        size = POSE * len(self.names)
-        poses = (tuple(self.models[at : at + POSE]) for at in range(slot * size, (slot + 1) * size, POSE))
-        return {name: pose for name, pose in zip(self.names, poses, strict=True) if math.isfinite(pose[0])}
-
-    def move(self, slot: int, starts: Mapping[str, PoseRow], models: Mapping[str, PoseRow]) -> None:
-        """Puts the models of a slot's test there, from where they started."""
-        still = (math.nan,) * POSE
-        rows = [still if (pose := models.get(name, still)) == starts.get(name) else pose for name in self.names]
-        if rows:
-            begin = slot * POSE * len(rows)
-            self.models[begin : begin + POSE * len(rows)] = [value for row in rows for value in row]
 
 
 @dataclass(frozen=True)
@@ -129,7 +98,20 @@ class Broke:
     reason: str
 
 
-Answer = Ready | RunResult | Start | Refused | Broke
+@dataclass(frozen=True)
+class Moment:
+    """A test goes on: so far `time` s are simulated. The robot, and the models that are no longer where they started, are there.
+
+    The robot began to move at `begun`, s of `time.monotonic`.
+    """
+
+    begun: float
+    time: float
+    pose: PoseRow
+    models: Mapping[str, PoseRow]
+
+
+Answer = Ready | Moment | RunResult | Start | Refused | Broke
 
 
 def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
@@ -144,7 +126,7 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     return Variants(world, robot, scenario)
 
 
-def work(line: Connection, output: Connection, parts: Any, shared: Shared, slot: int) -> None:
+def work(line: Connection, output: Connection, parts: Any) -> None:
     """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is printed goes to `output`.
 
     `parts` has what to make the simulator with, pickled: shared memory, so that starting a worker takes no time in a large world.
@@ -162,7 +144,7 @@ def work(line: Connection, output: Connection, parts: Any, shared: Shared, slot:
             task = line.recv()
         except (EOFError, OSError):
             return
-        answer = answered(task, simulator, shared, slot)
+        answer = answered(task, simulator, line.send)
         line.send(answer)
         if isinstance(answer, Broke):
             os._exit(1)
@@ -179,8 +161,8 @@ def _settle_in(output: Connection) -> None:
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
 
 
-def answered(task: Task, simulator: Simulator | Exception, shared: Shared, slot: int) -> Answer:
-    """Does a task, with its progress in `slot` of the shared memory. A traceback is printed."""
+def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]) -> Answer:
+    """Does a task, and tells the moments of a test. A traceback is printed."""
     try:
         if isinstance(simulator, Exception):
             raise simulator
@@ -189,7 +171,7 @@ def answered(task: Task, simulator: Simulator | Exception, shared: Shared, slot:
             return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
         if isinstance(simulator, Limited):
             simulator.limit = task.limit
-        return simulator.run(task.keep, task.seed, _progress(shared, slot), task.full)
+        return simulator.run(task.keep, task.seed, _progress(tell), task.full)
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:
         if error is simulator and isinstance(error, UserError):
@@ -199,9 +181,9 @@ def answered(task: Task, simulator: Simulator | Exception, shared: Shared, slot:
         return Broke(_reason(error))
 
 
-def _progress(shared: Shared, slot: int) -> Progress:
-    """Writes how far a test is to the shared memory."""
-    start, begun, due = slot * COLUMNS, False, 0.0
+def _progress(tell: Callable[[Moment], object]) -> Progress:
+    """Tells how far a test is, at its start and then every `PERIOD`."""
+    begun = due = 0.0
     starts: Mapping[str, PoseRow] = {}
 
     def report(time_s: float, pose: PoseRow, models: Mapping[str, PoseRow]) -> None:
@@ -209,12 +191,10 @@ def _progress(shared: Shared, slot: int) -> Progress:
         now = time.monotonic()
         if not begun or time_s == 0.0:
             # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
-            shared.begun[slot], begun = now, True
-            starts, due = models, 0.0
+            begun, due, starts = now, now, models
         if now >= due:
-            shared.move(slot, starts, models)
-            due = now + MODELS_PERIOD
-        shared.progress[start : start + COLUMNS] = (time_s, *pose)
+            due = now + PERIOD
+            tell(Moment(begun, time_s, pose, {name: at for name, at in models.items() if at != starts.get(name)}))
 
     return report
 

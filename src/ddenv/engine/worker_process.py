@@ -11,7 +11,7 @@ from multiprocessing.context import SpawnContext
 from pathlib import Path
 from typing import Any
 
-from ddenv.engine.worker import Answer, Shared, Task, work
+from ddenv.engine.worker import Answer, Task, work
 from ddenv.robot.external.process import MOST_LEFT, PIECE, Complaints, signal_name
 
 # How many of its last lines are kept in the reason why a worker died, and how much of a test's output the log gets, bytes.
@@ -27,12 +27,12 @@ class WorkerProcess:
     answer, and each wakes up whoever waits for its `handles`.
     """
 
-    def __init__(self, context: SpawnContext, parts: Any, shared: Shared, slot: int) -> None:
+    def __init__(self, context: SpawnContext, parts: Any) -> None:
         self._line, theirs = context.Pipe()
         self._output, printed = context.Pipe(duplex=False)
         os.set_blocking(self._output.fileno(), False)
         # Daemons are killed if this process ends by an exception.
-        self._process = context.Process(target=work, args=(theirs, printed, parts, shared, slot), daemon=True)
+        self._process = context.Process(target=work, args=(theirs, printed, parts), daemon=True)
         self._process.start()
         theirs.close()
         printed.close()

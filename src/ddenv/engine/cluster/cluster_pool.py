@@ -24,7 +24,7 @@ from distributed import Client, Future, KilledWorker
 from ddenv import __version__
 from ddenv.engine.cluster.link import GOODBYE, Attached, Link, Lost, There, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
-from ddenv.engine.pool import Broken, Pace, Pool
+from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import machine, simulator
 from ddenv.engine.worker import Start
 from ddenv.errors import UserError
@@ -345,24 +345,25 @@ class ClusterPool:
 
         return found
 
-    def live(self) -> list[Live]:
-        """The running tests that have begun to move."""
-        return [
-            Live(
-                flight.slot,
-                flight.asked.test,
-                row["time"],
-                tuple(row["pose"]),
-                {name: tuple(pose) for name, pose in row["models"].items()},
-            )
-            for flight in list(self._flights.values())
-            if flight.asked is not None and (row := self._progress.get(flight.asked.test)) is not None
+    def live(self) -> list[tuple[Live, float]]:
+        """As `Pool.live`."""
+        running = [
+            (flight.slot, self._progress.get(flight.asked.test)) for flight in self._flights.values() if flight.asked
         ]
-
-    def paces(self) -> list[Pace]:
-        """How far the running tests are that have begun to move."""
-        rows = [self._progress.get(each.asked.test) for each in self._flights.values() if each.asked is not None]
-        return [Pace(row["time"], row["real"]) for row in rows if row is not None and math.isfinite(row["time"])]
+        return [
+            (
+                Live(
+                    slot,
+                    row["test"],
+                    row["time"],
+                    tuple(row["pose"]),
+                    {name: tuple(pose) for name, pose in row["models"].items()},
+                ),
+                row["real"],
+            )
+            for slot, row in running
+            if row is not None and math.isfinite(row["time"])
+        ]
 
     def close(self) -> None:
         """Drops what runs: the workers end it by themselves."""

@@ -116,8 +116,8 @@ def _is_wanted(worker: Worker, key: Any) -> bool:
 
 
 def _report(worker: Worker, child: Pool, asked: Asked) -> None:
-    for live, pace in zip(child.live(), child.paces(), strict=False):
-        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models, "real": pace.real}
+    for live, real in child.live():
+        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models, "real": real}
         worker.log_event(asked.topic, row)
 
 
