@@ -16,9 +16,8 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Broken
 from ddenv.engine.shared import Key, Place
-from ddenv.engine.worker import Start
+from ddenv.engine.worker import Broken, Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState

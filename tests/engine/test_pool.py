@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from ddenv.engine.pool import PREPARATION, Broken, Pool
-from ddenv.engine.worker import PERIOD, Moment, Run, answered
+from ddenv.engine.pool import PREPARATION, Pool
+from ddenv.engine.worker import PERIOD, Broken, Moment, Run, answered
 from ddenv.errors import UserError
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import load_scenario

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from ddenv.engine.limits import FACTOR, GENEROUS, KNOWN_AFTER, LEAST, MOST_LATE
-from ddenv.engine.pool import Broken
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run

@@ -11,7 +11,8 @@ from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import rows_of
 from ddenv.engine.limits import note, wall_limit
-from ddenv.engine.pool import Broken, Workers
+from ddenv.engine.pool import Workers
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import notes_on

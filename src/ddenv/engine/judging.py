@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ddenv.engine.pool import Broken
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory

@@ -12,11 +12,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import wait
-from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, memory_limit, too_large
-from ddenv.engine.worker import Broke, Make, Moment, Ready, Refused, Run, Settle, Start, Task, simulator_of
+from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, simulator_of
 from ddenv.engine.worker_process import WorkerProcess
 from ddenv.errors import UserError
 from ddenv.robot import check_drake
@@ -37,24 +36,12 @@ FOR_DRAKE = {
 _one_at_a_time = threading.Lock()
 
 
-class _DrakeProcess(SpawnProcess):
-    """A process started with `FOR_DRAKE`: libraries read these variables before any Python code runs."""
-
-    @staticmethod
-    def _Popen(process: SpawnProcess) -> object:  # type: ignore[override]  # a private part of the standard library
-        with _environment(FOR_DRAKE):
-            return SpawnProcess._Popen(process)
-
-
-class DrakeContext(SpawnContext):
-    """Starts processes for the simulation with Drake, also in place of those that died."""
-
-    Process = _DrakeProcess
-
-
 @contextmanager
-def _environment(more: Mapping[str, str]) -> Iterator[None]:
-    """Adds `more` to the environment for a moment, unless the user has set it: a new process inherits it."""
+def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
+    """Adds `more` to the environment for a moment, unless the user has set it: a new process inherits it.
+
+    Libraries read these variables before any Python code runs.
+    """
     with _one_at_a_time:
         added = [name for name in more if name not in os.environ]
         os.environ.update({name: more[name] for name in added})
@@ -78,14 +65,6 @@ LONGEST_LOOK = 1.0
 MEMORY_PERIOD, FEW = 0.2, 8
 # The maximum time between two looks at the clocks, s.
 CLOCK_PERIOD = 0.1
-
-
-@dataclass(frozen=True)
-class Broken:
-    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died or broke)."""
-
-    outcome: str
-    failure: str
 
 
 @dataclass(frozen=True)
@@ -153,8 +132,9 @@ class Pool:
 
         Raises UserError where Drake is needed and not installed.
         """
+        self._context = multiprocessing.get_context("spawn")
         # The user's own simulator gets the environment unchanged.
-        self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
+        self._variables = FOR_DRAKE if scenario.oracle is None else {}
         if scenario.oracle is None:
             check_drake()
         parts = pickle.dumps((make, (scenario, world, robot)))
@@ -169,7 +149,8 @@ class Pool:
         self._slots = [_Slot(self._worker()) for _ in range(jobs)]
 
     def _worker(self) -> WorkerProcess:
-        return WorkerProcess(self._context, self._parts)
+        with added_to_environment(self._variables):
+            return WorkerProcess(self._context, self._parts)
 
     @property
     def idle(self) -> int:
@@ -256,11 +237,11 @@ class Pool:
                 slot.ready = True
                 if slot.job is not None:
                     self._hand_over(slot)
-            case Refused(why):
-                raise why
-            case Broke(reason):
+            case UserError():
+                raise answer
+            case Broken():
                 slot.worker.kill()
-                self._replace(slot, Broken("error", reason))
+                self._replace(slot, answer)
             case _:
                 slot.result = answer
 

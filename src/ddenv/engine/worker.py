@@ -85,17 +85,11 @@ class Ready:
 
 
 @dataclass(frozen=True)
-class Refused:
-    """The world cannot be simulated: `why` is for the user."""
+class Broken:
+    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died, or an exception ended it)."""
 
-    why: UserError
-
-
-@dataclass(frozen=True)
-class Broke:
-    """An exception ended the task, in one line, and ends the worker: nobody knows what it has left behind in the simulator."""
-
-    reason: str
+    outcome: str
+    failure: str
 
 
 @dataclass(frozen=True)
@@ -111,7 +105,8 @@ class Moment:
     models: Mapping[str, PoseRow]
 
 
-Answer = Ready | Moment | RunResult | Start | Refused | Broke
+# A UserError says why the world cannot be simulated.
+Answer = Ready | Moment | RunResult | Start | Broken | UserError
 
 
 def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
@@ -146,7 +141,8 @@ def work(line: Connection, output: Connection, parts: Any) -> None:
             return
         answer = answered(task, simulator, line.send)
         line.send(answer)
-        if isinstance(answer, Broke):
+        if isinstance(answer, Broken):
+            # Nobody knows what an exception has left behind in the simulator.
             os._exit(1)
 
 
@@ -175,10 +171,10 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:
         if error is simulator and isinstance(error, UserError):
-            return Refused(error)
+            return error
         traceback.print_exception(error)
         sys.stderr.flush()
-        return Broke(_reason(error))
+        return Broken("error", _reason(error))
 
 
 def _progress(tell: Callable[[Moment], object]) -> Progress:

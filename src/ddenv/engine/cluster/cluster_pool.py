@@ -6,15 +6,16 @@ are others than here.
 
 from __future__ import annotations
 
-import math
 import pickle
 import uuid
 import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
+from itertools import count as count_from
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -22,11 +23,11 @@ import numpy as np
 from distributed import Client, Future, KilledWorker
 
 from ddenv import __version__
-from ddenv.engine.cluster.link import GOODBYE, Attached, Link, Lost, There, in_a_line
+from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Start
+from ddenv.engine.worker import Broken, Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -41,37 +42,33 @@ REFERENCE = 0
 
 
 @dataclass(frozen=True)
+class _Flight:
+    """What a worker was asked; the scheduler drops it with the `future`. `asked` is None for a hello."""
+
+    future: Future[Any]
+    asked: Asked | None
+    slot: int
+
+
+@dataclass(eq=False)
 class _Worker:
     """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered, `isin` whether it is
-    taken in.
+    taken in. `flights` are by their keys.
     """
 
     address: str
     threads: int
     hello: Hello | None = None
     isin: bool = False
+    flights: dict[str, _Flight] = field(default_factory=dict)
+
+    @property
+    def free(self) -> int:
+        return self.threads - len(self.flights) if self.isin else 0
 
     @property
     def name(self) -> str:
         return self.address if self.hello is None else f"{self.address} ({printable(self.hello.host)})"
-
-
-@dataclass(frozen=True)
-class _Flight:
-    """What a worker was asked; the scheduler drops it with the `future`. `asked` is None for a hello."""
-
-    address: str
-    future: Future[Any]
-    asked: Asked | None
-    slot: int = 0
-
-
-@dataclass(frozen=True)
-class _Ended:
-    """What came back for a key: a result, a hello with a run, or an exception."""
-
-    key: str
-    answer: Any
 
 
 class ClusterPool:
@@ -86,9 +83,8 @@ class ClusterPool:
         self._keys = 0
         self._whole = frozenset(world.elements(frozenset(scenario.protected))), scenario.reduction.seed
         self._workers: dict[str, _Worker] = {}
-        self._flights: dict[str, _Flight] = {}
         self._waiting: list[Asked] = []
-        self._greeted: list[tuple[str, Hello, RunResult | Broken | None]] = []
+        self._greeted: list[tuple[_Worker, Hello, RunResult | Broken | None]] = []
         self._ready: list[tuple[int, RunResult | Broken]] = []
         self._progress: dict[int, Mapping[str, Any]] = {}
         self._news: list[str] = []
@@ -100,9 +96,10 @@ class ClusterPool:
         self._same: list[int] = []
         self._home: Pool | None = None
         self._settling = False
-        self._happenings: SimpleQueue[Any] = SimpleQueue()
+        # What has happened in other threads, to be done in that of the engine.
+        self._due: SimpleQueue[Callable[[], None]] = SimpleQueue()
         tell(0, f"asking the Dask scheduler of {cluster}")
-        self._link = Link(cluster, self._happenings)
+        self._link = Link(cluster, self._later(self._attached), self._later(self._there), self._later(self._lost))
         if self._compares:
             self._here().submit(REFERENCE, *self._whole)
 
@@ -112,20 +109,27 @@ class ClusterPool:
             self._home = Pool(*self._parts, 1)
         return self._home
 
-    @property
-    def idle(self) -> int:
-        """How many more tests can start now."""
-        made = sum(flight.asked is not None for flight in self._flights.values())
-        return max(0, self._room - made - len(self._waiting))
+    def _later(self, happened: Callable[..., None]) -> Callable[..., None]:
+        return lambda *what: self._due.put(partial(happened, *what))
 
     @property
-    def busy(self) -> int:
-        made = sum(flight.asked is not None for flight in self._flights.values())
-        return made + len(self._waiting) + len(self._ready) + len(self._same)
+    def _tests(self) -> list[tuple[int, Asked]]:
+        """The tests that workers make, with their slots."""
+        flights = (flight for worker in self._workers.values() for flight in worker.flights.values())
+        return [(flight.slot, flight.asked) for flight in flights if flight.asked is not None]
 
     @property
     def _room(self) -> int:
         return sum(worker.threads for worker in self._workers.values() if worker.isin)
+
+    @property
+    def idle(self) -> int:
+        """How many more tests can start now."""
+        return max(0, self._room - len(self._tests) - len(self._waiting))
+
+    @property
+    def busy(self) -> int:
+        return len(self._tests) + len(self._waiting) + len(self._ready) + len(self._same)
 
     def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
         """Has a worker make a test, as soon as there is one; as `Pool.submit`."""
@@ -140,11 +144,9 @@ class ClusterPool:
         """As `Pool.finished`: tests that have ended, waiting at most `seconds` for one."""
         self._look_here()
         with suppress(Empty):
-            happened = self._happenings.get(timeout=0.0 if self._ready else seconds) if seconds else None
+            self._due.get(timeout=0.0 if self._ready else seconds)()
             while True:
-                if happened is not None:
-                    _HANDLED[type(happened)](self, happened)
-                happened = self._happenings.get_nowait()
+                self._due.get_nowait()()
         self._take_in()
         self._send()
         self._say()
@@ -169,8 +171,8 @@ class ClusterPool:
 
     # What happens to the cluster.
 
-    def _attached(self, happened: Attached) -> None:
-        self._client = happened.client
+    def _attached(self, client: Client) -> None:
+        self._client = client
         self._client.subscribe_topic(self._topic, self._noted)
         with warnings.catch_warnings():
             # A world with meshes is large, and goes out once.
@@ -179,34 +181,34 @@ class ClusterPool:
             self._sent = self._client.submit(bytes, self._blob, key=self._key("parts"), pure=False)
         self._news.append(f"attached to the Dask scheduler of {self._cluster}")
 
-    def _lost(self, happened: Lost) -> None:
+    def _lost(self, why: str) -> None:
         self._client = self._sent = None
         for address in list(self._workers):
             self._gone(address)
         self._news.append(
-            f"the Dask scheduler of {self._cluster} is lost ({happened.why}); waiting for it. To go on without it, stop the run, "
+            f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. To go on without it, stop the run, "
             "and resume it with --cluster here"
         )
 
-    def _there(self, happened: There) -> None:
-        gone = [address for address in self._workers if address not in happened.threads]
+    def _there(self, threads: Mapping[str, int]) -> None:
+        gone = [address for address in self._workers if address not in threads]
         lost = sum(self._gone(address) for address in gone)
         if gone:
             again = f"; {count(lost, 'test')} made again elsewhere" if lost else ""
             self._news.append(f"{count(len(gone), 'worker')} left the cluster{again}")
-        new = [address for address in happened.threads if address not in self._workers]
-        for address in new:
-            self._workers[address] = _Worker(address, happened.threads[address])
-            self._ask(address)
+        new = [_Worker(address, threads[address]) for address in threads if address not in self._workers]
+        for worker in new:
+            self._workers[worker.address] = worker
+            self._ask(worker)
         if new:
             first = ": first the whole world once, as it is made here, to compare the bits" if self._compares else ""
             self._news.append(f"{count(len(new), 'worker')} came to the cluster{first}")
 
     def _gone(self, address: str) -> int:
         """Forgets a worker; returns how many of its tests have to be made again."""
-        del self._workers[address]
-        keys = [key for key, flight in self._flights.items() if flight.address == address]
-        again = [asked for key in keys if (asked := self._flights.pop(key).asked) is not None]
+        worker = self._workers.pop(address)
+        again = [flight.asked for flight in worker.flights.values() if flight.asked is not None]
+        worker.flights.clear()
         self._wait_again(again)
         return len(again)
 
@@ -225,33 +227,28 @@ class ClusterPool:
         self._keys += 1
         return f"{what}-{self._keys}-{self._topic}"
 
-    def _ask(self, address: str) -> None:
+    def _ask(self, worker: _Worker) -> None:
         """Asks a new worker who it is, and what bits it computes."""
-        self._hand_out(
-            address, greet, "hello", Asked(self._run, self._topic, REFERENCE, *self._whole, True, None), None
-        )
+        whole = Asked(self._run, self._topic, REFERENCE, *self._whole, True, None)
+        self._hand_out(worker, greet, "hello", whole, None)
 
     def _send(self) -> None:
-        """Hands tests to free workers, in the order of the algorithm."""
-        while self._waiting and self._client is not None and (address := self._free()) is not None:
+        """Hands tests to the workers with the most free threads, in the order of the algorithm."""
+        while self._waiting and self._client is not None:
+            worker = max(self._workers.values(), key=lambda worker: worker.free, default=None)
+            if worker is None or worker.free <= 0:
+                return
             asked = self._waiting.pop(0)
-            self._hand_out(address, make, "test", asked, asked)
+            self._hand_out(worker, make, "test", asked, asked)
 
-    def _free(self) -> str | None:
-        """The worker with the most free threads; None if all are busy."""
-        free = {worker.address: worker.threads for worker in self._workers.values() if worker.isin}
-        for flight in self._flights.values():
-            if flight.address in free:
-                free[flight.address] -= 1
-        best = max(free, key=lambda address: free[address], default=None)
-        return best if best is not None and free[best] > 0 else None
-
-    def _hand_out(self, address: str, what: Callable[..., Any], name: str, words: Asked, asked: Asked | None) -> None:
+    def _hand_out(
+        self, worker: _Worker, what: Callable[..., Any], name: str, words: Asked, asked: Asked | None
+    ) -> None:
         assert self._client is not None
         key = self._key(name)
         try:
             future = self._client.submit(
-                what, self._sent, words, key=key, workers=[address], pure=False, priority=-words.test
+                what, self._sent, words, key=key, workers=[worker.address], pure=False, priority=-words.test
             )
         except Exception:
             # The connection has just broken: the link will say so.
@@ -259,26 +256,26 @@ class ClusterPool:
                 self._wait_again([asked])
             self._client = None
             return
-        used = {flight.slot for flight in self._flights.values()}
-        slot = next(number for number in range(len(used) + 1) if number not in used)
-        self._flights[key] = _Flight(address, future, asked, slot)
-        future.add_done_callback(lambda done: self._happenings.put(_Ended(key, _answer(done))))
+        used = {slot for slot, _ in self._tests}
+        worker.flights[key] = _Flight(future, asked, next(slot for slot in count_from(0) if slot not in used))
+        ended = self._later(self._ended)
+        future.add_done_callback(lambda done: ended(worker, key, _answer(done)))
 
-    def _ended(self, happened: _Ended) -> None:
-        """Raises UserError if the world cannot be simulated."""
-        flight = self._flights.pop(happened.key, None)
+    def _ended(self, worker: _Worker, key: str, answer: Any) -> None:
+        """A result, a hello with a run, or an exception came back. Raises UserError if the world cannot be simulated."""
+        flight = worker.flights.pop(key, None)
         if flight is None:
-            # Its worker was lost, and the test is made elsewhere.
+            # The worker was lost, and the test is made elsewhere.
             return
-        answer, asked = happened.answer, flight.asked
+        asked = flight.asked
         if asked is None:
-            self._answered(flight.address, answer)
+            self._answered(worker, answer)
             return
         if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker):
             self._wait_again([asked])
-            if isinstance(answer, NotGreeted) and (worker := self._workers.get(flight.address)) is not None:
-                self._workers[worker.address] = replace(worker, isin=False)
-                self._ask(worker.address)
+            if isinstance(answer, NotGreeted):
+                worker.isin = False
+                self._ask(worker)
             return
         self._progress.pop(asked.test, None)
         if isinstance(answer, UserError):
@@ -288,29 +285,26 @@ class ClusterPool:
 
     # Who may make tests.
 
-    def _answered(self, address: str, answer: Any) -> None:
-        worker = self._workers.get(address)
-        if worker is None or isinstance(answer, CancelledError | KilledWorker):
+    def _answered(self, worker: _Worker, answer: Any) -> None:
+        if isinstance(answer, CancelledError | KilledWorker):
             return
         if isinstance(answer, BaseException):
             self._leave_out(worker, f"it cannot make tests: {printable(in_a_line(answer))}")
             return
-        hello, run = answer
-        self._workers[address] = replace(worker, hello=hello)
-        self._greeted.append((address, hello, run))
+        worker.hello, _ = answer
+        self._greeted.append((worker, *answer))
 
     def _take_in(self) -> None:
         """Compares what new workers made, once there is something to compare with."""
         if self._compares and self._reference is None:
             return
-        for address, hello, run in self._greeted:
-            worker = self._workers.get(address)
-            if worker is None:
+        for worker, hello, run in self._greeted:
+            if worker is not self._workers.get(worker.address):
                 continue
             if why := refusal(hello, run, self._reference):
                 self._leave_out(worker, why)
             else:
-                self._workers[address] = replace(worker, isin=True)
+                worker.isin = True
         self._greeted.clear()
 
     def _leave_out(self, worker: _Worker, why: str) -> None:
@@ -347,22 +341,11 @@ class ClusterPool:
 
     def live(self) -> list[tuple[Live, float]]:
         """As `Pool.live`."""
-        running = [
-            (flight.slot, self._progress.get(flight.asked.test)) for flight in self._flights.values() if flight.asked
-        ]
+        rows = ((slot, self._progress.get(asked.test)) for slot, asked in self._tests)
         return [
-            (
-                Live(
-                    slot,
-                    row["test"],
-                    row["time"],
-                    tuple(row["pose"]),
-                    {name: tuple(pose) for name, pose in row["models"].items()},
-                ),
-                row["real"],
-            )
-            for slot, row in running
-            if row is not None and math.isfinite(row["time"])
+            (Live(slot, row["test"], row["time"], row["pose"], row["models"]), row["real"])
+            for slot, row in rows
+            if row is not None
         ]
 
     def close(self) -> None:
@@ -370,7 +353,7 @@ class ClusterPool:
         if self._home is not None:
             self._home.close()
         client, taken = self._client, [worker.address for worker in self._workers.values() if worker.isin]
-        self._flights.clear()
+        self._workers.clear()
         if client is not None and taken:
             with suppress(Exception):
                 client.sync(client._run, forget, self._run, workers=taken, on_error="ignore", callback_timeout=GOODBYE)
@@ -417,11 +400,3 @@ def _same_bits(one: RunResult, other: RunResult) -> bool:
     ours, theirs = ({**run.motions, "": run.trajectory} for run in (one, other))
     same_models = ours.keys() == theirs.keys()
     return first == second and same_models and all(np.array_equal(ours[name], theirs[name]) for name in ours)
-
-
-_HANDLED: dict[type, Callable[[ClusterPool, Any], None]] = {
-    Attached: ClusterPool._attached,
-    Lost: ClusterPool._lost,
-    There: ClusterPool._there,
-    _Ended: ClusterPool._ended,
-}
