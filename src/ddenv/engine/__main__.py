@@ -24,14 +24,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError
-from ddenv.runfile.events import (
-    AcceptModeChanged,
-    Cluster,
-    EngineFailed,
-    EngineStarted,
-    EngineStopped,
-    IsolationGivenUp,
-)
+from ddenv.runfile import events
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs import processor
@@ -124,15 +117,15 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
             pool.close()
     except Stopped as stop:
         journal.lose_running()
-        journal.record(EngineStopped(str(stop)))
+        journal.record(events.EngineStopped(str(stop)))
         return 1
     except UserError as error:
         journal.lose_running()
-        journal.record(EngineFailed(str(error)))
+        journal.record(events.EngineFailed(str(error)))
         raise
     except Exception as error:
         # A bug in ddenv: the traceback goes to the log, and views show the reason.
-        journal.record(EngineFailed(f"unexpected {type(error).__name__}: {error} (see the log beside the run)"))
+        journal.record(events.EngineFailed(f"unexpected {type(error).__name__}: {error} (see the log beside the run)"))
         raise
     finally:
         file.set_live([])
@@ -145,7 +138,7 @@ def _give_up(file: RunFile) -> int:
     file.own()
     journal = Journal(file)
     if journal.state.isolating is not None:
-        journal.record(IsolationGivenUp())
+        journal.record(events.IsolationGivenUp())
     return 0
 
 
@@ -155,15 +148,17 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     # Only who asks for a cluster needs Dask.
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
-    return ClusterPool(scenario, world, robot, cluster, lambda tests, words: journal.record(Cluster(tests, words)))
+    return ClusterPool(
+        scenario, world, robot, cluster, lambda tests, words: journal.record(events.Cluster(tests, words))
+    )
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: Literal["automatic", "ask"] | None) -> None:
     # This event comes first: all events before it are another engine's.
-    journal.record(EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
+    journal.record(events.EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
     journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:
-        journal.record(AcceptModeChanged(accept_mode))
+        journal.record(events.AcceptModeChanged(accept_mode))
 
 
 if __name__ == "__main__":

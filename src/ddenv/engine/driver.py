@@ -12,9 +12,8 @@ from ddenv.engine.beginning import settle
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import fix_failure, known_failure, rows_of
+from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
 from ddenv.engine.limits import limit_after
-from ddenv.engine.sight import Sight
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.environment import Environment
 from ddenv.errors import UserError

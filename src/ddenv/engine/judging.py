@@ -1,5 +1,5 @@
-"""What the tests showed: the failure f, fixed from runs of the whole world, and each result judged by it, as plain data for the run
-file and for `--json`: every number in it is finite.
+"""What the tests showed: the failure f, fixed from runs of the whole world; each result judged by it, as plain data for the run
+file and for `--json`, in which every number is finite; and what the schemas see of them.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
+from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
@@ -21,6 +22,9 @@ from ddenv.runfile.failures import Baseline, SeenFailure, grouped
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.text import count
+from ddenv.world.extent import center, model_bounds
+from ddenv.world.model import Model, World
+from ddenv.world.pose import headings
 from ddenv.world.scenario import FailureSpec
 
 
@@ -183,3 +187,57 @@ def _no_failure(tests: Sequence[Test]) -> str:
     reached = len(tests) - len(broken)
     also = f" ({len(broken)} more broke: {broken[0].failure})" if broken else ""
     return f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce"
+
+
+# What the schemas see.
+
+
+def trajectory_of(rows: np.ndarray) -> np.ndarray:
+    """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to (N, 5)."""
+    return np.column_stack([rows[:, :4], headings(rows[:, 4:])])
+
+
+def traits_of(model: Model) -> Traits:
+    """What the learner knows about a model. The most slippery of its surfaces counts."""
+    box = model_bounds(model)
+    size = 0.0 if box is None else float((box[1] - box[0]).max())
+    friction = min((collision.mu for collision in model.collisions), default=1.0)
+    return Traits(size, friction, not model.static)
+
+
+def _end(state: RunState, run: Test) -> tuple[float, float, float]:
+    """Where f ended; if several failures count as f, the one that `run` showed."""
+    ends = [end_of(state.tests[test - 1]) for test in state.failures]
+    if run.end_pose is None:
+        return ends[0]
+    here = end_of(run)
+    return min(ends, key=lambda end: math.dist(end, here))
+
+
+class Sight:
+    """The part of the evidence that comes from the world and never changes in a run."""
+
+    def __init__(self, world: World, elements: Sequence[str], delta: float, seed: int) -> None:
+        models = {model.name: model for model in world.models}
+        self._elements = tuple(elements)
+        self._positions = {name: center(models[name]) for name in elements}
+        self._traits = {name: traits_of(models[name]) for name in elements}
+        self._delta = delta
+        self._seed = seed
+
+    def evidence(self, state: RunState, test: int, rows: np.ndarray, trials: Sequence[Trial]) -> Evidence:
+        """The evidence if `test` was the last similar run; `rows` (N, 8) is its trajectory."""
+        run, f = state.tests[test - 1], known_failure(state)
+        return Evidence(
+            elements=self._elements,
+            positions=self._positions,
+            trajectory=trajectory_of(rows),
+            failure_position=_end(state, run),
+            first_sensed=dict(run.first_sensed),
+            touched=frozenset(name for name, _ in run.first_touched),
+            traits=self._traits,
+            trials=trials,
+            miss_chance=f.miss_chance,
+            delta=self._delta,
+            seed=self._seed,
+        )
