@@ -19,7 +19,7 @@ from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.claims import current, is_minimal, verdict_on
-from ddenv.evidence.rates import Shown, wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, playing
@@ -30,7 +30,7 @@ from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
-from ddenv.runfile.progress import Certificate
+from ddenv.runfile.progress import Certificate, Node
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
@@ -51,8 +51,7 @@ class Driver:
         self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
         self._evidence: Evidence | None = None
         # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
-        self._trials: list[Trial] = []
-        self._learnt: set[int] = set()
+        self._trials: dict[int, Trial] = {}
         self._unknown: set[Environment] = set()
         self._memory = Memory()
         self._guide: Guide | None = None
@@ -63,6 +62,9 @@ class Driver:
         self._reason = ""
         # How many runs of what is left a new certificate needs at least; None if the search makes it when it is over.
         self._only_certify: int | None = None
+        # What the procedure asks of what is known.
+        self.shown, self.rate = journal.shown, journal.rate_of_whole
+        self.refused, self.refused_by_user = journal.is_refused, journal.is_refused_by_user
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
@@ -134,7 +136,6 @@ class Driver:
         self._leg = self._leg_from(environment, leg.pinned, self._reduction)
         self._bench.rule = self._leg.rule
         self._trials.clear()
-        self._learnt.clear()
         self._unknown.clear()
         self._learn(leg.tests)
         self._look_at(leg.evidence_test)
@@ -151,28 +152,16 @@ class Driver:
         if leg is None:
             return steps.Leg(1, journal.whole, (journal.whole,), stays, free, Acceptance(most_misses))
         rule = Acceptance(most_misses, leg.rate, reduction.keep_rate, leg.steps_back)
-        chain = tuple(state.environments[node] for node in self._chain(leg.node))
+        chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         return steps.Leg(leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again)
 
-    def _chain(self, node: int) -> tuple[int, ...]:
-        """The numbers of the environments on the way to a node, from where the same failures counted as f as now."""
-        return tuple(reached.id for reached in self._nodes(node))
-
-    def _nodes(self, node: int) -> tuple[Any, ...]:
+    def _nodes(self, node: int) -> tuple[Node, ...]:
+        """The way to a node, from where the same failures counted as f as now."""
         path = self._journal.state.changed(node=node).path
         begin = max(place for place, one in enumerate(path) if place == 0 or one.how in ("accepted", "instead"))
         return path[begin:]
 
     # What the procedure asks.
-
-    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
-        return self._journal.shown(environment, run, full)
-
-    def refused(self, environment: Environment) -> bool:
-        return self._journal.is_refused(environment)
-
-    def refused_by_user(self, environment: Environment) -> bool:
-        return self._journal.is_refused_by_user(environment)
 
     @property
     def refusals(self) -> int:
@@ -181,9 +170,6 @@ class Driver:
     @property
     def workers(self) -> int:
         return max(1, self._journal.state.jobs) if self._control.speculates() else 1
-
-    def rate(self) -> float:
-        return self._journal.rate_of_whole()
 
     def goes_on(self) -> bool:
         """Whoever accepts each reduction by hand also goes back by hand."""
@@ -220,7 +206,7 @@ class Driver:
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
         assert self._evidence is not None
-        return replace(self._evidence, trials=self._trials)
+        return replace(self._evidence, trials=tuple(self._trials.values()))
 
     def _broke(self, leg: steps.Leg, candidate: Candidate) -> bool:
         """Whether tests of a candidate of the algorithm, which knows one model of each stack, broke and left it unknown."""
@@ -229,16 +215,14 @@ class Driver:
     def _learn(self, tests: Iterable[int]) -> None:
         """The schemas see the tests behind the verdicts of a round: a resumed run sees the same."""
         state = self._journal.state
-        for test in (state.tests[number - 1] for number in tests if number not in self._learnt):
-            self._learnt.add(test.id)
+        for test in (state.tests[number - 1] for number in tests):
             if test.outcome not in BROKEN:
                 environment = state.environments[test.environment]
-                self._trials.append(Trial(environment, test.outcome == "similar", state.elements))
+                self._trials[test.id] = Trial(environment, test.outcome == "similar", state.elements)
 
     def _look_at(self, test: int) -> None:
         """The schemas see `test`, the last similar run."""
-        rows = rows_of(self._journal.file, test)
-        self._evidence = self._sight.evidence(self._journal.state, test, rows, self._trials)
+        self._evidence = self._sight.evidence(self._journal, test)
 
     # What the procedure finds.
 
@@ -323,7 +307,7 @@ class Driver:
             self._begin,
             guide,
             self._memory,
-            replace(self._known(), trials=tuple(self._trials)),
+            self._known(),
             self.shown,
             self.refused,
             known_failure(journal.state).rate,

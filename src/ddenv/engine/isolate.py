@@ -6,8 +6,8 @@ from typing import cast
 
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Stopped
-from ddenv.engine.journal import FRESH_RUNS, Journal
-from ddenv.engine.judging import Sight, known_failure, rows_of
+from ddenv.engine.journal import Journal
+from ddenv.engine.judging import Sight, known_failure
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, wilson_interval
@@ -17,7 +17,7 @@ from ddenv.reduction.procedure import Judged, NamedClaim, Step, Wants
 from ddenv.reduction.stacks import Stacks
 from ddenv.runfile import events
 from ddenv.runfile.progress import Isolation
-from ddenv.runfile.state import BROKEN
+from ddenv.runfile.state import BROKEN, FRESH_RUNS
 from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction
@@ -88,8 +88,7 @@ def _suspects(world: World, journal: Journal, reduction: Reduction) -> tuple[tup
     """
     state, f = journal.state, known_failure(journal.state).failure_test
     sight = Sight(world, state.elements, reduction.delta, reduction.seed)
-    evidence = sight.evidence(state, f, rows_of(journal.file, f), ())
-    distance = distances_to_failure(state.elements, evidence).tolist()
+    distance = distances_to_failure(state.elements, sight.evidence(journal, f)).tolist()
     stacks, left = _free(journal).by_first, journal.environment
     order = sorted(
         stacks, key=lambda first: (left.isdisjoint(stacks[first]), min(distance[model] for model in stacks[first]))

@@ -7,14 +7,16 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ddenv.engine.journal import Journal
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
-from ddenv.reduction.evidence import Evidence, Traits, Trial
+from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
@@ -219,25 +221,19 @@ class Sight:
 
     def __init__(self, world: World, elements: Sequence[str], delta: float, seed: int) -> None:
         models = {model.name: model for model in world.models}
-        self._elements = tuple(elements)
-        self._positions = {name: center(models[name]) for name in elements}
-        self._traits = {name: traits_of(models[name]) for name in elements}
-        self._delta = delta
-        self._seed = seed
+        positions = {name: center(models[name]) for name in elements}
+        traits = {name: traits_of(models[name]) for name in elements}
+        self._known = Evidence(tuple(elements), positions, traits=traits, delta=delta, seed=seed)
 
-    def evidence(self, state: RunState, test: int, rows: np.ndarray, trials: Sequence[Trial]) -> Evidence:
-        """The evidence if `test` was the last similar run; `rows` (N, 8) is its trajectory."""
-        run, f = state.tests[test - 1], known_failure(state)
-        return Evidence(
-            elements=self._elements,
-            positions=self._positions,
-            trajectory=trajectory_of(rows),
+    def evidence(self, journal: Journal, test: int) -> Evidence:
+        """The evidence if `test` was the last similar run."""
+        state, run = journal.state, journal.state.tests[test - 1]
+        return replace(
+            self._known,
+            trajectory=trajectory_of(rows_of(journal.file, test)),
             failure_position=_end(state, run),
             first_sensed=dict(run.first_sensed),
             touched=frozenset(name for name, _ in run.first_touched),
-            traits=self._traits,
-            trials=trials,
-            miss_chance=f.miss_chance,
-            delta=self._delta,
-            seed=self._seed,
+            miss_chance=known_failure(state).miss_chance,
+            _memory={},
         )

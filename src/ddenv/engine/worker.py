@@ -12,14 +12,18 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, Any, cast
 
 from ddenv.errors import UserError
+from ddenv.robot.external.simulator import ExternalSimulator
 from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
 from ddenv.text import printable
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
+
+if TYPE_CHECKING:
+    from ddenv.robot.simulation.template import Variants
 
 NICENESS = 5
 # Time between two moments of a running test, s.
@@ -27,32 +31,16 @@ PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
 
-
-@runtime_checkable
-class Limited(Protocol):
-    """A simulator that ends a test itself after `limit` s of real time, and says why."""
-
-    limit: float
-
-
-class Settling(Protocol):
-    """A simulator that lets a world come to rest.
-
-    `ties` has each of `elements` with each other one that it is tied to: without that it would move by itself, as a ball without
-    its shelf. So without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
-    """
-
-    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]: ...
-    def settled(self) -> Settled: ...
-    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None: ...
-
-
 Make = Callable[[Scenario, World, Model], Simulator]
 
 
 @dataclass(frozen=True)
 class Start:
-    """What rests on what in the settled world, as (upper, lower), how it settled, and the ties of its models if they are known."""
+    """What rests on what in the settled world, as (upper, lower), and how it settled.
+
+    `ties` has models with others that they are tied to: without that a model would move by itself, as a ball without its shelf. So
+    without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
+    """
 
     supports: list[tuple[str, str]]
     settled: Settled
@@ -112,8 +100,6 @@ Answer = Ready | Moment | RunResult | Start | Broken | UserError
 def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     """The simulator that a scenario asks for. Raises UserError if the world cannot be simulated."""
     if scenario.oracle is not None:
-        from ddenv.robot.external.simulator import ExternalSimulator
-
         return ExternalSimulator(world, scenario)
     # Drake takes a second to load, and users of another simulator may not have it.
     from ddenv.robot.simulation.template import Variants
@@ -163,9 +149,10 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
         if isinstance(simulator, Exception):
             raise simulator
         if isinstance(task, Settle):
-            world = cast(Settling, simulator)
+            world = cast("Variants", simulator)
             return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
-        if isinstance(simulator, Limited):
+        if isinstance(simulator, ExternalSimulator):
+            # It ends a test itself, and says why.
             simulator.limit = task.limit
         return simulator.run(task.keep, task.seed, _progress(tell), task.full)
     # Drake raises SystemExit when one of its own checks fails.
