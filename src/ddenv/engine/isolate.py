@@ -13,7 +13,7 @@ from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, wilson_interval
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Passing, isolation
-from ddenv.reduction.procedure import Judged, NamedClaim, Step, Wants
+from ddenv.reduction.procedure import Judged, NamedClaim, Wants
 from ddenv.reduction.stacks import Stacks
 from ddenv.runfile import events
 from ddenv.runfile.progress import Isolation
@@ -131,16 +131,13 @@ class _Isolator:
             except StopIteration as end:
                 removed: Environment | None = end.value
                 return removed
-            self._answer(step)
-
-    def _answer(self, step: Step | Checked) -> None:
-        match step:
-            case Wants():
-                self._bench.work(step.tests)
-            case Judged():
-                self._judged(step)
-            case Checked():
-                self._check(step)
+            match step:
+                case Wants():
+                    self._bench.work(step.tests)
+                case Judged():
+                    self._judged(step)
+                case Checked():
+                    self._check(step)
 
     # What the procedure asks.
 
@@ -158,8 +155,7 @@ class _Isolator:
     def refused(self, environment: Environment) -> bool:
         return False
 
-    def refused_by_user(self, environment: Environment) -> bool:
-        return False
+    refused_by_user = refused
 
     # What it finds.
 

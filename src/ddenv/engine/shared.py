@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,7 +21,7 @@ from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import CERTIFY, Test
+from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
@@ -67,40 +68,36 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
     for path in sorted(folder.glob(f"*{SUFFIX}")):
         if path.resolve() == run.path.resolve():
             continue
-        try:
-            with RunFile(path) as other:
-                known |= dict(_tests_of(other)) if _is_alike(run, other) else {}
-        except UserError:
-            # Files that cannot be read are skipped.
-            continue
+        # Files that cannot be read are skipped.
+        with suppress(UserError), RunFile(path) as other:
+            written = list(other.events()) if _is_alike(run, other) else []
+            engines = (each.event for each in written if isinstance(each.event, EngineStarted))
+            if {(one.version, one.simulator, one.machine) for one in engines} == {
+                (__version__, simulator(), machine())
+            }:
+                known |= dict(_tests_of(path, fold(written)))
     return known
 
 
-def _tests_of(other: RunFile) -> Iterator[tuple[Key, Place]]:
-    state = fold(other.events())
+def _tests_of(path: Path, state: RunState) -> Iterator[tuple[Key, Place]]:
     for test in state.tests:
         # Another run implies for itself.
         if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None:
             models = frozenset(state.models_of(test))
             for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
                 if holds:
-                    yield (models, test.seed, full), Place(other.path, test, state.elements)
+                    yield (models, test.seed, full), Place(path, test, state.elements)
 
 
 def _is_alike(run: RunFile, other: RunFile) -> bool:
-    """Whether tests of the same models and the same seed are the same in both runs."""
-    first, second = ([recorded.event for recorded in file.events(most=1)] for file in (run, other))
-    if not (first and second and isinstance(first[0], Created) and isinstance(second[0], Created)):
+    """Whether both runs are asked for tests of the same models in the same world."""
+    ours, theirs = (next((each.event for each in file.events(most=1)), None) for file in (run, other))
+    if not isinstance(ours, Created) or not isinstance(theirs, Created):
         return False
-    ours, theirs = first[0], second[0]
     asked = _asked(ours.scenario)
     if asked is None or asked != _asked(theirs.scenario) or ours.elements != theirs.elements:
         return False
-    if any(run.documents(name) != other.documents(name) for name in ("world", "robot", "resource ")):
-        return False
-    engines = (recorded.event for recorded in other.events())
-    made_with = {(one.version, one.simulator, one.machine) for one in engines if isinstance(one, EngineStarted)}
-    return made_with == {(__version__, simulator(), machine())}
+    return all(run.documents(name) == other.documents(name) for name in ("world", "robot", "resource "))
 
 
 def _asked(scenario: dict[str, Any]) -> Any:

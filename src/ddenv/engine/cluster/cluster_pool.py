@@ -80,11 +80,11 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._keys = 0
         self._whole = frozenset(world.elements(frozenset(scenario.protected))), scenario.reduction.seed
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
-        self._greeted: list[tuple[_Worker, Hello, RunResult | Broken | None]] = []
+        # Workers that have answered, each with the run that it made to compare.
+        self._greeted: list[tuple[_Worker, RunResult | Broken | None]] = []
         self._ready: list[tuple[int, RunResult | Broken]] = []
         self._progress: dict[int, Mapping[str, Any]] = {}
         self._news: list[str] = []
@@ -93,7 +93,6 @@ class ClusterPool:
         self._sent: Future[bytes] | None = None
         self._compares = scenario.oracle is None
         self._reference: RunResult | None = None
-        self._same: list[int] = []
         self._home: Pool | None = None
         self._settling = False
         # What has happened in other threads, to be done in that of the engine.
@@ -129,13 +128,13 @@ class ClusterPool:
 
     @property
     def busy(self) -> int:
-        return len(self._tests) + len(self._waiting) + len(self._ready) + len(self._same)
+        return len(self._tests) + len(self._waiting) + len(self._ready)
 
     def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
         """Has a worker make a test, as soon as there is one; as `Pool.submit`."""
-        if self._compares and full and (keep, seed) == self._whole:
-            # It is made here in any case.
-            self._same.append(test)
+        if self._reference is not None and full and (keep, seed) == self._whole:
+            # It was made here in any case.
+            self._ready.append((test, self._reference))
             return
         self._waiting.append(Asked(self._run, self._topic, test, keep, seed, full, limit))
         self._send()
@@ -162,9 +161,6 @@ class ClusterPool:
                         f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
                     )
                 self._reference = result
-        if self._reference is not None:
-            self._ready += [(test, self._reference) for test in self._same]
-            self._same.clear()
         if self._home is not None and not self._settling and (self._reference is not None or not self._compares):
             self._home.close()
             self._home = None
@@ -178,7 +174,9 @@ class ClusterPool:
             # A world with meshes is large, and goes out once.
             warnings.simplefilter("ignore")
             # As a task it is made again if the workers that hold it die.
-            self._sent = self._client.submit(bytes, self._blob, key=self._key("parts"), pure=False)
+            self._sent = self._client.submit(
+                bytes, self._blob, key=f"parts-{self._topic}-{uuid.uuid4().hex}", pure=False
+            )
         self._news.append(f"attached to the Dask scheduler of {self._cluster}")
 
     def _lost(self, why: str) -> None:
@@ -223,14 +221,10 @@ class ClusterPool:
 
     # Tests.
 
-    def _key(self, what: str) -> str:
-        self._keys += 1
-        return f"{what}-{self._keys}-{self._topic}"
-
     def _ask(self, worker: _Worker) -> None:
         """Asks a new worker who it is, and what bits it computes."""
         whole = Asked(self._run, self._topic, REFERENCE, *self._whole, True, None)
-        self._hand_out(worker, greet, "hello", whole, None)
+        self._hand_out(worker, greet, whole, None)
 
     def _send(self) -> None:
         """Hands tests to the workers with the most free threads, in the order of the algorithm."""
@@ -239,13 +233,11 @@ class ClusterPool:
             if worker is None or worker.free <= 0:
                 return
             asked = self._waiting.pop(0)
-            self._hand_out(worker, make, "test", asked, asked)
+            self._hand_out(worker, make, asked, asked)
 
-    def _hand_out(
-        self, worker: _Worker, what: Callable[..., Any], name: str, words: Asked, asked: Asked | None
-    ) -> None:
+    def _hand_out(self, worker: _Worker, what: Callable[..., Any], words: Asked, asked: Asked | None) -> None:
         assert self._client is not None
-        key = self._key(name)
+        key = f"{what.__name__}-{uuid.uuid4().hex}"
         try:
             future = self._client.submit(
                 what, self._sent, words, key=key, workers=[worker.address], pure=False, priority=-words.test
@@ -291,17 +283,17 @@ class ClusterPool:
         if isinstance(answer, BaseException):
             self._leave_out(worker, f"it cannot make tests: {printable(in_a_line(answer))}")
             return
-        worker.hello, _ = answer
-        self._greeted.append((worker, *answer))
+        worker.hello, run = answer
+        self._greeted.append((worker, run))
 
     def _take_in(self) -> None:
         """Compares what new workers made, once there is something to compare with."""
         if self._compares and self._reference is None:
             return
-        for worker, hello, run in self._greeted:
-            if worker is not self._workers.get(worker.address):
+        for worker, run in self._greeted:
+            if worker.hello is None or worker is not self._workers.get(worker.address):
                 continue
-            if why := refusal(hello, run, self._reference):
+            if why := refusal(worker.hello, run, self._reference):
                 self._leave_out(worker, why)
             else:
                 worker.isin = True

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from distributed import Worker, get_worker
@@ -129,7 +130,6 @@ class _Idle:
 
 _idle: list[_Idle] = []
 _lock = threading.Lock()
-_watched = False
 
 
 @contextmanager
@@ -159,15 +159,17 @@ def _taken(which: Callable[[_Idle], bool], most: int | None = None) -> list[Pool
 
 
 def _new(parts: bytes) -> Pool:
-    global _watched
-    with _lock:
-        if not _watched:
-            _watched = True
-            threading.Thread(target=_end_unused, daemon=True).start()
+    _watch()
     # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
     known: Parts = pickle.loads(parts)
     return Pool(*known, 1, at_a_time=get_worker().state.nthreads)
+
+
+@cache
+def _watch() -> None:
+    """Once in this process: a thread ends children that nobody uses."""
+    threading.Thread(target=_end_unused, daemon=True).start()
 
 
 def _end_unused() -> None:
