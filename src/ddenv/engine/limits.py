@@ -61,11 +61,6 @@ def memory_limit(scenario: Scenario, jobs: int) -> float:
     return asked * GIGABYTE if asked is not None else SHARE * processor.usable_memory() / jobs
 
 
-def too_large(limit: float) -> str:
-    """Why a worker was killed that used more than `limit` bytes."""
-    return f"used more than {limit / GIGABYTE:.3g} GB of memory (simulation.memory_limit, or fewer --jobs, allows more)"
-
-
 def note(journal: Journal, about: str, words: str) -> None:
     """Writes an event with a sentence, unless one `about` the same is there."""
     if about not in dict(journal.state.notes):

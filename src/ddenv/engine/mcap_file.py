@@ -353,10 +353,24 @@ def pose(at: Pose) -> Message:
 
 def marker(number: int, frame: str, name: str, at: Pose, shape: Shape, color: Color) -> Message | None:
     """A shape at `at` in `frame`; None for a plane, which has no end."""
-    drawn = _drawn(shape)
-    if drawn is None:
-        return None
-    kind, size, points = drawn
+    # The kind of marker, its size along its axes, m, and the corners of its triangles.
+    kind, points = CUBE, list[Sequence[float]]()
+    size: tuple[float, ...] = (1.0, 1.0, 1.0)
+    match shape:
+        case Box():
+            size = shape.size
+        case Sphere():
+            kind, size = SPHERE, (2 * shape.radius,) * 3
+        case Ellipsoid():
+            kind, size = SPHERE, tuple(2 * radius for radius in shape.radii)
+        case Cylinder():
+            kind, size = CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length)
+        case Capsule():
+            kind, size = CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length + 2 * shape.radius)
+        case Mesh():
+            kind, points = TRIANGLES, shape.vertices[shape.faces].reshape(-1, 3).tolist()
+        case _:
+            return None
     return {
         "header": header(0.0, frame),
         "ns": name,
@@ -368,22 +382,3 @@ def marker(number: int, frame: str, name: str, at: Pose, shape: Shape, color: Co
         "frame_locked": True,
         "points": [vector(*point) for point in points],
     }
-
-
-def _drawn(shape: Shape) -> tuple[int, Sequence[float], Iterable[Sequence[float]]] | None:
-    """The kind of marker, its size along its axes, m, and the corners of its triangles."""
-    match shape:
-        case Box():
-            return CUBE, shape.size, ()
-        case Sphere():
-            return SPHERE, (2 * shape.radius,) * 3, ()
-        case Ellipsoid():
-            return SPHERE, tuple(2 * radius for radius in shape.radii), ()
-        case Cylinder():
-            return CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length), ()
-        case Capsule():
-            return CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length + 2 * shape.radius), ()
-        case Mesh():
-            return TRIANGLES, (1.0, 1.0, 1.0), shape.vertices[shape.faces].reshape(-1, 3).tolist()
-        case _:
-            return None

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
-from ddenv.engine.limits import GENEROUS, memory_limit, too_large
-from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, simulator_of
-from ddenv.engine.worker_process import WorkerProcess
+from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
+from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, WorkerProcess, simulator_of
 from ddenv.errors import UserError
 from ddenv.robot import check_drake
 from ddenv.robot.deadline import Stopwatch
@@ -221,7 +220,8 @@ class Pool:
             for slot in self._slots:
                 if slot.worker.memory() > self._memory:
                     slot.worker.kill()
-                    self._lose(slot, too_large(self._memory))
+                    limit = f"{self._memory / GIGABYTE:.3g} GB of memory"
+                    self._lose(slot, f"used more than {limit} (simulation.memory_limit, or fewer --jobs, allows more)")
 
     def _listen(self, slot: _Slot) -> None:
         try:
