@@ -91,7 +91,7 @@ class Bench:
         self._journal = journal
         self._pool = pool
         self._control = control
-        self._others = others or {}
+        self._others = dict(others or {})
         self._taken: list[tuple[int, RunResult | Broken]] = []
         self._started: set[tuple[Environment, int, bool]] = set()
         self._next_live = 0.0
@@ -175,7 +175,7 @@ class Bench:
         # To be compared, it ends as the other one did.
         full = full or (source is not None and journal.is_full(state.tests[source - 1].phase))
         keep = frozenset(wanted.environment.names(state.elements))
-        known = self._others.get((keep, seed, full))
+        known = self._others.pop((keep, seed, full), None)
         if known is not None and (taken := result_of(known)) is not None:
             self._taken.append((number, taken))
         else:
