@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+from contextlib import closing
 from pathlib import Path
 from typing import Literal
 
@@ -100,9 +101,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
         control = Control(journal, terminated, after, disk)
-        pool = _workers(scenario, world, robot, jobs, cluster, journal)
         others = None if options.share is None else tests_of_others(file, scenario, options.share)
-        try:
+        with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
             if scenario.oracle is None:
                 check_repeats(journal, pool, control, options.bits == "mixed")
             note_start(scenario, world, robot, journal)
@@ -113,8 +113,6 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
                 isolate(world, journal, bench, options.isolate or None, before)
             else:
                 Driver(scenario, world, journal, bench, control).reduce()
-        finally:
-            pool.close()
     except Stopped as stop:
         journal.lose_running()
         journal.record(events.EngineStopped(str(stop)))

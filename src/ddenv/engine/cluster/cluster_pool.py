@@ -15,7 +15,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
-from itertools import count as count_from
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -41,30 +40,21 @@ Tell = Callable[[int, str], None]
 REFERENCE = 0
 
 
-@dataclass(frozen=True)
-class _Flight:
-    """What a worker was asked; the scheduler drops it with the `future`. `asked` is None for a hello."""
-
-    future: Future[Any]
-    asked: Asked | None
-    slot: int
-
-
 @dataclass(eq=False)
 class _Worker:
     """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered, `isin` whether it is
-    taken in. `flights` are by their keys.
+    taken in. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
     """
 
     address: str
     threads: int
     hello: Hello | None = None
     isin: bool = False
-    flights: dict[str, _Flight] = field(default_factory=dict)
+    asked: dict[str, tuple[Asked | None, Future[Any]]] = field(default_factory=dict)
 
     @property
     def free(self) -> int:
-        return self.threads - len(self.flights) if self.isin else 0
+        return self.threads - len(self.asked) if self.isin else 0
 
     @property
     def name(self) -> str:
@@ -112,10 +102,10 @@ class ClusterPool:
         return lambda *what: self._due.put(partial(happened, *what))
 
     @property
-    def _tests(self) -> list[tuple[int, Asked]]:
-        """The tests that workers make, with their slots."""
-        flights = (flight for worker in self._workers.values() for flight in worker.flights.values())
-        return [(flight.slot, flight.asked) for flight in flights if flight.asked is not None]
+    def _tests(self) -> list[int]:
+        """The tests that workers make."""
+        asked = (asked for worker in self._workers.values() for asked, _ in worker.asked.values())
+        return [each.test for each in asked if each is not None]
 
     @property
     def _room(self) -> int:
@@ -205,8 +195,8 @@ class ClusterPool:
     def _gone(self, address: str) -> int:
         """Forgets a worker; returns how many of its tests have to be made again."""
         worker = self._workers.pop(address)
-        again = [flight.asked for flight in worker.flights.values() if flight.asked is not None]
-        worker.flights.clear()
+        again = [asked for asked, _ in worker.asked.values() if asked is not None]
+        worker.asked.clear()
         self._wait_again(again)
         return len(again)
 
@@ -248,18 +238,16 @@ class ClusterPool:
                 self._wait_again([asked])
             self._client = None
             return
-        used = {slot for slot, _ in self._tests}
-        worker.flights[key] = _Flight(future, asked, next(slot for slot in count_from(0) if slot not in used))
+        worker.asked[key] = asked, future
         ended = self._later(self._ended)
         future.add_done_callback(lambda done: ended(worker, key, _answer(done)))
 
     def _ended(self, worker: _Worker, key: str, answer: Any) -> None:
         """A result, a hello with a run, or an exception came back. Raises UserError if the world cannot be simulated."""
-        flight = worker.flights.pop(key, None)
-        if flight is None:
+        if key not in worker.asked:
             # The worker was lost, and the test is made elsewhere.
             return
-        asked = flight.asked
+        asked, _ = worker.asked.pop(key)
         if asked is None:
             self._answered(worker, answer)
             return
@@ -333,12 +321,8 @@ class ClusterPool:
 
     def live(self) -> list[tuple[Live, float]]:
         """As `Pool.live`."""
-        rows = ((slot, self._progress.get(asked.test)) for slot, asked in self._tests)
-        return [
-            (Live(slot, row["test"], row["time"], row["pose"], row["models"]), row["real"])
-            for slot, row in rows
-            if row is not None
-        ]
+        rows = (row for test in self._tests if (row := self._progress.get(test)) is not None)
+        return [(Live(row["test"], row["test"], row["time"], row["pose"], row["models"]), row["real"]) for row in rows]
 
     def close(self) -> None:
         """Drops what runs: the workers end it by themselves."""
