@@ -302,15 +302,12 @@ class Bench:
             started = journal.state.tests[test - 1]
             environment = journal.state.environments[started.environment]
             self._started.discard((environment, started.run, journal.is_full(started.phase)))
-        took_part = data.pop("took_part", None)
-        pose = data.pop("end_pose")
-        noticed: dict[str, Any] = {
-            "end_pose": None if pose is None else tuple(pose),
-            "first_sensed": journal.in_order(data.pop("first_sensed")),
-            "first_touched": journal.in_order(data.pop("first_touched")),
-            "took_part": None if took_part is None else journal.models(took_part),
+        by_number: dict[str, Any] = {
+            "first_sensed": journal.in_order(data["first_sensed"]),
+            "first_touched": journal.in_order(data["first_touched"]),
+            "took_part": journal.models(data["took_part"]) if "took_part" in data else None,
         }
-        journal.record(TestFinished(test, **data, **noticed), motions)
+        journal.record(TestFinished(test, **data | by_number), motions)
         compare(journal, [journal.state.tests[test - 1]])
 
     def _counted(self) -> tuple[Failure, ...]:

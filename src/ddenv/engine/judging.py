@@ -20,7 +20,7 @@ from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
-from ddenv.runfile.failures import Baseline, SeenFailure, grouped
+from ddenv.runfile.failures import Baseline, grouped, named
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.text import count
@@ -163,7 +163,7 @@ def fix_failure(
         position=failures[f].position,
         miss_chance=miss_chance(rate, iterations),
         iterations_95=iterations_needed(rate),
-        seen=tuple(Seen(failure.test, failure.runs, failure.kinds, failure.position) for failure in seen),
+        seen=tuple(seen),
         judged=Outcomes(
             {id: judgement.outcome for id, judgement in judged.items()},
             {id: judgement.distance for id, judgement in judged.items()},
@@ -171,14 +171,15 @@ def fix_failure(
     )
 
 
-def _seen(group: Sequence[Test]) -> SeenFailure:
+def _seen(group: Sequence[Test]) -> Seen:
     """A group of failing tests, the one in their middle first."""
     kinds = Counter(test.failure for test in group)
-    return SeenFailure(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
+    return Seen(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
 
 
-def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str:
-    listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
+def _no_such_failure(seen: Sequence[Seen], wanted: int, runs: int) -> str:
+    names = (f"{named(one.kinds, one.position)} in {count(one.runs, 'run')}" for one in seen)
+    listed = "; ".join(f"{number}. {name}" for number, name in enumerate(names, 1))
     return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
 
 
