@@ -87,9 +87,6 @@ class Simulated:
     def live(self) -> list:
         return []
 
-    def paces(self) -> list:
-        return []
-
 
 def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int, int]:
     """A reduction with so many workers: its pool, the real s that it took, how many models are left, and how many tests no verdict

@@ -20,6 +20,7 @@ Needs `pip install '.[bench]'`.
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import signal
 import subprocess
 import sys
@@ -34,7 +35,7 @@ import psutil
 from peers_reducers import REDUCERS, reduce_in_process
 from peers_tests import Counts, counts
 
-from ddenv.engine.pool import DrakeContext
+from ddenv.engine.pool import FOR_DRAKE, added_to_environment
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY
@@ -205,12 +206,13 @@ def _content(file: tempfile._TemporaryFileWrapper) -> str:
 def theirs(asked: Asked, reducer: str, report: Callable[[int], None]) -> Result:
     """One reduction by another reducer. Raises UserError."""
     record = asked.folder / f"{list(REDUCERS).index(reducer)}.tests"
-    context = DrakeContext()
+    context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     work = (reducer, asked.scenario, record, asked.jobs, asked.shuffle, there)
     started = time.perf_counter()
     process = context.Process(target=reduce_in_process, args=work)
-    process.start()
+    with added_to_environment(FOR_DRAKE):
+        process.start()
     there.close()
     try:
         while not here.poll(LOOK):

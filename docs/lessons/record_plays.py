@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ddenv import schemas
-from ddenv.engine.sight import traits_of, trajectory_of
+from ddenv.engine.judging import traits_of, trajectory_of
 from ddenv.errors import UserError
 from ddenv.learn.attempt import Oracle, read_oracle
 from ddenv.learn.lesson import Lesson

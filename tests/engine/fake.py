@@ -16,8 +16,8 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Broken, Pace
-from ddenv.engine.worker import Start
+from ddenv.engine.shared import Key, Place
+from ddenv.engine.worker import Broken, Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState
@@ -73,8 +73,8 @@ class FakePool:
         self.settling = 0
         self.settled = Settled()
         self.limits: list[float | None] = []
-        # How far running tests are.
-        self.pace: list[Pace] = []
+        # How far running tests are, and how long they took so far, s.
+        self.pace: list[tuple[Live, float]] = []
 
     @property
     def idle(self) -> int:
@@ -109,10 +109,7 @@ class FakePool:
         settled = self.supports if isinstance(self.supports, Broken) else Start(self.supports, self.settled, self.ties)
         return lambda: next(looks, settled)
 
-    def live(self) -> list[Live]:
-        return []
-
-    def paces(self) -> list[Pace]:
+    def live(self) -> list[tuple[Live, float]]:
         return self.pace
 
 
@@ -135,6 +132,7 @@ def drive(
     accept_mode: str | None = None,
     prepare: Callable[[RunFile], None] | None = None,
     mixed: bool = False,
+    others: dict[Key, Place] | None = None,
 ) -> RunState:
     """Works on a run as the engine program does, in this process."""
     from ddenv.engine.__main__ import _begin
@@ -149,7 +147,7 @@ def drive(
             prepare(file)
         control = Control(journal, threading.Event(), time.time())
         check_repeats(journal, pool, control, mixed)
-        Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
+        Driver(scenario, world, journal, Bench(journal, pool, control, others), control).reduce()
         return journal.state
 
 

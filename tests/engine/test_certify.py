@@ -15,8 +15,9 @@ from ddenv.engine.__main__ import _begin
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
-from ddenv.engine.journal import FIRST_FRESH_RUN, Journal
+from ddenv.engine.journal import Journal
 from ddenv.runfile.fold import fold
+from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import read_parts
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run

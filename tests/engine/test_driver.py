@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine import background
+from ddenv.engine import bench
 from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
@@ -373,7 +373,7 @@ def forecasts(path):
 
 
 def test_each_round_is_forecast_while_tests_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(background, "FIRST", math.inf)
+    monkeypatch.setattr(bench, "FIRST", math.inf)
     paths = [new_run(tmp_path) for _ in range(3)]
     for path, pool in zip(paths, (SlowPool, SlowPool, FakePool), strict=True):
         state = drive(path, pool(needs("wall", "beam"), 2))

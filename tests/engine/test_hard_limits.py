@@ -7,7 +7,8 @@ import pytest
 
 from ddenv.engine.journal import Journal
 from ddenv.engine.limits import memory_limit
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Pool
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import read_parts

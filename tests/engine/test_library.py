@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ddenv
-from ddenv.engine.sight import traits_of, trajectory_of
+from ddenv.engine.judging import traits_of, trajectory_of
 from ddenv.errors import UserError
 from ddenv.schemas import names
 from ddenv.world.extent import center

@@ -9,10 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from ddenv.engine.pool import PREPARATION, Broken, Pool
-from ddenv.engine.worker import MODELS_PERIOD, POSE, Run, Shared, answered
+from ddenv.engine.pool import PREPARATION, Pool
+from ddenv.engine.worker import PERIOD, Broken, Moment, Run, answered
 from ddenv.errors import UserError
-from ddenv.runfile.store import COLUMNS
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import load_scenario
 from ddenv.world.sdf.read import read_world
@@ -30,16 +29,17 @@ def parts(**simulation):
 
 
 def test_a_run_that_starts_again_has_all_of_its_time():
-    begun = []
+    told = []
 
     class Again:
         def run(self, keep, seed, progress, full):
             for time_s in (0.0, 1.0, 0.0, 1.0):
-                progress(time_s, (0.0,) * (COLUMNS - 1), {})
-                begun.append(shared.begun[0])
+                progress(time_s, (0.0,) * 7, {})
+                time.sleep(PERIOD)
 
-    shared = Shared([0.0] * COLUMNS, [0.0])
-    answered(Run(EVERYTHING, 1, True, 60.0), Again(), shared, 0)
+    answered(Run(EVERYTHING, 1, True, 60.0), Again(), told.append)
+    assert [moment.time for moment in told] == [0.0, 1.0, 0.0, 1.0]
+    begun = [moment.begun for moment in told]
     assert 0.0 < begun[0] == begun[1] < begun[2] == begun[3]
 
 
@@ -51,14 +51,11 @@ def test_models_that_moved_are_told_while_a_test_runs():
         def run(self, keep, seed, progress, full):
             for time_s, ball in ((0.0, start), (1.0, start), (2.0, later), (0.0, start)):
                 progress(time_s, start, {"ball": ball, "post": start})
-                told.append(shared.moved(1))
-                time.sleep(MODELS_PERIOD)
+                time.sleep(PERIOD)
 
-    shared = Shared([0.0] * 2 * COLUMNS, [0.0] * 2, [math.nan] * 2 * 3 * POSE, ("ball", "gone", "post"))
-    answered(Run(EVERYTHING, 1, True, 60.0), Pushing(), shared, 1)
+    answered(Run(EVERYTHING, 1, True, 60.0), Pushing(), told.append)
     # A run that starts again has its models where they started, again.
-    assert told == [{}, {}, {"ball": later}, {}]
-    assert shared.moved(0) == {}
+    assert [moment.models for moment in told] == [{}, {}, {"ball": later}, {}]
 
 
 @pytest.fixture
@@ -206,7 +203,7 @@ def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
     clock = Clock(pool, monkeypatch)
     pool.submit(1, EVERYTHING, 0)
     assert clock.looks(600, every=0.5) == []
-    pool._shared.begun[0] = clock.now
+    pool._slots[0].go_on(Moment(clock.now, 0.0, (0.0,) * 7, {}))
     assert clock.looks(30, every=0.5) == []
     # The engine is stopped for a day.
     assert clock.looks(86400, every=86400) == []
@@ -227,7 +224,7 @@ def test_progress_is_seen_while_a_test_runs(pool):
     while not (ended := pool.finished(0.005)):
         seen += pool.live()
     assert ended[0][0] == 7
-    assert all(live.test == 7 and math.isfinite(live.time) for live in seen)
+    assert all(live.test == 7 and math.isfinite(live.time) and 0.0 <= real < 60.0 for live, real in seen)
     assert pool.live() == []
 
 

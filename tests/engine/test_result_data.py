@@ -3,7 +3,7 @@
 import json
 
 from ddenv.engine.judging import result_data
-from ddenv.engine.pool import Broken
+from ddenv.engine.worker import Broken
 from tests.engine.fake import result
 
 

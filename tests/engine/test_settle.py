@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ddenv.engine import bench
 from ddenv.engine.beginning import note_start
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Broken
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.settled import Settled, notes_on
 from ddenv.runfile.fold import fold

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from ddenv.engine import shared
-from ddenv.engine.shared import SharingPool
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
@@ -31,9 +30,7 @@ def known(path):
 
 def share(path, pool, found=None):
     """Works on a run; it takes over what it can."""
-    sharing = SharingPool(pool, known(path) if found is None else found)
-    sharing.jobs = pool.jobs
-    return drive(path, sharing)
+    return drive(path, pool, others=known(path) if found is None else found)
 
 
 def events(path):

@@ -12,8 +12,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
-from ddenv.engine.mcap_file import Chosen, Streams, _chosen, messages
-from ddenv.engine.ros_messages import DEFINITIONS, header, marker, nanoseconds
+from ddenv.engine.mcap_file import KINDS, Chosen, Streams, _chosen, definition, header, marker, messages, nanoseconds
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Twist, WheelSpeeds
 from ddenv.world import scenario
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Sphere
@@ -35,7 +34,7 @@ def read_back(rows):
     """Decoded messages by topic."""
     output = BytesIO()
     writer = Writer(output)
-    schemas = {name: writer.register_msgdef(name, text) for name, text in DEFINITIONS.items()}
+    schemas = {kind: writer.register_msgdef(kind, definition(kind)) for kind in KINDS}
     for topic, kind, seconds, message in rows:
         writer.write_message(topic, schemas[kind], message, nanoseconds(seconds))
     writer.finish()

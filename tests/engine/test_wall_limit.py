@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from ddenv.engine.limits import FACTOR, GENEROUS, LEAST
-from ddenv.engine.noting import KNOWN_AFTER, MOST_LATE
-from ddenv.engine.pool import Broken, Pace
+from ddenv.engine.limits import FACTOR, GENEROUS, KNOWN_AFTER, LEAST, MOST_LATE
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
+from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
 from ddenv.settings import SETTINGS
 from ddenv.words.news import news
@@ -68,9 +67,13 @@ def test_a_number_of_the_users_holds_for_all_tests(tmp_path):
     assert set(pool.limits) == {33.0}
 
 
+def pace(simulated, real, slot=0):
+    return Live(slot, 1, simulated, (0.0,) * 7), real
+
+
 def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     path, pool = new_run(tmp_path), FakePool(needs("wall"), 2)
-    pool.pace = [Pace(50.0, 12.0), Pace(3.0, 12.0)]
+    pool.pace = [pace(50.0, 12.0), pace(3.0, 12.0, 1)]
     drive(path, pool)
     written = events(path)
     kinds = [event.kind for event in written]
@@ -87,10 +90,10 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     assert said[1:] in str(content(read_run(path)).lead)
 
 
-@pytest.mark.parametrize("pace", [Pace(11.0, 10.0), Pace(0.5, KNOWN_AFTER - 0.1)])
-def test_a_fast_world_is_not_called_slow_and_one_that_has_just_begun_neither(tmp_path, pace):
+@pytest.mark.parametrize(("simulated", "real"), [(11.0, 10.0), (0.5, KNOWN_AFTER - 0.1)])
+def test_a_fast_world_is_not_called_slow_and_one_that_has_just_begun_neither(tmp_path, simulated, real):
     path, pool = new_run(tmp_path), FakePool(needs("wall"), 2)
-    pool.pace = [pace]
+    pool.pace = [pace(simulated, real)]
     assert drive(path, pool).notes == ()
 
 

@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+from contextlib import closing
 from pathlib import Path
 from typing import Literal
 
@@ -22,16 +23,9 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool, Workers
-from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
+from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError
-from ddenv.runfile.events import (
-    AcceptModeChanged,
-    Cluster,
-    EngineFailed,
-    EngineStarted,
-    EngineStopped,
-    IsolationGivenUp,
-)
+from ddenv.runfile import events
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs import processor
@@ -107,34 +101,29 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
         control = Control(journal, terminated, after, disk)
-        workers = _workers(scenario, world, robot, jobs, cluster, journal)
-        pool = workers
-        if options.share is not None:
-            pool = SharingPool(workers, tests_of_others(file, scenario, options.share))
-        try:
+        others = None if options.share is None else tests_of_others(file, scenario, options.share)
+        with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
             if scenario.oracle is None:
-                check_repeats(journal, workers, control, options.bits == "mixed")
+                check_repeats(journal, pool, control, options.bits == "mixed")
             note_start(scenario, world, robot, journal)
-            bench = Bench(journal, pool, control)
+            bench = Bench(journal, pool, control, others)
             if options.certify:
                 Driver(scenario, world, journal, bench, control).certify(options.certify)
             elif options.isolate is not None or journal.state.isolating is not None:
                 isolate(world, journal, bench, options.isolate or None, before)
             else:
                 Driver(scenario, world, journal, bench, control).reduce()
-        finally:
-            pool.close()
     except Stopped as stop:
         journal.lose_running()
-        journal.record(EngineStopped(str(stop)))
+        journal.record(events.EngineStopped(str(stop)))
         return 1
     except UserError as error:
         journal.lose_running()
-        journal.record(EngineFailed(str(error)))
+        journal.record(events.EngineFailed(str(error)))
         raise
     except Exception as error:
         # A bug in ddenv: the traceback goes to the log, and views show the reason.
-        journal.record(EngineFailed(f"unexpected {type(error).__name__}: {error} (see the log beside the run)"))
+        journal.record(events.EngineFailed(f"unexpected {type(error).__name__}: {error} (see the log beside the run)"))
         raise
     finally:
         file.set_live([])
@@ -147,7 +136,7 @@ def _give_up(file: RunFile) -> int:
     file.own()
     journal = Journal(file)
     if journal.state.isolating is not None:
-        journal.record(IsolationGivenUp())
+        journal.record(events.IsolationGivenUp())
     return 0
 
 
@@ -157,15 +146,17 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     # Only who asks for a cluster needs Dask.
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
-    return ClusterPool(scenario, world, robot, cluster, lambda tests, words: journal.record(Cluster(tests, words)))
+    return ClusterPool(
+        scenario, world, robot, cluster, lambda tests, words: journal.record(events.Cluster(tests, words))
+    )
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: Literal["automatic", "ask"] | None) -> None:
     # This event comes first: all events before it are another engine's.
-    journal.record(EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
+    journal.record(events.EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
     journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:
-        journal.record(AcceptModeChanged(accept_mode))
+        journal.record(events.AcceptModeChanged(accept_mode))
 
 
 if __name__ == "__main__":

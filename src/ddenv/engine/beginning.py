@@ -10,25 +10,13 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import rows_of
-from ddenv.engine.limits import wall_limit
-from ddenv.engine.noting import note
-from ddenv.engine.pool import Broken, Workers
+from ddenv.engine.limits import note, wall_limit
+from ddenv.engine.pool import Workers
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import notes_on
-from ddenv.runfile.events import (
-    AcceptModeChanged,
-    Compared,
-    Comparing,
-    EngineStarted,
-    EnvironmentNamed,
-    LegStarted,
-    Still,
-    Supports,
-    SupportsStarted,
-    TestLost,
-    TestStarted,
-)
+from ddenv.runfile import events
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.programs import log_of
 from ddenv.world.model import Model, World
@@ -38,7 +26,15 @@ from ddenv.world.scenario import Scenario
 # So many engines may die in a row, each before it has got anywhere.
 MOST_DEATHS = 3
 # What an engine writes again and again without getting anywhere.
-NOWHERE = (AcceptModeChanged, Comparing, SupportsStarted, LegStarted, EnvironmentNamed, TestStarted, TestLost)
+NOWHERE = (
+    events.AcceptModeChanged,
+    events.Comparing,
+    events.SupportsStarted,
+    events.LegStarted,
+    events.EnvironmentNamed,
+    events.TestStarted,
+    events.TestLost,
+)
 # The last events that are looked at.
 LAST = 3000
 
@@ -48,7 +44,7 @@ def check_crash_loop(journal: Journal) -> None:
     path, last = journal.file.path, journal.state.revision
     deaths, place = 0, 0
     for event in journal.file.events(max(0, last - LAST)):
-        if isinstance(event.event, EngineStarted):
+        if isinstance(event.event, events.EngineStarted):
             deaths += 1
         elif not isinstance(event.event, NOWHERE):
             deaths, place = 0, event.id
@@ -72,7 +68,7 @@ def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool
     test = _comparable(state)
     if state.physics.now == state.physics.proven or test is None:
         return
-    journal.record(Comparing(test.id))
+    journal.record(events.Comparing(test.id))
     pool.submit(0, frozenset(state.elements), test.seed, limit=wall_limit(state))
     while not (ended := pool.finished(WAIT)):
         control.poll()
@@ -80,7 +76,7 @@ def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool
     same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
     if not same and not mixed:
         raise UserError(_differs(journal, result))
-    journal.record(Compared(same))
+    journal.record(events.Compared(same))
 
 
 def _comparable(state: RunState) -> Test | None:
@@ -113,7 +109,7 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
     """
     moves = any(model.links and not model.static for model in world.models)
     if not moves and scenario.reduction.slice and journal.state.ties is None:
-        journal.record(Still())
+        journal.record(events.Still())
     if journal.state.ties is not None or journal.state.unsettled or journal.state.supports or not moves:
         return
     needed = scenario.reduction.keep_supports
@@ -124,13 +120,13 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
             )
         return
     elements = journal.state.elements
-    found = bench.settle(frozenset(elements), lambda: journal.record(SupportsStarted()))
+    found = bench.settle(frozenset(elements), lambda: journal.record(events.SupportsStarted()))
     if not isinstance(found, Broken):
         for about, words in notes_on(world, found.settled):
             note(journal, about, words)
         ties = None if found.ties is None else journal.pairs(found.ties)
-        journal.record(Supports(journal.pairs(found.supports), ties))
+        journal.record(events.Supports(journal.pairs(found.supports), ties))
     elif needed:
         raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")
     else:
-        journal.record(Supports((), why=found.failure))
+        journal.record(events.Supports((), why=found.failure))

@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ddenv.engine.background import Background
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
-from ddenv.engine.limits import wall_limit
-from ddenv.engine.noting import give_up_if_late, note_slow
-from ddenv.engine.pool import Broken, Workers
+from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
+from ddenv.engine.pool import Workers
+from ddenv.engine.shared import Key, Place, result_of
 from ddenv.engine.slicing import audit_is_due, compare
-from ddenv.engine.worker import Start
+from ddenv.engine.worker import Broken, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Test
@@ -41,20 +40,59 @@ PATIENCE = 1.0
 # Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no display, a full disk), all tests
 # break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
 MOST_BROKEN = 25
+# The part of all time that background work may take; and besides that, s: at first, when most is unknown, and for each test that
+# has ended.
+SHARE, FIRST, AFTER_TEST = 0.01, 0.5, 0.002
+
+
+class Background:
+    """Work that may wait, such as forecasts: advances `steps` of some milliseconds as long as there is time for them.
+
+    What begins next takes the place of what is left.
+    """
+
+    def __init__(self) -> None:
+        self._steps: Iterator[object] = iter(())
+        self._began = time.monotonic()
+        self._spent = 0.0
+        self._ended = 0
+
+    def begin(self, steps: Iterator[object]) -> None:
+        """From now on advances `steps`."""
+        self._steps = steps
+
+    def test_ended(self) -> None:
+        """A test has ended: some more time may be taken."""
+        self._ended += 1
+
+    def step(self) -> bool:
+        """Makes one step; returns False where none is left, or no time for it."""
+        began = time.monotonic()
+        if self._spent > FIRST + AFTER_TEST * self._ended + SHARE * (began - self._began):
+            return False
+        made = next(self._steps, self) is not self
+        self._spent += time.monotonic() - began
+        return made
 
 
 class Bench:
     """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges tries of the user.
 
+    A test that `others` have made has its result at once, and takes no worker.
+
     Before f is fixed, a run that failed is recorded as "failed".
     """
 
-    def __init__(self, journal: Journal, pool: Workers, control: Control) -> None:
+    def __init__(
+        self, journal: Journal, pool: Workers, control: Control, others: Mapping[Key, Place] | None = None
+    ) -> None:
         self._failures: tuple[Failure, ...] = ()
         self._failed: tuple[int, ...] = ()
         self._journal = journal
         self._pool = pool
         self._control = control
+        self._others = dict(others or {})
+        self._taken: list[tuple[int, RunResult | Broken]] = []
         self._started: set[tuple[Environment, int, bool]] = set()
         self._next_live = 0.0
         self._live_shown = False
@@ -78,7 +116,7 @@ class Bench:
     def _start(self, tests: Sequence[Test]) -> bool:
         """Starts tests on free workers. Returns whether one was implied, and so needs none."""
         # A step is one test, the next in order.
-        free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
+        free = self._pool.idle if self._control.speculates() else int(self._busy == 0)
         for test in tests if free and self._control.may_start() else ():
             if self._key(test) in self._started:
                 continue
@@ -92,6 +130,11 @@ class Bench:
             if not free or not self._control.may_start():
                 return False
         return False
+
+    @property
+    def _busy(self) -> int:
+        """How many tests are running."""
+        return self._pool.busy + len(self._taken)
 
     def _key(self, test: Test) -> tuple[Environment, int, bool]:
         return test.environment, test.run, self._journal.is_full(test.why)
@@ -132,7 +175,11 @@ class Bench:
         # To be compared, it ends as the other one did.
         full = full or (source is not None and journal.is_full(state.tests[source - 1].phase))
         keep = frozenset(wanted.environment.names(state.elements))
-        self._pool.submit(number, keep, seed, full, wall_limit(state))
+        known = self._others.pop((keep, seed, full), None)
+        if known is not None and (taken := result_of(known)) is not None:
+            self._taken.append((number, taken))
+        else:
+            self._pool.submit(number, keep, seed, full, wall_limit(state))
         return False
 
     def settle(self, elements: frozenset[str], late: Callable[[], None]) -> Start | Broken:
@@ -183,9 +230,9 @@ class Bench:
     def _is_spent(self) -> bool:
         """Whether no test may start any more. Raises Stopped once none runs."""
         state = self._journal.state
-        if state.budget is None or state.made + self._pool.busy < state.budget:
+        if state.budget is None or state.made + self._busy < state.budget:
             return False
-        if self._pool.busy == 0:
+        if self._busy == 0:
             raise Stopped(f"the budget of {count(state.budget, 'test')} is used up")
         return True
 
@@ -209,7 +256,8 @@ class Bench:
     def _look_around(self, wait: float) -> None:
         self._control.poll()
         works = self._quiet and self._pool.busy > 0 and self.background.step()
-        finished = self._pool.finished(0.0 if works else wait)
+        taken, self._taken = self._taken, []
+        finished = sorted([*taken, *self._pool.finished(0.0 if works or taken else wait)], key=lambda one: one[0])
         for test, result in finished:
             self._record(test, result)
             self.background.test_ended()
@@ -217,7 +265,7 @@ class Bench:
         self._quiet = not finished
         # Before the search gets the workers that are free now.
         self._serve_trials()
-        if self._pool.busy == 0:
+        if self._busy == 0:
             self._control.settled()
             if not finished:
                 time.sleep(wait)
@@ -237,10 +285,10 @@ class Bench:
             )
 
     def _show_live(self) -> None:
-        note_slow(self._journal, self._pool.paces())
         live = self._pool.live()
+        note_slow(self._journal, live)
         if live or self._live_shown:
-            self._journal.file.set_live(live)
+            self._journal.file.set_live([test for test, _ in live])
         self._live_shown = bool(live)
 
     def _record(self, test: int, result: RunResult | Broken) -> None:
@@ -254,15 +302,12 @@ class Bench:
             started = journal.state.tests[test - 1]
             environment = journal.state.environments[started.environment]
             self._started.discard((environment, started.run, journal.is_full(started.phase)))
-        took_part = data.pop("took_part", None)
-        pose = data.pop("end_pose")
-        noticed: dict[str, Any] = {
-            "end_pose": None if pose is None else tuple(pose),
-            "first_sensed": journal.in_order(data.pop("first_sensed")),
-            "first_touched": journal.in_order(data.pop("first_touched")),
-            "took_part": None if took_part is None else journal.models(took_part),
+        by_number: dict[str, Any] = {
+            "first_sensed": journal.in_order(data["first_sensed"]),
+            "first_touched": journal.in_order(data["first_touched"]),
+            "took_part": journal.models(data["took_part"]) if "took_part" in data else None,
         }
-        journal.record(TestFinished(test, **data, **noticed), motions)
+        journal.record(TestFinished(test, **data | by_number), motions)
         compare(journal, [journal.state.tests[test - 1]])
 
     def _counted(self) -> tuple[Failure, ...]:

@@ -17,25 +17,7 @@ from ddenv.guiding.commands import Command, parse, refusal
 from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
 from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import Situation, label_of, numbers_of
-from ddenv.runfile.events import (
-    AcceptedOther,
-    AcceptModeChanged,
-    Adopted,
-    Changed,
-    CommandHandled,
-    CommandRefused,
-    Decided,
-    Event,
-    Outcomes,
-    Paused,
-    Pinned,
-    Resumed,
-    TrialStarted,
-    Unpinned,
-    Unvetoed,
-    Vetoed,
-    WentBack,
-)
+from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import failures_at
 from ddenv.runfile.store import Request
 from ddenv.world.scenario import FailureSpec
@@ -143,7 +125,7 @@ class Control:
         self._journal.command = request.id
         try:
             if why := self._why_not(request):
-                self._journal.record(CommandRefused(why))
+                self._journal.record(events.CommandRefused(why))
         finally:
             # A stop raises an exception, and must not be read again.
             self._journal.command = None
@@ -163,7 +145,7 @@ class Control:
 
     def _handled(self, request: Request) -> None:
         self._journal.command = request.id
-        self._journal.record(CommandHandled())
+        self._journal.record(events.CommandHandled())
         self._journal.command = None
 
     def _do(self, command: Command) -> None:
@@ -193,36 +175,36 @@ class Control:
         self._credit, self._pause_after_round = credit, pause_after_round
         if self._paused:
             self._paused = False
-            self._journal.record(Resumed())
+            self._journal.record(events.Resumed())
 
     def _pause(self) -> None:
         self._paused, self._credit, self._pause_after_round = True, None, False
-        self._journal.record(Paused())
+        self._journal.record(events.Paused())
 
     def _go(self, node: int, rejected: int | None) -> None:
         state = self._journal.state
         failures = failures_at(state, node)
         outcomes = None if failures == state.failures else _judged(self._journal, failures)
-        self._journal.record(WentBack(node, rejected, outcomes))
+        self._journal.record(events.WentBack(node, rejected, outcomes))
 
 
-def _judged(journal: Journal, failures: tuple[int, ...]) -> Outcomes:
+def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
     """The outcomes of all tests if the ends of `failures` count as f."""
     file, state = journal.file, journal.state
     spec = FailureSpec.model_validate(state.scenario["failure"])
     return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
 
 
-def _adopted(journal: Journal, asked: Adopt) -> Event:
+def _adopted(journal: Journal, asked: Adopt) -> events.Event:
     trial = journal.state.trials[asked.trial - 1]
-    return Adopted(asked.trial, trial.environment, trial.tests[-1])
+    return events.Adopted(asked.trial, trial.environment, trial.tests[-1])
 
 
-def _accepted_other(journal: Journal, asked: AcceptOther) -> Event:
+def _accepted_other(journal: Journal, asked: AcceptOther) -> events.Event:
     state = journal.state
     test = state.tests[asked.test - 1]
     unnamed = asked.instead or test.phase == "hand"
-    return AcceptedOther(
+    return events.AcceptedOther(
         test.id,
         f"test {test.id}" if unnamed else label_of(state, test),
         test.environment,
@@ -233,18 +215,18 @@ def _accepted_other(journal: Journal, asked: AcceptOther) -> Event:
 
 
 # What each decision of the user is in the run file.
-_EVENTS: dict[type[Command], Callable[[Journal, Any], Event]] = {
-    AcceptMode: lambda journal, asked: AcceptModeChanged(asked.mode),
-    Accept: lambda journal, asked: Decided(asked.round, asked.candidate, "accept"),
-    Reject: lambda journal, asked: Decided(asked.round, asked.candidate, "reject"),
-    Veto: lambda journal, asked: Vetoed(asked.round, asked.candidate),
-    Unveto: lambda journal, asked: Unvetoed(asked.round, asked.candidate),
-    Pin: lambda journal, asked: Pinned(numbers_of(journal.state, asked.new(journal.state))),
-    Unpin: lambda journal, asked: Unpinned(numbers_of(journal.state, asked.pinned(journal.state))),
-    Try: lambda journal, asked: TrialStarted(
+_EVENTS: dict[type[Command], Callable[[Journal, Any], events.Event]] = {
+    AcceptMode: lambda journal, asked: events.AcceptModeChanged(asked.mode),
+    Accept: lambda journal, asked: events.Decided(asked.round, asked.candidate, "accept"),
+    Reject: lambda journal, asked: events.Decided(asked.round, asked.candidate, "reject"),
+    Veto: lambda journal, asked: events.Vetoed(asked.round, asked.candidate),
+    Unveto: lambda journal, asked: events.Unvetoed(asked.round, asked.candidate),
+    Pin: lambda journal, asked: events.Pinned(numbers_of(journal.state, asked.new(journal.state))),
+    Unpin: lambda journal, asked: events.Unpinned(numbers_of(journal.state, asked.pinned(journal.state))),
+    Try: lambda journal, asked: events.TrialStarted(
         len(journal.state.trials) + 1, journal.number(Environment.of(asked.models))
     ),
     Adopt: _adopted,
     AcceptOther: _accepted_other,
-    Change: lambda journal, asked: Changed(asked.new(journal.state)),
+    Change: lambda journal, asked: events.Changed(asked.new(journal.state)),
 }

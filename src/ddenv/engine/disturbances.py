@@ -34,8 +34,7 @@ class DiskSpace:
         """Whether a test may start. Writes an event when that changes."""
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + PERIOD
-            free = self._free()
-            self._tell(free >= NEEDED, free)
+            self._tell(self._free() >= NEEDED)
         return self._enough
 
     def wait(self, full: NoRoom) -> bool:
@@ -46,17 +45,17 @@ class DiskSpace:
             # The log may be on the same disk.
             with suppress(OSError):
                 print(f"{full}; waits until {NEEDED / 1e6:.0f} MB are free", file=sys.stderr, flush=True)
-        self._tell(False, self._free())
+        self._tell(False)
         return not self._terminated.wait(PERIOD)
 
-    def _tell(self, enough: bool, free: int) -> None:
+    def _tell(self, enough: bool) -> None:
         changed, self._enough = enough != self._enough, enough
         if not changed:
             return
         # A small event may find room where a result does not.
         self._telling = True
         with suppress(UserError):
-            self._file.append(events.DiskSpace(enough, NEEDED, free))
+            self._file.append(events.DiskSpace(enough, NEEDED, self._free()))
         self._telling = False
 
     def _free(self) -> int:

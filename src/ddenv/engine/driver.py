@@ -12,15 +12,14 @@ from ddenv.engine.beginning import settle
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import fix_failure, known_failure, rows_of
+from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
 from ddenv.engine.limits import limit_after
-from ddenv.engine.sight import Sight
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
-from ddenv.environment import Environment
+from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.claims import current, is_minimal, verdict_on
-from ddenv.evidence.rates import Shown, wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, playing
@@ -31,7 +30,7 @@ from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
-from ddenv.runfile.progress import Certificate
+from ddenv.runfile.progress import Certificate, Leg, Node
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
@@ -50,26 +49,28 @@ class Driver:
         self._reduction = scenario.reduction
         self._journal, self._bench, self._control = journal, bench, control
         self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
-        self._evidence: Evidence | None = None
         # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
-        self._trials: list[Trial] = []
-        self._learnt: set[int] = set()
+        self._trials: dict[int, Trial] = {}
         self._unknown: set[Environment] = set()
-        self._memory = Memory()
-        self._guide: Guide | None = None
-        self._stacks = Stacks({})
-        self._leg: steps.Leg | None = None
-        # What the baseline shows so far, and why there is nothing to reduce.
-        self._baseline: events.BaselineFinished | None = None
-        self._reason = ""
+        # Of the current search: they are there once it has begun.
+        self._leg: steps.Leg
+        self._stacks: Stacks
+        self._guide: Guide
+        self._memory: Memory
+        self._evidence: Evidence
+        # What the baseline shows so far, or why there is nothing to reduce.
+        self._baseline: events.BaselineFinished | str = ""
         # How many runs of what is left a new certificate needs at least; None if the search makes it when it is over.
         self._only_certify: int | None = None
+        # What the procedure asks of what is known.
+        self.shown, self.rate = journal.shown, journal.rate_of_whole
+        self.refused, self.refused_by_user = journal.is_refused, journal.is_refused_by_user
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
         journal, reduction = self._journal, self._reduction
         # Unknown names are refused before a robot runs.
-        self.algorithm(self._leg_from(journal.state.elements, frozenset(), reduction))
+        self.algorithm(steps.Leg(1, NOTHING, (NOTHING,), NOTHING, {}, Acceptance(1)))
         settle(self._scenario, self._world, journal, self._bench)
         leg: steps.Leg | None = None
         if journal.state.baseline is not None:
@@ -77,7 +78,7 @@ class Driver:
         whole, keeps_rate = journal.state.environments[0], reduction.accept_rate == "kept"
         procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg)
         if self._carry_out(procedure) is None:
-            self._end(False, self._reason)
+            self._end(False, str(self._baseline))
         else:
             self._conclude()
 
@@ -132,48 +133,32 @@ class Driver:
         assert leg is not None
         self._reduction = Reduction.model_validate(leg.settings)
         environment = journal.state.nodes[leg.node].environment
-        self._leg = self._leg_from(environment, leg.pinned, self._reduction)
+        self._leg = self._leg_of(leg, environment)
         self._bench.rule = self._leg.rule
         self._trials.clear()
-        self._learnt.clear()
         self._unknown.clear()
         self._learn(leg.tests)
         self._look_at(leg.evidence_test)
         return self._leg
 
-    def _leg_from(self, environment: tuple[str, ...], pinned: frozenset[str], reduction: Reduction) -> steps.Leg:
+    def _leg_of(self, leg: Leg, environment: tuple[str, ...]) -> steps.Leg:
         """A search of `environment`. It may leave out whole stacks, and none with a model that is pinned."""
-        journal, state, leg = self._journal, self._journal.state, self._journal.state.leg
+        journal, state = self._journal, self._journal.state
         together = Stacks.of(map(journal.models, stacks_of(state, environment)))
-        stays = journal.models(pinned)
+        stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        most_misses = 1 + reduction.iterations
-        if leg is None:
-            return steps.Leg(1, journal.whole, (journal.whole,), stays, free, Acceptance(most_misses))
-        rule = Acceptance(most_misses, leg.rate, reduction.keep_rate, leg.steps_back)
-        chain = tuple(state.environments[node] for node in self._chain(leg.node))
+        rule = Acceptance(1 + self._reduction.iterations, leg.rate, self._reduction.keep_rate, leg.steps_back)
+        chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         return steps.Leg(leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again)
 
-    def _chain(self, node: int) -> tuple[int, ...]:
-        """The numbers of the environments on the way to a node, from where the same failures counted as f as now."""
-        return tuple(reached.id for reached in self._nodes(node))
-
-    def _nodes(self, node: int) -> tuple[Any, ...]:
+    def _nodes(self, node: int) -> tuple[Node, ...]:
+        """The way to a node, from where the same failures counted as f as now."""
         path = self._journal.state.changed(node=node).path
         begin = max(place for place, one in enumerate(path) if place == 0 or one.how in ("accepted", "instead"))
         return path[begin:]
 
     # What the procedure asks.
-
-    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
-        return self._journal.shown(environment, run, full)
-
-    def refused(self, environment: Environment) -> bool:
-        return self._journal.is_refused(environment)
-
-    def refused_by_user(self, environment: Environment) -> bool:
-        return self._journal.is_refused_by_user(environment)
 
     @property
     def refusals(self) -> int:
@@ -182,9 +167,6 @@ class Driver:
     @property
     def workers(self) -> int:
         return max(1, self._journal.state.jobs) if self._control.speculates() else 1
-
-    def rate(self) -> float:
-        return self._journal.rate_of_whole()
 
     def goes_on(self) -> bool:
         """Whoever accepts each reduction by hand also goes back by hand."""
@@ -208,7 +190,7 @@ class Driver:
             skip=asked.skip,
             rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
             runs=lambda: leg.rule.misses,
-            broke=partial(self._broke, leg),
+            broke=self._broke,
         )
         return self._begin(leg, self._memory.of(self._guide))
 
@@ -220,26 +202,23 @@ class Driver:
 
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
-        assert self._evidence is not None
-        return replace(self._evidence, trials=self._trials)
+        return replace(self._evidence, trials=tuple(self._trials.values()))
 
-    def _broke(self, leg: steps.Leg, candidate: Candidate) -> bool:
+    def _broke(self, candidate: Candidate) -> bool:
         """Whether tests of a candidate of the algorithm, which knows one model of each stack, broke and left it unknown."""
-        return leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
+        return self._leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
 
     def _learn(self, tests: Iterable[int]) -> None:
         """The schemas see the tests behind the verdicts of a round: a resumed run sees the same."""
         state = self._journal.state
-        for test in (state.tests[number - 1] for number in tests if number not in self._learnt):
-            self._learnt.add(test.id)
+        for test in (state.tests[number - 1] for number in tests):
             if test.outcome not in BROKEN:
                 environment = state.environments[test.environment]
-                self._trials.append(Trial(environment, test.outcome == "similar", state.elements))
+                self._trials[test.id] = Trial(environment, test.outcome == "similar", state.elements)
 
     def _look_at(self, test: int) -> None:
         """The schemas see `test`, the last similar run."""
-        rows = rows_of(self._journal.file, test)
-        self._evidence = self._sight.evidence(self._journal.state, test, rows, self._trials)
+        self._evidence = self._sight.evidence(self._journal, test)
 
     # What the procedure finds.
 
@@ -251,15 +230,11 @@ class Driver:
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(step.runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         spec, asked = self._scenario.failure, self._reduction
-        fixed = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure)
-        if isinstance(fixed, str):
-            self._reason = fixed
-            return None
-        self._baseline = fixed
-        return fixed.failures
+        self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure)
+        return None if isinstance(self._baseline, str) else self._baseline.failures
 
     def _failure_fixed(self, step: steps.FailureFixed) -> steps.Leg:
-        assert self._baseline is not None
+        assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
         self._control.round_finished()
@@ -268,7 +243,7 @@ class Driver:
     def _round_began(self, step: steps.RoundBegan) -> steps.Past | None:
         state, leg = self._journal.state, self._journal.state.leg
         parts = tuple(map(Environment.of, step.round.partitions))
-        assert leg is not None and self._leg is not None
+        assert leg is not None
         place = step.number - leg.first_round
         if place < len(leg.past):
             past = leg.past[place]
@@ -290,7 +265,6 @@ class Driver:
 
     def _announce(self, number: int, round: Round) -> None:
         journal, leg = self._journal, self._leg
-        assert leg is not None
         # These schemas score by distance in m, which is useful to show.
         shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
         environment = Environment.of(round.environment) | leg.pinned
@@ -315,7 +289,7 @@ class Driver:
     def _forecast(self, number: int) -> Iterator[object]:
         """Plays the search on, and records how many tests are left; once in a round."""
         journal, leg, guide = self._journal, self._leg, self._guide
-        assert leg is not None and guide is not None and journal.state.leg is not None
+        assert journal.state.leg is not None
         moment = Moment(
             leg,
             tuple(past.winner for past in journal.state.leg.past),
@@ -324,7 +298,7 @@ class Driver:
             self._begin,
             guide,
             self._memory,
-            replace(self._known(), trials=tuple(self._trials)),
+            self._known(),
             self.shown,
             self.refused,
             known_failure(journal.state).rate,
@@ -464,8 +438,8 @@ class Driver:
         if certificate is None or journal.state.search_due:
             raise Stopped(CHANGED)
         together = self._reduction.keep_supports
-        pinned = 0 if self._leg is None else len(self._leg.pinned & journal.environment)
-        reason = verdict_on(certificate, pinned, "stack" if together else "single model")
+        pinned = self._leg.pinned & journal.environment
+        reason = verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
             reason += "; to leave it out was vetoed or rejected"

@@ -6,25 +6,18 @@ from typing import cast
 
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Stopped
-from ddenv.engine.journal import FRESH_RUNS, Journal
-from ddenv.engine.judging import known_failure, rows_of
-from ddenv.engine.sight import Sight
+from ddenv.engine.journal import Journal
+from ddenv.engine.judging import Sight, known_failure
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, wilson_interval
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Passing, isolation
-from ddenv.reduction.procedure import Judged, NamedClaim, Step, Wants
+from ddenv.reduction.procedure import Judged, NamedClaim, Wants
 from ddenv.reduction.stacks import Stacks
-from ddenv.runfile.events import (
-    IsolationChecked,
-    IsolationFinished,
-    IsolationStarted,
-    RemovalJudged,
-    ReturnedMade,
-)
+from ddenv.runfile import events
 from ddenv.runfile.progress import Isolation
-from ddenv.runfile.state import BROKEN
+from ddenv.runfile.state import BROKEN, FRESH_RUNS
 from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction
@@ -52,7 +45,7 @@ def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, 
     journal.lose_running()
     _open(journal)
     whole = journal.state.environments[0]
-    journal.record(IsolationFinished(None if removed is None else journal.number(whole - removed)))
+    journal.record(events.IsolationFinished(None if removed is None else journal.number(whole - removed)))
 
 
 def _open(journal: Journal) -> Isolation:
@@ -72,7 +65,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     last = state.isolations[-1] if state.isolations else None
     suspects, size = _suspects(world, journal, reduction)
     journal.record(
-        IsolationStarted(
+        events.IsolationStarted(
             isolation=len(state.isolations) + 1,
             run=FIRST_RUN if last is None else last.first_run + MOST_CHECKS * last.block,
             block=max(FRESH_RUNS, 2 * least),
@@ -95,8 +88,7 @@ def _suspects(world: World, journal: Journal, reduction: Reduction) -> tuple[tup
     """
     state, f = journal.state, known_failure(journal.state).failure_test
     sight = Sight(world, state.elements, reduction.delta, reduction.seed)
-    evidence = sight.evidence(state, f, rows_of(journal.file, f), ())
-    distance = distances_to_failure(state.elements, evidence).tolist()
+    distance = distances_to_failure(state.elements, sight.evidence(journal, f)).tolist()
     stacks, left = _free(journal).by_first, journal.environment
     order = sorted(
         stacks, key=lambda first: (left.isdisjoint(stacks[first]), min(distance[model] for model in stacks[first]))
@@ -139,16 +131,13 @@ class _Isolator:
             except StopIteration as end:
                 removed: Environment | None = end.value
                 return removed
-            self._answer(step)
-
-    def _answer(self, step: Step | Checked) -> None:
-        match step:
-            case Wants():
-                self._bench.work(step.tests)
-            case Judged():
-                self._judged(step)
-            case Checked():
-                self._check(step)
+            match step:
+                case Wants():
+                    self._bench.work(step.tests)
+                case Judged():
+                    self._judged(step)
+                case Checked():
+                    self._check(step)
 
     # What the procedure asks.
 
@@ -166,8 +155,7 @@ class _Isolator:
     def refused(self, environment: Environment) -> bool:
         return False
 
-    def refused_by_user(self, environment: Environment) -> bool:
-        return False
+    refused_by_user = refused
 
     # What it finds.
 
@@ -177,7 +165,7 @@ class _Isolator:
         known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
         if next(known, "") != verdict:
             tests = journal.tests(step.environment, range(step.runs), full=True)
-            journal.record(RemovalJudged(number, verdict, tests))
+            journal.record(events.RemovalJudged(number, verdict, tests))
 
     def _check(self, check: Checked) -> None:
         journal, now = self._journal, _open(self._journal)
@@ -190,13 +178,13 @@ class _Isolator:
         }
         claims = tuple(self._made(claim, first) for claim in check.claims)
         environment = journal.number(self._whole - check.removed)
-        journal.record(IsolationChecked(environment, claims, tuple(sorted(rests_on))))
+        journal.record(events.IsolationChecked(environment, claims, tuple(sorted(rests_on))))
 
-    def _made(self, named: NamedClaim, first: int) -> ReturnedMade:
+    def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
         shown = [self.shown(named.environment, first + run) for run in range(named.claim.runs)]
         runs, reached = sum(type(one) is bool for one in shown), sum(one is True for one in shown)
         low, high = wilson_interval(reached, runs) if runs else (0.0, 1.0)
-        return ReturnedMade(named.model, named.claim.verdict, reached, runs, low, high)
+        return events.ReturnedMade(named.model, named.claim.verdict, reached, runs, low, high)
 
     def _known_checks(self) -> list[Checked]:
         """What fresh runs have shown before this engine."""

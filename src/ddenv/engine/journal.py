@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping
 
 from ddenv.environment import Environment
 from ddenv.errors import UserError
@@ -12,19 +12,18 @@ from ddenv.evidence.slices import Ties, implies
 from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Round, RunState, Test
+from ddenv.runfile.state import BROKEN, CERTIFY, FIRST_FRESH_RUN, FRESH_RUNS, ISOLATE, Round, RunState, Test
 from ddenv.runfile.store import Motions, RunFile, uncollected
 from ddenv.runfile.supports import stack_with
 from ddenv.settings import SETTINGS, read
 
-# The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
-FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
-
 
 class Journal:
-    """The events of a run, `state` folded from them, and a memo of its finished tests.
+    """The events of a run, `state` folded from them, and a memo of its finished tests by (environment, run, full).
 
-    While a user's `command` is obeyed, events hold its number.
+    A test in the memo is never made again, but one that broke is made twice, and again by the next engine where a verdict needs it.
+    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only
+    changes runs that it cuts. While a user's `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -35,13 +34,61 @@ class Journal:
             for recorded in file.events():
                 self.state = apply(self.state, recorded)
         self._number_of = {name: number for number, name in enumerate(self.state.elements)}
-        self._memo = _Memo(self.state)
+        self._numbers: dict[Environment, int] = {}
+        self._tests: dict[tuple[int, int, bool], int] = {}
+        # By run: what took part in a simulated test, its models, its number.
+        self._implying: dict[tuple[int, bool], list[tuple[Environment, Environment, int]]] = defaultdict(list)
+        self._broke: Counter[tuple[int, int, bool, int]] = Counter()
+        self._ties: tuple[object, Ties] = None, Ties.among(())
+        self._remember(RunState(), self.state)
 
     def record(self, event: Event, motions: Motions | None = None) -> None:
         """Writes an event."""
         before = self.state
         self.state = apply(before, self.file.append(event, motions, self.command))
-        self._memo.follow(before, self.state)
+        self._remember(before, self.state)
+
+    def _remember(self, before: RunState, after: RunState) -> None:
+        """Takes in what one event, or a whole file, changed."""
+        for number in range(len(before.environments), len(after.environments)):
+            self._numbers[after.environments[number]] = number
+        if after.mixed_until != before.mixed_until:
+            # What was made with something else implies nothing of tests that are made now.
+            self._implying.clear()
+        if after.tests is not before.tests:
+            for test in after.tests.changed_since(before.tests):
+                self._enter(test)
+        if after.engines != before.engines:
+            self._forget(lambda test: test.outcome in BROKEN and self._is_made_again(test))
+        if after.refuted is not before.refuted:
+            self._forget(lambda test: test.implied_by is not None)
+
+    def _enter(self, test: Test) -> None:
+        if not test.is_finished:
+            return
+        if test.outcome in BROKEN:
+            key = test.environment, test.run, test.phase == CERTIFY, test.engine
+            self._broke[key] += 1
+            if self._broke[key] < 2:
+                return
+        for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
+            if not holds:
+                continue
+            self._tests[test.environment, test.run, full] = test.id
+            simulated = test.implied_by is None and test.outcome not in BROKEN
+            if test.took_part is not None and simulated and test.id > self.state.mixed_until:
+                there = self.state.environments[test.environment]
+                self._implying[test.run, full].append((test.took_part, there, test.id))
+
+    def _forget(self, which: Callable[[Test], bool]) -> None:
+        self._tests = {key: test for key, test in self._tests.items() if not which(self.state.tests[test - 1])}
+
+    def _is_made_again(self, broken: Test) -> bool:
+        """A baseline that is done, and a certificate, may do without a few runs that broke."""
+        if broken.phase == "baseline":
+            return self.state.baseline is None
+        last = self.state.certificates[-1:]
+        return broken.phase != CERTIFY or any(claim.verdict == "unknown" for one in last for claim in one.claims)
 
     # Environments.
 
@@ -61,7 +108,7 @@ class Journal:
 
     def number(self, environment: Environment) -> int:
         """The number of an environment. An event names it the first time."""
-        known = self._memo.numbers.get(environment)
+        known = self._numbers.get(environment)
         if known is None:
             known, command = len(self.state.environments), self.command
             # A command is not obeyed by that.
@@ -100,8 +147,8 @@ class Journal:
 
     def test(self, environment: Environment, run: int, full: bool = False) -> Test | None:
         """The finished test of a run; None if it has to be made. With `full` only a run to its end counts."""
-        number = self._memo.numbers.get(environment)
-        test = None if number is None else self._memo.tests.get((number, run, full))
+        number = self._numbers.get(environment)
+        test = None if number is None else self._tests.get((number, run, full))
         return None if test is None else self.state.tests[test - 1]
 
     def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> tuple[int, ...]:
@@ -127,7 +174,7 @@ class Journal:
         ties = self.ties
         if ties is None:
             return None
-        made = self._memo.implying[run, full]
+        made = self._implying[run, full]
         return next((test for took_part, there, test in made if implies(took_part, there, environment, ties)), None)
 
     @property
@@ -136,7 +183,9 @@ class Journal:
         state = self.state
         if state.ties is None or state.refuted is not None or not read(state.scenario, SETTINGS["slice"]):
             return None
-        return self._memo.ties(state, self._number_of)
+        if self._ties[0] is not state.ties:
+            self._ties = state.ties, Ties.among(self.pairs(state.ties))
+        return self._ties[1]
 
     @property
     def rested_on(self) -> tuple[Test, ...]:
@@ -148,7 +197,7 @@ class Journal:
 
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
-        whole, state = self._memo.numbers[self.whole], self.state
+        whole, state = self._numbers[self.whole], self.state
         tests = [
             test
             for test in state.tests
@@ -183,72 +232,3 @@ class Journal:
         if self.state.round is None:
             raise UserError("damaged run file: there is no round yet")
         return self.state.round
-
-
-class _Memo:
-    """The finished tests of a run by (environment, run, full). A test in it is never made again, but one that broke is made twice,
-    and again by the next engine where a verdict needs it.
-
-    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only
-    changes runs that it cuts.
-    """
-
-    def __init__(self, state: RunState) -> None:
-        self.tests: dict[tuple[int, int, bool], int] = {}
-        self.numbers: dict[Environment, int] = {}
-        # By run: what took part in a simulated test, its models, its number.
-        self.implying: dict[tuple[int, bool], list[tuple[Environment, Environment, int]]] = defaultdict(list)
-        self._broke: dict[tuple[int, int, bool, int], int] = {}
-        self._ties: tuple[object, Ties] = None, Ties.among(())
-        self._state = state
-        self.follow(RunState(), state)
-
-    def follow(self, before: RunState, after: RunState) -> None:
-        """Takes in what one event, or a whole file, changed."""
-        self._state = after
-        for number in range(len(before.environments), len(after.environments)):
-            self.numbers[after.environments[number]] = number
-        if after.mixed_until != before.mixed_until:
-            # What was made with something else implies nothing of tests that are made now.
-            self.implying.clear()
-        if after.tests is not before.tests:
-            for test in after.tests.changed_since(before.tests):
-                self._enter(test)
-        if after.engines != before.engines:
-            tests = {key: after.tests[test - 1] for key, test in self.tests.items()}
-            broken = {key: test for key, test in tests.items() if test.outcome in BROKEN}
-            for key in (key for key, test in broken.items() if self._is_made_again(test)):
-                del self.tests[key]
-        if after.refuted is not before.refuted:
-            tests = {key: after.tests[test - 1] for key, test in self.tests.items()}
-            self.tests = {key: test.id for key, test in tests.items() if test.implied_by is None}
-
-    def _enter(self, test: Test) -> None:
-        if not test.is_finished:
-            return
-        if test.outcome in BROKEN:
-            key = test.environment, test.run, test.phase == CERTIFY, test.engine
-            self._broke[key] = self._broke.get(key, 0) + 1
-            if self._broke[key] < 2:
-                return
-        for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
-            if not holds:
-                continue
-            self.tests[test.environment, test.run, full] = test.id
-            simulated = test.implied_by is None and test.outcome not in BROKEN
-            if test.took_part is not None and simulated and test.id > self._state.mixed_until:
-                there = self._state.environments[test.environment]
-                self.implying[test.run, full].append((test.took_part, there, test.id))
-
-    def _is_made_again(self, test: Test) -> bool:
-        """A baseline that is done, and a certificate, may do without a few runs that broke."""
-        if test.phase == "baseline":
-            return self._state.baseline is None
-        last = self._state.certificates[-1:]
-        return test.phase != CERTIFY or any(claim.verdict == "unknown" for one in last for claim in one.claims)
-
-    def ties(self, state: RunState, number_of: dict[str, int]) -> Ties:
-        if self._ties[0] is not state.ties:
-            pairs = ((number_of[name], number_of[other]) for name, other in state.ties or ())
-            self._ties = state.ties, Ties.among(pairs)
-        return self._ties[1]

@@ -1,5 +1,5 @@
-"""What the tests showed: the failure f, fixed from runs of the whole world, and each result judged by it, as plain data for the run
-file and for `--json`: every number in it is finite.
+"""What the tests showed: the failure f, fixed from runs of the whole world; each result judged by it, as plain data for the run
+file and for `--json`, in which every number is finite; and what the schemas see of them.
 """
 
 from __future__ import annotations
@@ -7,20 +7,26 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ddenv.engine.pool import Broken
+from ddenv.engine.journal import Journal
+from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
+from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
-from ddenv.runfile.failures import Baseline, SeenFailure, grouped
+from ddenv.runfile.failures import Baseline, grouped, named
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.text import count
+from ddenv.world.extent import center, model_bounds
+from ddenv.world.model import Model, World
+from ddenv.world.pose import headings
 from ddenv.world.scenario import FailureSpec
 
 
@@ -157,7 +163,7 @@ def fix_failure(
         position=failures[f].position,
         miss_chance=miss_chance(rate, iterations),
         iterations_95=iterations_needed(rate),
-        seen=tuple(Seen(failure.test, failure.runs, failure.kinds, failure.position) for failure in seen),
+        seen=tuple(seen),
         judged=Outcomes(
             {id: judgement.outcome for id, judgement in judged.items()},
             {id: judgement.distance for id, judgement in judged.items()},
@@ -165,14 +171,15 @@ def fix_failure(
     )
 
 
-def _seen(group: Sequence[Test]) -> SeenFailure:
+def _seen(group: Sequence[Test]) -> Seen:
     """A group of failing tests, the one in their middle first."""
     kinds = Counter(test.failure for test in group)
-    return SeenFailure(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
+    return Seen(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
 
 
-def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str:
-    listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
+def _no_such_failure(seen: Sequence[Seen], wanted: int, runs: int) -> str:
+    names = (f"{named(one.kinds, one.position)} in {count(one.runs, 'run')}" for one in seen)
+    listed = "; ".join(f"{number}. {name}" for number, name in enumerate(names, 1))
     return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
 
 
@@ -183,3 +190,51 @@ def _no_failure(tests: Sequence[Test]) -> str:
     reached = len(tests) - len(broken)
     also = f" ({len(broken)} more broke: {broken[0].failure})" if broken else ""
     return f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce"
+
+
+# What the schemas see.
+
+
+def trajectory_of(rows: np.ndarray) -> np.ndarray:
+    """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to (N, 5)."""
+    return np.column_stack([rows[:, :4], headings(rows[:, 4:])])
+
+
+def traits_of(model: Model) -> Traits:
+    """What the learner knows about a model. The most slippery of its surfaces counts."""
+    box = model_bounds(model)
+    size = 0.0 if box is None else float((box[1] - box[0]).max())
+    friction = min((collision.mu for collision in model.collisions), default=1.0)
+    return Traits(size, friction, not model.static)
+
+
+def _end(state: RunState, run: Test) -> tuple[float, float, float]:
+    """Where f ended; if several failures count as f, the one that `run` showed."""
+    ends = [end_of(state.tests[test - 1]) for test in state.failures]
+    if run.end_pose is None:
+        return ends[0]
+    here = end_of(run)
+    return min(ends, key=lambda end: math.dist(end, here))
+
+
+class Sight:
+    """The part of the evidence that comes from the world and never changes in a run."""
+
+    def __init__(self, world: World, elements: Sequence[str], delta: float, seed: int) -> None:
+        models = {model.name: model for model in world.models}
+        positions = {name: center(models[name]) for name in elements}
+        traits = {name: traits_of(models[name]) for name in elements}
+        self._known = Evidence(tuple(elements), positions, traits=traits, delta=delta, seed=seed)
+
+    def evidence(self, journal: Journal, test: int) -> Evidence:
+        """The evidence if `test` was the last similar run."""
+        state, run = journal.state, journal.state.tests[test - 1]
+        return replace(
+            self._known,
+            trajectory=trajectory_of(rows_of(journal.file, test)),
+            failure_position=_end(state, run),
+            first_sensed=dict(run.first_sensed),
+            touched=frozenset(name for name, _ in run.first_touched),
+            miss_chance=known_failure(state).miss_chance,
+            _memory={},
+        )

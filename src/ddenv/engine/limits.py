@@ -1,4 +1,4 @@
-"""What one test may take: real time, and memory.
+"""What one test may take, real time and memory; and what is noted of a whole world that is slow, or odd at its start.
 
 The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and all later tests a
 multiple of what these took: so a slow world or machine is not taken for a hanging one. The baseline's event holds it: a resumed
@@ -9,11 +9,18 @@ bring the kernel to kill the engine.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
+from ddenv.engine.journal import Journal
+from ddenv.errors import UserError
+from ddenv.runfile.events import Noted
 from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.store import Live
 from ddenv.runs import processor
+from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
-from ddenv.world.scenario import Scenario
+from ddenv.text import about, count, duration
+from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
 GENEROUS = 1800.0
@@ -24,6 +31,12 @@ LEAST = 120.0
 # The part of the memory that is not left to all others: the engine, the workbench, the system.
 SHARE = 0.9
 GIGABYTE = 1e9
+# A run is slow if it simulates less than `SLOW` s in each real second; that is known after so many real seconds.
+SLOW = 1.0
+KNOWN_AFTER = 10.0
+# So many runs of the whole world may be too late before one has ended.
+MOST_LATE = 3
+HELPS = "what helps: fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
 
 
 def wall_limit(state: RunState) -> float:
@@ -48,6 +61,46 @@ def memory_limit(scenario: Scenario, jobs: int) -> float:
     return asked * GIGABYTE if asked is not None else SHARE * processor.usable_memory() / jobs
 
 
-def too_large(limit: float) -> str:
-    """Why a worker was killed that used more than `limit` bytes."""
-    return f"used more than {limit / GIGABYTE:.3g} GB of memory (simulation.memory_limit, or fewer --jobs, allows more)"
+def note(journal: Journal, about: str, words: str) -> None:
+    """Writes an event with a sentence, unless one `about` the same is there."""
+    if about not in dict(journal.state.notes):
+        journal.record(Noted(about, words))
+
+
+def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
+    """Writes an event once a run of the whole world turns out to be slow. `running` tests took so long, s.
+
+    Own simulators keep their own time.
+    """
+    state = journal.state
+    if state.baseline is not None or state.scenario.get("oracle") is not None or "slow" in dict(state.notes):
+        return
+    for live, real in running:
+        if real >= KNOWN_AFTER and live.time < SLOW * real:
+            note(journal, "slow", _slow(state, live.time / real))
+
+
+def _slow(state: RunState, rate: float) -> str:
+    """What a slow world will cost: its baseline in full, then what is left to test of it after the slice (`rough_run`)."""
+    asked = Reduction.model_validate(state.scenario["reduction"])
+    timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
+    if rate <= 0.0:
+        return f"this world is slow: not even a tenth of a second was simulated in {KNOWN_AFTER:g} s; {HELPS}"
+    each = timeout / rate
+    runs, jobs = asked.baseline_runs, max(1, state.jobs)
+    baseline = duration(each * -(-runs // jobs))
+    whole = about(*(each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds))
+    return (
+        f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
+        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run about {whole}; "
+        f"{HELPS}, more --jobs"
+    )
+
+
+def give_up_if_late(journal: Journal, late: str) -> None:
+    """After a test that was too `late`, in words. Raises UserError if several runs of the whole world were, and none has ended."""
+    state = journal.state
+    if state.baseline is None and state.tests_done == state.tally["timeout"] >= MOST_LATE:
+        raise UserError(
+            f"{count(state.tally['timeout'], 'run')} of the whole world {late}, and none has ended; {HELPS}"
+        )

@@ -1,41 +1,24 @@
 """Runs as an MCAP file: what Foxglove, Rerun and `ros2 bag` show. The streams are made again from the seeds, bit for bit.
 
-Transforms, sensors, estimate, commands and models of each run are messages, as ROS 2 has them.
+Transforms, sensors, estimate, commands and models of each run are messages of ROS 2 (common_interfaces and geometry2), with their
+names, fields and units: m, s, rad, and quaternions x, y, z, w. What a message lacks is written as zeros, empty texts and empty
+lists.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap_ros2.writer import Writer
 
 from ddenv.engine.judging import rows_of
-from ddenv.engine.ros_messages import (
-    DEFINITIONS,
-    IMU,
-    MARKERS,
-    ODOMETRY,
-    PLACE,
-    SCAN,
-    TF,
-    TWIST,
-    WHEELS,
-    WORDS,
-    Message,
-    header,
-    heading,
-    marker,
-    nanoseconds,
-    pose,
-    transform,
-    twist,
-    vector,
-)
 from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
@@ -49,15 +32,78 @@ from ddenv.runs.reasons import GOAL, F, reasons
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.world import scenario
 from ddenv.world.access import write_file
-from ddenv.world.model import Link, Model, Shape
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere, Visual
 from ddenv.world.pose import Pose
 
+Message = dict[str, Any]
 Color = tuple[float, float, float, float]
 # Topic, kind, time (s), message. Topics without a slash in front get the run's name.
 Row = tuple[str, str, float, Message]
 # All runs are in one frame, and all transforms on one topic, as tools expect; other frames begin with the run's name.
 MAP, TRANSFORMS = "map", "/tf"
 ROBOT_COLOR, LEFT_COLOR, ALWAYS_COLOR = (0.95, 0.75, 0.1, 1.0), (0.85, 0.45, 0.15, 1.0), (0.6, 0.6, 0.6, 1.0)
+# The kinds of messages.
+TF = "tf2_msgs/msg/TFMessage"
+ODOMETRY = "nav_msgs/msg/Odometry"
+SCAN = "sensor_msgs/msg/LaserScan"
+IMU = "sensor_msgs/msg/Imu"
+WHEELS = "sensor_msgs/msg/JointState"
+TWIST = "geometry_msgs/msg/TwistStamped"
+PLACE = "geometry_msgs/msg/PoseStamped"
+WORDS = "std_msgs/msg/String"
+MARKERS = "visualization_msgs/msg/MarkerArray"
+KINDS = (TF, ODOMETRY, SCAN, IMU, WHEELS, TWIST, PLACE, WORDS, MARKERS)
+# Kinds of markers.
+CUBE, SPHERE, CYLINDER, TRIANGLES = 1, 2, 3, 11
+
+# The fields of messages and of their parts.
+_FIELDS = {
+    TF: "geometry_msgs/TransformStamped[] transforms",
+    ODOMETRY: "std_msgs/Header header; string child_frame_id; geometry_msgs/PoseWithCovariance pose; "
+    "geometry_msgs/TwistWithCovariance twist",
+    SCAN: "std_msgs/Header header; float32 angle_min; float32 angle_max; float32 angle_increment; float32 time_increment; "
+    "float32 scan_time; float32 range_min; float32 range_max; float32[] ranges; float32[] intensities",
+    IMU: "std_msgs/Header header; geometry_msgs/Quaternion orientation; float64[9] orientation_covariance; "
+    "geometry_msgs/Vector3 angular_velocity; float64[9] angular_velocity_covariance; "
+    "geometry_msgs/Vector3 linear_acceleration; float64[9] linear_acceleration_covariance",
+    WHEELS: "std_msgs/Header header; string[] name; float64[] position; float64[] velocity; float64[] effort",
+    TWIST: "std_msgs/Header header; geometry_msgs/Twist twist",
+    PLACE: "std_msgs/Header header; geometry_msgs/Pose pose",
+    WORDS: "string data",
+    MARKERS: "visualization_msgs/Marker[] markers",
+    "builtin_interfaces/Time": "int32 sec; uint32 nanosec",
+    "builtin_interfaces/Duration": "int32 sec; uint32 nanosec",
+    "std_msgs/Header": "builtin_interfaces/Time stamp; string frame_id",
+    "std_msgs/ColorRGBA": "float32 r; float32 g; float32 b; float32 a",
+    "geometry_msgs/Vector3": "float64 x; float64 y; float64 z",
+    "geometry_msgs/Point": "float64 x; float64 y; float64 z",
+    "geometry_msgs/Quaternion": "float64 x; float64 y; float64 z; float64 w",
+    "geometry_msgs/Pose": "geometry_msgs/Point position; geometry_msgs/Quaternion orientation",
+    "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose; float64[36] covariance",
+    "geometry_msgs/Twist": "geometry_msgs/Vector3 linear; geometry_msgs/Vector3 angular",
+    "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist; float64[36] covariance",
+    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation; geometry_msgs/Quaternion rotation",
+    "geometry_msgs/TransformStamped": "std_msgs/Header header; string child_frame_id; geometry_msgs/Transform transform",
+    "sensor_msgs/CompressedImage": "std_msgs/Header header; string format; uint8[] data",
+    "visualization_msgs/UVCoordinate": "float32 u; float32 v",
+    "visualization_msgs/MeshFile": "string filename; uint8[] data",
+    "visualization_msgs/Marker": "std_msgs/Header header; string ns; int32 id; int32 type; int32 action; geometry_msgs/Pose pose; "
+    "geometry_msgs/Vector3 scale; std_msgs/ColorRGBA color; builtin_interfaces/Duration lifetime; bool frame_locked; "
+    "geometry_msgs/Point[] points; std_msgs/ColorRGBA[] colors; string texture_resource; sensor_msgs/CompressedImage texture; "
+    "visualization_msgs/UVCoordinate[] uv_coordinates; string text; string mesh_resource; visualization_msgs/MeshFile mesh_file; "
+    "bool mesh_use_embedded_materials",
+}
+
+
+def definition(kind: str) -> str:
+    """The definition of a kind of messages and of all that it uses, as ROS 2 joins them."""
+    names = [kind]
+    # What a part uses is added while the list is gone through.
+    for name in names:
+        used = (each.split()[0].partition("[")[0] for each in _FIELDS[name].split("; "))
+        names += [each for each in dict.fromkeys(used) if each in _FIELDS and each not in names]
+    texts = ["\n".join([f"MSG: {name}", *_FIELDS[name].split("; ")]) for name in names]
+    return f"\n{'=' * 80}\n".join(texts).removeprefix(f"MSG: {kind}\n")
 
 
 @dataclass(frozen=True)
@@ -108,7 +154,7 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     template = Variants(subject.world, subject.robot, subject.scenario)
     said, output = [], BytesIO()
     writer = Writer(output)
-    schemas = {name: writer.register_msgdef(name, text) for name, text in DEFINITIONS.items()}
+    schemas = {kind: writer.register_msgdef(kind, definition(kind)) for kind in KINDS}
     for one in chosen:
         streams = Streams()
         result = template.run(one.models, one.seed, _progress(progress, one.name), one.full, streams)
@@ -162,10 +208,14 @@ def _named(subject: Subject, name: str, number: int) -> Chosen:
 def messages(one: Chosen, result: RunResult, streams: Streams, subject: Subject) -> Iterator[Row]:
     """What is still, what moved, and what the robot sensed and did."""
     goal, removable, base = subject.scenario.goal, frozenset(subject.elements), one.frame("base_link")
-    there = [model for model in subject.world.models if model.name in one.models or model.name not in removable]
     yield "goal", PLACE, 0.0, {"header": header(0.0, MAP), "pose": pose(Pose((goal.x, goal.y, 0.0)))}
-    yield "models", MARKERS, 0.0, {"markers": [*_of_models(one, there, result)]}
-    yield "robot", MARKERS, 0.0, {"markers": [*_of_robot(subject.robot, base)]}
+    there = [model for model in subject.world.models if model.name in one.models or model.name not in removable]
+    # What moves is drawn in a frame of its own.
+    frames = (one.frame(model.name) if model.name in result.motions else MAP for model in there)
+    colors = (LEFT_COLOR if model.name in one.models else ALWAYS_COLOR for model in there)
+    models = zip(there, (model.name for model in there), frames, colors, strict=True)
+    yield "models", MARKERS, 0.0, _markers(models)
+    yield "robot", MARKERS, 0.0, _markers([(subject.robot, "robot", base, ROBOT_COLOR)])
     for child, rows in ((base, result.trajectory), *((one.frame(name), rows) for name, rows in result.motions.items())):
         for seconds, *at in rows.tolist():
             yield TRANSFORMS, TF, seconds, {"transforms": [transform(seconds, MAP, child, at)]}
@@ -242,33 +292,93 @@ def _wheels(seconds: float, joints: Sequence[str], speeds: Sequence[float]) -> M
     return {"header": header(seconds, ""), "name": list(joints), "velocity": [float(speed) for speed in speeds]}
 
 
-def _of_models(one: Chosen, models: Iterable[Model], result: RunResult) -> Iterator[Message]:
-    """A marker for each shape: of a model that moves in its own frame, else in that of the map."""
-    number = 0
-    for model in models:
-        moves = model.name in result.motions
-        frame, origin = (one.frame(model.name), model.links[0].pose.inverse()) if moves else (MAP, Pose())
-        color = LEFT_COLOR if model.name in one.models else ALWAYS_COLOR
-        for shape, at, own in _shapes(model):
-            number += 1
-            if drawn := marker(number, frame, model.name, origin @ at, shape, own or color):
-                yield drawn
-
-
-def _of_robot(robot: Model, base: str) -> Iterator[Message]:
-    origin = robot.links[0].pose.inverse()
-    for number, (shape, at, color) in enumerate(_shapes(robot)):
-        if drawn := marker(number, base, "robot", origin @ at, shape, color or ROBOT_COLOR):
-            yield drawn
+def _markers(models: Iterable[tuple[Model, str, str, Color]]) -> Message:
+    """A marker for each shape of models; each with its name, its frame, and the colour of shapes without one of their own."""
+    shapes = (
+        (frame, name, (Pose() if frame == MAP else model.links[0].pose.inverse()) @ at, shape, own or color)
+        for model, name, frame, color in models
+        for shape, at, own in _shapes(model)
+    )
+    drawn = (marker(number, *one) for number, one in enumerate(shapes, 1))
+    return {"markers": [one for one in drawn if one]}
 
 
 def _shapes(model: Model) -> Iterator[tuple[Shape, Pose, Color | None]]:
     """Shape, pose and colour of each visual, or of each collision of a link that has none."""
     for link in model.links:
-        yield from _of_link(link)
+        for item in link.visuals or link.collisions:
+            yield item.shape, item.pose, item.color if isinstance(item, Visual) else None
 
 
-def _of_link(link: Link) -> Iterator[tuple[Shape, Pose, Color | None]]:
-    if link.visuals:
-        return ((item.shape, item.pose, item.color) for item in link.visuals)
-    return ((item.shape, item.pose, None) for item in link.collisions)
+# The parts of messages.
+
+
+def nanoseconds(seconds: float) -> int:
+    return round(1e9 * seconds)
+
+
+def header(seconds: float, frame: str) -> Message:
+    whole, part = divmod(nanoseconds(seconds), 1_000_000_000)
+    return {"stamp": {"sec": whole, "nanosec": part}, "frame_id": frame}
+
+
+def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
+    return {"x": float(x), "y": float(y), "z": float(z)}
+
+
+def turn(w: float = 1.0, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
+    return {"x": float(x), "y": float(y), "z": float(z), "w": float(w)}
+
+
+def heading(yaw: float) -> Message:
+    return turn(math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+
+
+def twist(speed: float, turn_rate: float) -> Message:
+    return {"linear": vector(speed), "angular": vector(0.0, 0.0, turn_rate)}
+
+
+def transform(seconds: float, frame: str, child: str, pose: Sequence[float]) -> Message:
+    """`pose` is x, y, z, qw, qx, qy, qz of `child` in `frame`."""
+    return {
+        "header": header(seconds, frame),
+        "child_frame_id": child,
+        "transform": {"translation": vector(*pose[:3]), "rotation": turn(*pose[3:7])},
+    }
+
+
+def pose(at: Pose) -> Message:
+    return {"position": vector(*at.position), "orientation": turn(*at.quaternion)}
+
+
+def marker(number: int, frame: str, name: str, at: Pose, shape: Shape, color: Color) -> Message | None:
+    """A shape at `at` in `frame`; None for a plane, which has no end."""
+    # The kind of marker, its size along its axes, m, and the corners of its triangles.
+    kind, points = CUBE, list[Sequence[float]]()
+    size: tuple[float, ...] = (1.0, 1.0, 1.0)
+    match shape:
+        case Box():
+            size = shape.size
+        case Sphere():
+            kind, size = SPHERE, (2 * shape.radius,) * 3
+        case Ellipsoid():
+            kind, size = SPHERE, tuple(2 * radius for radius in shape.radii)
+        case Cylinder():
+            kind, size = CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length)
+        case Capsule():
+            kind, size = CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length + 2 * shape.radius)
+        case Mesh():
+            kind, points = TRIANGLES, shape.vertices[shape.faces].reshape(-1, 3).tolist()
+        case _:
+            return None
+    return {
+        "header": header(0.0, frame),
+        "ns": name,
+        "id": number,
+        "type": kind,
+        "pose": pose(at),
+        "scale": vector(*size),
+        "color": dict(zip("rgba", color, strict=True)),
+        "frame_locked": True,
+        "points": [vector(*point) for point in points],
+    }

@@ -12,17 +12,15 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import wait
-from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Protocol
 
-from ddenv.engine.limits import GENEROUS, memory_limit, too_large
-from ddenv.engine.worker import POSE, Broke, Make, Ready, Refused, Run, Settle, Shared, Start, Task, simulator_of
-from ddenv.engine.worker_process import WorkerProcess
+from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
+from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, WorkerProcess, simulator_of
 from ddenv.errors import UserError
 from ddenv.robot import check_drake
 from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.result import RunResult
-from ddenv.runfile.store import COLUMNS, Live
+from ddenv.runfile.store import Live
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
@@ -37,24 +35,12 @@ FOR_DRAKE = {
 _one_at_a_time = threading.Lock()
 
 
-class _DrakeProcess(SpawnProcess):
-    """A process started with `FOR_DRAKE`: libraries read these variables before any Python code runs."""
-
-    @staticmethod
-    def _Popen(process: SpawnProcess) -> object:  # type: ignore[override]  # a private part of the standard library
-        with _environment(FOR_DRAKE):
-            return SpawnProcess._Popen(process)
-
-
-class DrakeContext(SpawnContext):
-    """Starts processes for the simulation with Drake, also in place of those that died."""
-
-    Process = _DrakeProcess
-
-
 @contextmanager
-def _environment(more: Mapping[str, str]) -> Iterator[None]:
-    """Adds `more` to the environment for a moment, unless the user has set it: a new process inherits it."""
+def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
+    """Adds `more` to the environment for a moment, unless the user has set it: a new process inherits it.
+
+    Libraries read these variables before any Python code runs.
+    """
     with _one_at_a_time:
         added = [name for name in more if name not in os.environ]
         os.environ.update({name: more[name] for name in added})
@@ -81,28 +67,12 @@ CLOCK_PERIOD = 0.1
 
 
 @dataclass(frozen=True)
-class Broken:
-    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died or broke)."""
-
-    outcome: str
-    failure: str
-
-
-@dataclass(frozen=True)
 class Job:
     """A task in flight, for `test` if it is one. It may take `limit` s of real time, without its preparation."""
 
     test: int | None
     task: Task
     limit: float
-
-
-@dataclass(frozen=True)
-class Pace:
-    """How far a running test is: `simulated` s in `real` s of wall clock."""
-
-    simulated: float
-    real: float
 
 
 class Workers(Protocol):
@@ -117,8 +87,7 @@ class Workers(Protocol):
     ) -> None: ...
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]: ...
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]: ...
-    def live(self) -> list[Live]: ...
-    def paces(self) -> list[Pace]: ...
+    def live(self) -> list[tuple[Live, float]]: ...
     def close(self) -> None: ...
 
 
@@ -130,9 +99,20 @@ class _Slot:
         self.ready = False
         self.job: Job | None = None
         self.breaks = 0
-        # How long the job has run, or is in preparation.
-        self.clock = Stopwatch(LONGEST_LOOK)
+        # Where its test is, once it has begun.
+        self.moment: Moment | None = None
         self.result: RunResult | Start | Broken | None = None
+        self.wait(False)
+
+    def wait(self, begun: bool) -> None:
+        """A job is there that has `begun`, or is in preparation until its first moment."""
+        self.moment, self.begun, self.clock = None, begun, Stopwatch(LONGEST_LOOK)
+
+    def go_on(self, moment: Moment) -> None:
+        """The job has come so far. What came before it began to move does not count."""
+        self.moment = moment
+        if self.clock.since != moment.begun:
+            self.begun, self.clock = True, Stopwatch(LONGEST_LOOK, moment.begun)
 
 
 class Pool:
@@ -151,12 +131,9 @@ class Pool:
 
         Raises UserError where Drake is needed and not installed.
         """
+        self._context = multiprocessing.get_context("spawn")
         # The user's own simulator gets the environment unchanged.
-        self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
-        moving = tuple(model.name for model in world.models if not model.static)
-        sizes = (jobs * COLUMNS, jobs, jobs * POSE * len(moving))
-        progress, begun, models = (self._context.RawArray("d", size) for size in sizes)
-        self._shared = Shared(progress, begun, models, moving)
+        self._variables = FOR_DRAKE if scenario.oracle is None else {}
         if scenario.oracle is None:
             check_drake()
         parts = pickle.dumps((make, (scenario, world, robot)))
@@ -168,10 +145,11 @@ class Pool:
         self._margin = 0.0 if scenario.oracle is None else MARGIN
         self._memory = memory_limit(scenario, at_a_time or jobs)
         self._next_memory = 0.0
-        self._slots = [_Slot(self._worker(number)) for number in range(jobs)]
+        self._slots = [_Slot(self._worker()) for _ in range(jobs)]
 
-    def _worker(self, slot: int) -> WorkerProcess:
-        return WorkerProcess(self._context, self._parts, self._shared, slot)
+    def _worker(self) -> WorkerProcess:
+        with added_to_environment(self._variables):
+            return WorkerProcess(self._context, self._parts)
 
     @property
     def idle(self) -> int:
@@ -191,21 +169,16 @@ class Pool:
         limit = limit or self._limit
         self._start(Job(test, Run(keep, seed, full, limit), limit + self._margin))
 
-    def _start(self, job: Job) -> int:
-        """Starts a job on an idle worker, one that has prepared if possible; returns its slot."""
-        idle = (number for number, slot in enumerate(self._slots) if slot.job is None)
-        number = min(idle, key=lambda number: not self._slots[number].ready)
-        slot = self._slots[number]
+    def _start(self, job: Job) -> _Slot:
+        """Starts a job on an idle worker, one that has prepared if possible."""
+        slot = min((slot for slot in self._slots if slot.job is None), key=lambda slot: not slot.ready)
         slot.job, slot.result = job, None
-        self._hand_over(number)
-        return number
+        self._hand_over(slot)
+        return slot
 
-    def _hand_over(self, number: int) -> None:
+    def _hand_over(self, slot: _Slot) -> None:
         """Gives a worker its job, now or once it has prepared: until then it would not read it."""
-        slot = self._slots[number]
-        self._shared.progress[number * COLUMNS] = math.nan
-        self._shared.begun[number] = 0.0 if self._prepares else time.monotonic()
-        slot.clock = Stopwatch(LONGEST_LOOK)
+        slot.wait(begun=not self._prepares)
         if slot.ready and slot.job is not None:
             slot.worker.give(slot.job.task)
 
@@ -236,25 +209,26 @@ class Pool:
         """Waits at most `seconds` for a worker to answer, to print or to die. Replaces what died, and kills what takes too long or
         too much.
         """
-        owners: dict[Any, int] = {
-            handle: number for number, slot in enumerate(self._slots) for handle in slot.worker.handles
-        }
-        for number in sorted({owners[handle] for handle in wait(owners, seconds)}):
-            self._listen(number)
-        for number, slot in enumerate(self._slots):
+        heard = set(wait([handle for slot in self._slots for handle in slot.worker.handles], seconds))
+        for slot in self._slots:
+            if not heard.isdisjoint(slot.worker.handles):
+                self._listen(slot)
             if slot.job is not None and slot.result is None:
-                self._kill_if_late(number)
+                self._kill_if_late(slot, slot.job)
         if time.monotonic() >= self._next_memory:
             self._next_memory = time.monotonic() + MEMORY_PERIOD * max(1.0, len(self._slots) / FEW)
-            for number in range(len(self._slots)):
-                self._kill_if_large(number)
+            for slot in self._slots:
+                if slot.worker.memory() > self._memory:
+                    slot.worker.kill()
+                    limit = f"{self._memory / GIGABYTE:.3g} GB of memory"
+                    self._lose(slot, f"used more than {limit} (simulation.memory_limit, or fewer --jobs, allows more)")
 
-    def _listen(self, number: int) -> None:
-        slot = self._slots[number]
+    def _listen(self, slot: _Slot) -> None:
         try:
-            answer = slot.worker.answer()
+            while isinstance(answer := slot.worker.answer(), Moment):
+                slot.go_on(answer)
         except EOFError:
-            self._lose(number, f"the simulator's process died ({slot.worker.died()})")
+            self._lose(slot, f"the simulator's process died ({slot.worker.died()})")
             return
         match answer:
             case None:
@@ -262,59 +236,47 @@ class Pool:
             case Ready():
                 slot.ready = True
                 if slot.job is not None:
-                    self._hand_over(number)
-            case Refused(why):
-                raise why
-            case Broke(reason):
+                    self._hand_over(slot)
+            case UserError():
+                raise answer
+            case Broken():
                 slot.worker.kill()
-                self._replace(number, Broken("error", reason))
+                self._replace(slot, answer)
             case _:
                 slot.result = answer
 
-    def _kill_if_late(self, number: int) -> None:
-        slot, begun = self._slots[number], self._shared.begun[number]
-        assert slot.job is not None
-        if begun and slot.clock.since != begun:
-            slot.clock = Stopwatch(LONGEST_LOOK, begun)
-        limit, what = (slot.job.limit, "") if begun else (PREPARATION, " to prepare")
+    def _kill_if_late(self, slot: _Slot, job: Job) -> None:
+        limit, what = (job.limit, "") if slot.begun else (PREPARATION, " to prepare")
         if slot.clock.look() > limit:
             slot.worker.kill()
-            self._replace(number, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}"))
+            self._replace(slot, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}"))
 
-    def _kill_if_large(self, number: int) -> None:
-        worker = self._slots[number].worker
-        if worker.memory() > self._memory:
-            worker.kill()
-            self._lose(number, too_large(self._memory))
-
-    def _lose(self, number: int, how: str) -> None:
+    def _lose(self, slot: _Slot, how: str) -> None:
         """A worker is gone. Its job is broken, unless it had not yet begun with that: then it is made by another one.
 
         Raises UserError if that happens again and again.
         """
-        slot = self._slots[number]
         slot.breaks += not slot.ready
         if slot.breaks > MOST_BREAKS:
             raise UserError(
                 f"the simulator's processes die before they run a test: {how}; is there enough memory for the world?"
             )
-        self._replace(number, Broken("error", how) if slot.ready else None)
+        self._replace(slot, Broken("error", how) if slot.ready else None)
 
-    def _replace(self, number: int, broken: Broken | None) -> None:
+    def _replace(self, slot: _Slot, broken: Broken | None) -> None:
         """A new worker for one that is gone, whose job has the result `broken`, or is made again."""
-        slot = self._slots[number]
-        slot.worker, slot.ready = self._worker(number), False
+        slot.worker, slot.ready = self._worker(), False
         if slot.job is None or slot.result is not None:
             return
         slot.result = broken
         if broken is None:
-            self._hand_over(number)
+            self._hand_over(slot)
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         """Lets an idle worker settle the world, and find which of `elements` rest on which. The result returns it, or None until it
         is known.
         """
-        slot = self._slots[self._start(Job(None, Settle(elements), PREPARATION))]
+        slot = self._start(Job(None, Settle(elements), PREPARATION))
 
         def found() -> Start | Broken | None:
             self._look(0.0)
@@ -326,23 +288,14 @@ class Pool:
 
         return found
 
-    def live(self) -> list[Live]:
-        """The running tests that have begun to move."""
-        rows = []
-        for number, slot in enumerate(self._slots):
-            values = self._shared.progress[number * COLUMNS : (number + 1) * COLUMNS]
-            if slot.job is not None and slot.job.test is not None and all(map(math.isfinite, values)):
-                rows.append(Live(number, slot.job.test, values[0], tuple(values[1:]), self._shared.moved(number)))
-        return rows
-
-    def paces(self) -> list[Pace]:
-        """How far the running tests are that have begun to move."""
-        paces = []
-        for number, slot in enumerate(self._slots):
-            # The clock is that of the preparation until it was looked at once more.
-            if slot.job is not None and slot.clock.since == self._shared.begun[number]:
-                paces.append(Pace(self._shared.progress[number * COLUMNS], slot.clock.look()))
-        return [pace for pace in paces if math.isfinite(pace.simulated)]
+    def live(self) -> list[tuple[Live, float]]:
+        """The running tests that have begun to move, and how long each took so far, s of real time."""
+        running = [(number, slot, slot.job.test, slot.moment) for number, slot in enumerate(self._slots) if slot.job]
+        return [
+            (Live(number, test, now.time, now.pose, now.models), slot.clock.look())
+            for number, slot, test, now in running
+            if test is not None and now is not None and all(map(math.isfinite, (now.time, *now.pose)))
+        ]
 
     def close(self) -> None:
         """Kills what runs."""

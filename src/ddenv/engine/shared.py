@@ -7,7 +7,8 @@ controllers may not be deterministic, so their tests are not reused.
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -16,14 +17,12 @@ from typing import Any
 import numpy as np
 
 from ddenv import __version__
-from ddenv.engine.pool import Broken, Pace, Workers
-from ddenv.engine.worker import Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import CERTIFY, Test
-from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runfile.state import CERTIFY, RunState, Test
+from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
 from ddenv.world.scenario import Scenario
@@ -69,40 +68,36 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
     for path in sorted(folder.glob(f"*{SUFFIX}")):
         if path.resolve() == run.path.resolve():
             continue
-        try:
-            with RunFile(path) as other:
-                known |= dict(_tests_of(other)) if _is_alike(run, other) else {}
-        except UserError:
-            # Files that cannot be read are skipped.
-            continue
+        # Files that cannot be read are skipped.
+        with suppress(UserError), RunFile(path) as other:
+            written = list(other.events()) if _is_alike(run, other) else []
+            engines = (each.event for each in written if isinstance(each.event, EngineStarted))
+            if {(one.version, one.simulator, one.machine) for one in engines} == {
+                (__version__, simulator(), machine())
+            }:
+                known |= dict(_tests_of(path, fold(written)))
     return known
 
 
-def _tests_of(other: RunFile) -> Iterator[tuple[Key, Place]]:
-    state = fold(other.events())
+def _tests_of(path: Path, state: RunState) -> Iterator[tuple[Key, Place]]:
     for test in state.tests:
         # Another run implies for itself.
         if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None:
             models = frozenset(state.models_of(test))
             for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
                 if holds:
-                    yield (models, test.seed, full), Place(other.path, test, state.elements)
+                    yield (models, test.seed, full), Place(path, test, state.elements)
 
 
 def _is_alike(run: RunFile, other: RunFile) -> bool:
-    """Whether tests of the same models and the same seed are the same in both runs."""
-    first, second = ([recorded.event for recorded in file.events(most=1)] for file in (run, other))
-    if not (first and second and isinstance(first[0], Created) and isinstance(second[0], Created)):
+    """Whether both runs are asked for tests of the same models in the same world."""
+    ours, theirs = (next((each.event for each in file.events(most=1)), None) for file in (run, other))
+    if not isinstance(ours, Created) or not isinstance(theirs, Created):
         return False
-    ours, theirs = first[0], second[0]
     asked = _asked(ours.scenario)
     if asked is None or asked != _asked(theirs.scenario) or ours.elements != theirs.elements:
         return False
-    if any(run.documents(name) != other.documents(name) for name in ("world", "robot", "resource ")):
-        return False
-    engines = (recorded.event for recorded in other.events())
-    made_with = {(one.version, one.simulator, one.machine) for one in engines if isinstance(one, EngineStarted)}
-    return made_with == {(__version__, simulator(), machine())}
+    return all(run.documents(name) == other.documents(name) for name in ("world", "robot", "resource "))
 
 
 def _asked(scenario: dict[str, Any]) -> Any:
@@ -121,57 +116,8 @@ def _asked(scenario: dict[str, Any]) -> Any:
     }
 
 
-class SharingPool:
-    """Runs new tests in `pool`; a `known` test has its result at once, and takes no worker."""
-
-    def __init__(self, pool: Workers, known: dict[Key, Place]) -> None:
-        self._pool = pool
-        self._known = known
-        self._ready: list[tuple[int, RunResult | Broken]] = []
-
-    @property
-    def idle(self) -> int:
-        """How many more tests can start now."""
-        return self._pool.idle
-
-    @property
-    def busy(self) -> int:
-        return self._pool.busy + len(self._ready)
-
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
-        """Reuses the test, or starts it on an idle worker."""
-        result = _result(self._known.pop((keep, seed, full), None))
-        if result is None:
-            self._pool.submit(test, keep, seed, full, limit)
-        else:
-            self._ready.append((test, result))
-
-    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
-        """Tests that have ended, waiting at most `seconds` for one."""
-        ready, self._ready = self._ready, []
-        return sorted([*ready, *self._pool.finished(0.0 if ready else seconds)], key=lambda one: one[0])
-
-    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
-        """As `Pool.settle`."""
-        return self._pool.settle(elements)
-
-    def live(self) -> list[Live]:
-        """The running tests that have begun to move."""
-        return self._pool.live()
-
-    def paces(self) -> list[Pace]:
-        """How far the running tests are."""
-        return self._pool.paces()
-
-    def close(self) -> None:
-        """Kills what runs."""
-        self._pool.close()
-
-
-def _result(place: Place | None) -> RunResult | None:
+def result_of(place: Place) -> RunResult | None:
     """The result of a test; None if it can no longer be read."""
-    if place is None:
-        return None
     test = place.test
     try:
         with RunFile(place.path) as other:

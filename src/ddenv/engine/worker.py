@@ -1,8 +1,10 @@
-"""What a worker process does: prepare the simulator once, then run one test at a time in it."""
+"""A worker process, from both sides. It prepares the simulator once, and then runs one test at a time in it.
+
+The engine gives it tasks, hears its answers, and may kill it; what it prints goes to the log.
+"""
 
 from __future__ import annotations
 
-import math
 import os
 import pickle
 import signal
@@ -10,84 +12,52 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from typing import Any, Protocol, cast, runtime_checkable
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnContext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 from ddenv.errors import UserError
+from ddenv.robot.external.process import MOST_LEFT, PIECE, Complaints, signal_name
+from ddenv.robot.external.simulator import ExternalSimulator
 from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
-from ddenv.runfile.store import COLUMNS
 from ddenv.text import printable
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
+if TYPE_CHECKING:
+    from ddenv.robot.simulation.template import Variants
+
 NICENESS = 5
-POSE = COLUMNS - 1
-# Time between two looks at where the models of a running test are, s.
-MODELS_PERIOD = 0.1
+# Time between two moments of a running test, s.
+PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
-
-
-@runtime_checkable
-class Limited(Protocol):
-    """A simulator that ends a test itself after `limit` s of real time, and says why."""
-
-    limit: float
-
-
-class Settling(Protocol):
-    """A simulator that lets a world come to rest.
-
-    `ties` has each of `elements` with each other one that it is tied to: without that it would move by itself, as a ball without
-    its shelf. So without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
-    """
-
-    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]: ...
-    def settled(self) -> Settled: ...
-    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None: ...
-
+# How many of its last lines are kept in the reason why a worker died, and how much of a test's output the log gets, bytes.
+LAST_LINES, LOGGED = 3, 100_000
+LEFT_OUT = b"\n(the rest of what this test printed is left out)\n"
+# How long a worker whose pipe is closed may take to end, s.
+END_WAIT = 5.0
+PROC = Path("/proc")
 
 Make = Callable[[Scenario, World, Model], Simulator]
 
 
 @dataclass(frozen=True)
 class Start:
-    """What rests on what in the settled world, as (upper, lower), how it settled, and the ties of its models if they are known."""
+    """What rests on what in the settled world, as (upper, lower), and how it settled.
+
+    `ties` has models with others that they are tied to: without that a model would move by itself, as a ball without its shelf. So
+    without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
+    """
 
     supports: list[tuple[str, str]]
     settled: Settled
     ties: list[tuple[str, str]] | None = None
-
-
-@dataclass(frozen=True)
-class Shared:
-    """Memory that a pool shares with its workers, with a part for each slot.
-
-    `progress` has `COLUMNS` doubles a slot; `begun` one, when the robot began to move, s of `time.monotonic`, and 0 before that.
-    `models` has a pose for each of `names`, the models that can move; its x is NaN while the model is where it started.
-    """
-
-    progress: Any
-    begun: Any
-    models: Any = None
-    names: tuple[str, ...] = ()
-
-    def moved(self, slot: int) -> dict[str, PoseRow]:
-        """Where the models of a slot's test are that are no longer where they started."""
-        size = POSE * len(self.names)
-        poses = (tuple(self.models[at : at + POSE]) for at in range(slot * size, (slot + 1) * size, POSE))
-        return {name: pose for name, pose in zip(self.names, poses, strict=True) if math.isfinite(pose[0])}
-
-    def move(self, slot: int, starts: Mapping[str, PoseRow], models: Mapping[str, PoseRow]) -> None:
-        """Puts the models of a slot's test there, from where they started."""
-        still = (math.nan,) * POSE
-        rows = [still if (pose := models.get(name, still)) == starts.get(name) else pose for name in self.names]
-        if rows:
-            begin = slot * POSE * len(rows)
-            self.models[begin : begin + POSE * len(rows)] = [value for row in rows for value in row]
 
 
 @dataclass(frozen=True)
@@ -116,27 +86,33 @@ class Ready:
 
 
 @dataclass(frozen=True)
-class Refused:
-    """The world cannot be simulated: `why` is for the user."""
+class Broken:
+    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died, or an exception ended it)."""
 
-    why: UserError
+    outcome: str
+    failure: str
 
 
 @dataclass(frozen=True)
-class Broke:
-    """An exception ended the task, in one line, and ends the worker: nobody knows what it has left behind in the simulator."""
+class Moment:
+    """A test goes on: so far `time` s are simulated. The robot, and the models that are no longer where they started, are there.
 
-    reason: str
+    The robot began to move at `begun`, s of `time.monotonic`.
+    """
+
+    begun: float
+    time: float
+    pose: PoseRow
+    models: Mapping[str, PoseRow]
 
 
-Answer = Ready | RunResult | Start | Refused | Broke
+# A UserError says why the world cannot be simulated.
+Answer = Ready | Moment | RunResult | Start | Broken | UserError
 
 
 def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     """The simulator that a scenario asks for. Raises UserError if the world cannot be simulated."""
     if scenario.oracle is not None:
-        from ddenv.robot.external.simulator import ExternalSimulator
-
         return ExternalSimulator(world, scenario)
     # Drake takes a second to load, and users of another simulator may not have it.
     from ddenv.robot.simulation.template import Variants
@@ -144,7 +120,7 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     return Variants(world, robot, scenario)
 
 
-def work(line: Connection, output: Connection, parts: Any, shared: Shared, slot: int) -> None:
+def work(line: Connection, output: Connection, parts: Any) -> None:
     """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is printed goes to `output`.
 
     `parts` has what to make the simulator with, pickled: shared memory, so that starting a worker takes no time in a large world.
@@ -162,9 +138,10 @@ def work(line: Connection, output: Connection, parts: Any, shared: Shared, slot:
             task = line.recv()
         except (EOFError, OSError):
             return
-        answer = answered(task, simulator, shared, slot)
+        answer = answered(task, simulator, line.send)
         line.send(answer)
-        if isinstance(answer, Broke):
+        if isinstance(answer, Broken):
+            # Nobody knows what an exception has left behind in the simulator.
             os._exit(1)
 
 
@@ -179,29 +156,30 @@ def _settle_in(output: Connection) -> None:
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
 
 
-def answered(task: Task, simulator: Simulator | Exception, shared: Shared, slot: int) -> Answer:
-    """Does a task, with its progress in `slot` of the shared memory. A traceback is printed."""
+def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]) -> Answer:
+    """Does a task, and tells the moments of a test. A traceback is printed."""
     try:
         if isinstance(simulator, Exception):
             raise simulator
         if isinstance(task, Settle):
-            world = cast(Settling, simulator)
+            world = cast("Variants", simulator)
             return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
-        if isinstance(simulator, Limited):
+        if isinstance(simulator, ExternalSimulator):
+            # It ends a test itself, and says why.
             simulator.limit = task.limit
-        return simulator.run(task.keep, task.seed, _progress(shared, slot), task.full)
+        return simulator.run(task.keep, task.seed, _progress(tell), task.full)
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:
         if error is simulator and isinstance(error, UserError):
-            return Refused(error)
+            return error
         traceback.print_exception(error)
         sys.stderr.flush()
-        return Broke(_reason(error))
+        return Broken("error", _reason(error))
 
 
-def _progress(shared: Shared, slot: int) -> Progress:
-    """Writes how far a test is to the shared memory."""
-    start, begun, due = slot * COLUMNS, False, 0.0
+def _progress(tell: Callable[[Moment], object]) -> Progress:
+    """Tells how far a test is, at its start and then every `PERIOD`."""
+    begun = due = 0.0
     starts: Mapping[str, PoseRow] = {}
 
     def report(time_s: float, pose: PoseRow, models: Mapping[str, PoseRow]) -> None:
@@ -209,12 +187,10 @@ def _progress(shared: Shared, slot: int) -> Progress:
         now = time.monotonic()
         if not begun or time_s == 0.0:
             # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
-            shared.begun[slot], begun = now, True
-            starts, due = models, 0.0
+            begun, due, starts = now, now, models
         if now >= due:
-            shared.move(slot, starts, models)
-            due = now + MODELS_PERIOD
-        shared.progress[start : start + COLUMNS] = (time_s, *pose)
+            due = now + PERIOD
+            tell(Moment(begun, time_s, pose, {name: at for name, at in models.items() if at != starts.get(name)}))
 
     return report
 
@@ -231,3 +207,126 @@ def _follow_parent(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)
+
+
+# As the engine sees it.
+
+
+class WorkerProcess:
+    """A process that runs `work`. Its answers come over one pipe, and what it prints over another: no output can be taken for an
+    answer, and each wakes up whoever waits for its `handles`.
+    """
+
+    def __init__(self, context: SpawnContext, parts: Any) -> None:
+        self._line, theirs = context.Pipe()
+        self._output, printed = context.Pipe(duplex=False)
+        os.set_blocking(self._output.fileno(), False)
+        # Daemons are killed if this process ends by an exception.
+        self._process = context.Process(target=work, args=(theirs, printed, parts), daemon=True)
+        self._process.start()
+        theirs.close()
+        printed.close()
+        self._said, self._logged, self._silent = Complaints(), 0, False
+
+    @property
+    def pid(self) -> int:
+        pid = self._process.pid
+        assert pid is not None
+        return pid
+
+    @property
+    def handles(self) -> list[Connection | int]:
+        """What `multiprocessing.connection.wait` can wait for."""
+        return [self._line, self._process.sentinel, *([] if self._silent else [self._output])]
+
+    def give(self, task: Task) -> None:
+        """Hands over a task. Does nothing if the worker is dead; that is seen by its handles."""
+        self._said, self._logged = Complaints(), 0
+        with suppress(OSError):
+            self._line.send(task)
+
+    def answer(self) -> Answer | None:
+        """What it has answered since; None if nothing. Raises EOFError if it is dead and will not answer any more."""
+        self._listen()
+        try:
+            if self._line.poll():
+                answer: Answer = self._line.recv()
+                return answer
+        except OSError:
+            raise EOFError from None
+        if wait([self._process.sentinel], 0.0):
+            # It may have answered before it died.
+            if self._line.poll():
+                return self.answer()
+            raise EOFError
+        return None
+
+    def _listen(self) -> None:
+        """Takes some of what it has printed: it may print for ever."""
+        if self._silent:
+            return
+        with suppress(BlockingIOError):
+            piece = os.read(self._output.fileno(), PIECE)
+            self._silent = not piece
+            self._said.add(piece)
+            self._log(piece)
+
+    def _log(self, piece: bytes) -> None:
+        left = LOGGED - self._logged
+        if left < 0:
+            return
+        self._logged += len(piece)
+        with suppress(OSError):
+            os.write(2, piece if len(piece) <= left else piece[:left] + LEFT_OUT)
+
+    def kill(self) -> None:
+        """Ends it at once, whatever it does. Does nothing if it has ended."""
+        if not self._line.closed:
+            self._process.kill()
+            self._end()
+
+    def died(self) -> str:
+        """How it ended by itself, after `answer` has raised EOFError: "SIGSEGV: its last lines"."""
+        self._process.join(END_WAIT)
+        self._process.kill()
+        self._process.join()
+        code = self._process.exitcode
+        for _ in range(MOST_LEFT // PIECE):
+            self._listen()
+        self._end()
+        return _words(0 if code is None else code, self._said.last_lines(LAST_LINES))
+
+    def _end(self) -> None:
+        self._process.join()
+        self._line.close()
+        self._output.close()
+        self._process.close()
+
+    def memory(self) -> int:
+        """The memory in use by it and by what it has started, bytes; 0 where that is not known."""
+        return sum(_resident(pid) for pid in _family(self.pid))
+
+
+def _words(code: int, said: list[str]) -> str:
+    how = f"exit code {code}" if code >= 0 else signal_name(-code)
+    # Nobody else kills workers.
+    perhaps = ", perhaps for lack of memory" if code == -signal.SIGKILL else ""
+    return f"{how}{perhaps}{': ' if said else ''}{' | '.join(said)}"
+
+
+def _family(pid: int) -> Iterator[int]:
+    """A process and all that it has started."""
+    yield pid
+    with suppress(OSError, ValueError):
+        for thread in (PROC / str(pid) / "task").iterdir():
+            for child in (thread / "children").read_text().split():
+                yield from _family(int(child))
+
+
+def _resident(pid: int) -> int:
+    """The memory of one process, without what it shares with others, bytes."""
+    try:
+        _, resident, shared = (PROC / str(pid) / "statm").read_text().split()[:3]
+    except (OSError, ValueError):
+        return 0
+    return (int(resident) - int(shared)) * os.sysconf("SC_PAGE_SIZE")

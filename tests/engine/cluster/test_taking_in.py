@@ -10,11 +10,11 @@ pytest.importorskip("distributed")
 from ddenv import __version__
 from ddenv.engine.cluster.cluster_pool import refusal
 from ddenv.engine.cluster.made_there import Hello
-from ddenv.engine.pool import Broken
 from ddenv.engine.shared import machine, simulator
+from ddenv.engine.worker import Broken
 from tests.engine.fake import result
 
-SAME = Hello("b", 1, __version__, simulator(), machine())
+SAME = Hello("b", __version__, simulator(), machine())
 HERE = result("failed", 0, 2.0)
 
 

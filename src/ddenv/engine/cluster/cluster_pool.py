@@ -6,14 +6,14 @@ are others than here.
 
 from __future__ import annotations
 
-import math
 import pickle
 import uuid
 import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -22,11 +22,11 @@ import numpy as np
 from distributed import Client, Future, KilledWorker
 
 from ddenv import __version__
-from ddenv.engine.cluster.link import GOODBYE, Attached, Link, Lost, There, in_a_line
+from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
-from ddenv.engine.pool import Broken, Pace, Pool
+from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Start
+from ddenv.engine.worker import Broken, Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -40,38 +40,25 @@ Tell = Callable[[int, str], None]
 REFERENCE = 0
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class _Worker:
     """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered, `isin` whether it is
-    taken in.
+    taken in. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
     """
 
     address: str
     threads: int
     hello: Hello | None = None
     isin: bool = False
+    asked: dict[str, tuple[Asked | None, Future[Any]]] = field(default_factory=dict)
+
+    @property
+    def free(self) -> int:
+        return self.threads - len(self.asked) if self.isin else 0
 
     @property
     def name(self) -> str:
         return self.address if self.hello is None else f"{self.address} ({printable(self.hello.host)})"
-
-
-@dataclass(frozen=True)
-class _Flight:
-    """What a worker was asked; the scheduler drops it with the `future`. `asked` is None for a hello."""
-
-    address: str
-    future: Future[Any]
-    asked: Asked | None
-    slot: int = 0
-
-
-@dataclass(frozen=True)
-class _Ended:
-    """What came back for a key: a result, a hello with a run, or an exception."""
-
-    key: str
-    answer: Any
 
 
 class ClusterPool:
@@ -83,12 +70,11 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._keys = 0
         self._whole = frozenset(world.elements(frozenset(scenario.protected))), scenario.reduction.seed
         self._workers: dict[str, _Worker] = {}
-        self._flights: dict[str, _Flight] = {}
         self._waiting: list[Asked] = []
-        self._greeted: list[tuple[str, Hello, RunResult | Broken | None]] = []
+        # Workers that have answered, each with the run that it made to compare.
+        self._greeted: list[tuple[_Worker, RunResult | Broken | None]] = []
         self._ready: list[tuple[int, RunResult | Broken]] = []
         self._progress: dict[int, Mapping[str, Any]] = {}
         self._news: list[str] = []
@@ -97,12 +83,12 @@ class ClusterPool:
         self._sent: Future[bytes] | None = None
         self._compares = scenario.oracle is None
         self._reference: RunResult | None = None
-        self._same: list[int] = []
         self._home: Pool | None = None
         self._settling = False
-        self._happenings: SimpleQueue[Any] = SimpleQueue()
+        # What has happened in other threads, to be done in that of the engine.
+        self._due: SimpleQueue[Callable[[], None]] = SimpleQueue()
         tell(0, f"asking the Dask scheduler of {cluster}")
-        self._link = Link(cluster, self._happenings)
+        self._link = Link(cluster, self._later(self._attached), self._later(self._there), self._later(self._lost))
         if self._compares:
             self._here().submit(REFERENCE, *self._whole)
 
@@ -112,26 +98,33 @@ class ClusterPool:
             self._home = Pool(*self._parts, 1)
         return self._home
 
-    @property
-    def idle(self) -> int:
-        """How many more tests can start now."""
-        made = sum(flight.asked is not None for flight in self._flights.values())
-        return max(0, self._room - made - len(self._waiting))
+    def _later(self, happened: Callable[..., None]) -> Callable[..., None]:
+        return lambda *what: self._due.put(partial(happened, *what))
 
     @property
-    def busy(self) -> int:
-        made = sum(flight.asked is not None for flight in self._flights.values())
-        return made + len(self._waiting) + len(self._ready) + len(self._same)
+    def _tests(self) -> list[int]:
+        """The tests that workers make."""
+        asked = (asked for worker in self._workers.values() for asked, _ in worker.asked.values())
+        return [each.test for each in asked if each is not None]
 
     @property
     def _room(self) -> int:
         return sum(worker.threads for worker in self._workers.values() if worker.isin)
 
+    @property
+    def idle(self) -> int:
+        """How many more tests can start now."""
+        return max(0, self._room - len(self._tests) - len(self._waiting))
+
+    @property
+    def busy(self) -> int:
+        return len(self._tests) + len(self._waiting) + len(self._ready)
+
     def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
         """Has a worker make a test, as soon as there is one; as `Pool.submit`."""
-        if self._compares and full and (keep, seed) == self._whole:
-            # It is made here in any case.
-            self._same.append(test)
+        if self._reference is not None and full and (keep, seed) == self._whole:
+            # It was made here in any case.
+            self._ready.append((test, self._reference))
             return
         self._waiting.append(Asked(self._run, self._topic, test, keep, seed, full, limit))
         self._send()
@@ -140,11 +133,9 @@ class ClusterPool:
         """As `Pool.finished`: tests that have ended, waiting at most `seconds` for one."""
         self._look_here()
         with suppress(Empty):
-            happened = self._happenings.get(timeout=0.0 if self._ready else seconds) if seconds else None
+            self._due.get(timeout=0.0 if self._ready else seconds)()
             while True:
-                if happened is not None:
-                    _HANDLED[type(happened)](self, happened)
-                happened = self._happenings.get_nowait()
+                self._due.get_nowait()()
         self._take_in()
         self._send()
         self._say()
@@ -160,53 +151,52 @@ class ClusterPool:
                         f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
                     )
                 self._reference = result
-        if self._reference is not None:
-            self._ready += [(test, self._reference) for test in self._same]
-            self._same.clear()
         if self._home is not None and not self._settling and (self._reference is not None or not self._compares):
             self._home.close()
             self._home = None
 
     # What happens to the cluster.
 
-    def _attached(self, happened: Attached) -> None:
-        self._client = happened.client
+    def _attached(self, client: Client) -> None:
+        self._client = client
         self._client.subscribe_topic(self._topic, self._noted)
         with warnings.catch_warnings():
             # A world with meshes is large, and goes out once.
             warnings.simplefilter("ignore")
             # As a task it is made again if the workers that hold it die.
-            self._sent = self._client.submit(bytes, self._blob, key=self._key("parts"), pure=False)
+            self._sent = self._client.submit(
+                bytes, self._blob, key=f"parts-{self._topic}-{uuid.uuid4().hex}", pure=False
+            )
         self._news.append(f"attached to the Dask scheduler of {self._cluster}")
 
-    def _lost(self, happened: Lost) -> None:
+    def _lost(self, why: str) -> None:
         self._client = self._sent = None
         for address in list(self._workers):
             self._gone(address)
         self._news.append(
-            f"the Dask scheduler of {self._cluster} is lost ({happened.why}); waiting for it. To go on without it, stop the run, "
+            f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. To go on without it, stop the run, "
             "and resume it with --cluster here"
         )
 
-    def _there(self, happened: There) -> None:
-        gone = [address for address in self._workers if address not in happened.threads]
+    def _there(self, threads: Mapping[str, int]) -> None:
+        gone = [address for address in self._workers if address not in threads]
         lost = sum(self._gone(address) for address in gone)
         if gone:
             again = f"; {count(lost, 'test')} made again elsewhere" if lost else ""
             self._news.append(f"{count(len(gone), 'worker')} left the cluster{again}")
-        new = [address for address in happened.threads if address not in self._workers]
-        for address in new:
-            self._workers[address] = _Worker(address, happened.threads[address])
-            self._ask(address)
+        new = [_Worker(address, threads[address]) for address in threads if address not in self._workers]
+        for worker in new:
+            self._workers[worker.address] = worker
+            self._ask(worker)
         if new:
             first = ": first the whole world once, as it is made here, to compare the bits" if self._compares else ""
             self._news.append(f"{count(len(new), 'worker')} came to the cluster{first}")
 
     def _gone(self, address: str) -> int:
         """Forgets a worker; returns how many of its tests have to be made again."""
-        del self._workers[address]
-        keys = [key for key, flight in self._flights.items() if flight.address == address]
-        again = [asked for key in keys if (asked := self._flights.pop(key).asked) is not None]
+        worker = self._workers.pop(address)
+        again = [asked for asked, _ in worker.asked.values() if asked is not None]
+        worker.asked.clear()
         self._wait_again(again)
         return len(again)
 
@@ -221,37 +211,26 @@ class ClusterPool:
 
     # Tests.
 
-    def _key(self, what: str) -> str:
-        self._keys += 1
-        return f"{what}-{self._keys}-{self._topic}"
-
-    def _ask(self, address: str) -> None:
+    def _ask(self, worker: _Worker) -> None:
         """Asks a new worker who it is, and what bits it computes."""
-        self._hand_out(
-            address, greet, "hello", Asked(self._run, self._topic, REFERENCE, *self._whole, True, None), None
-        )
+        whole = Asked(self._run, self._topic, REFERENCE, *self._whole, True, None)
+        self._hand_out(worker, greet, whole, None)
 
     def _send(self) -> None:
-        """Hands tests to free workers, in the order of the algorithm."""
-        while self._waiting and self._client is not None and (address := self._free()) is not None:
+        """Hands tests to the workers with the most free threads, in the order of the algorithm."""
+        while self._waiting and self._client is not None:
+            worker = max(self._workers.values(), key=lambda worker: worker.free, default=None)
+            if worker is None or worker.free <= 0:
+                return
             asked = self._waiting.pop(0)
-            self._hand_out(address, make, "test", asked, asked)
+            self._hand_out(worker, make, asked, asked)
 
-    def _free(self) -> str | None:
-        """The worker with the most free threads; None if all are busy."""
-        free = {worker.address: worker.threads for worker in self._workers.values() if worker.isin}
-        for flight in self._flights.values():
-            if flight.address in free:
-                free[flight.address] -= 1
-        best = max(free, key=lambda address: free[address], default=None)
-        return best if best is not None and free[best] > 0 else None
-
-    def _hand_out(self, address: str, what: Callable[..., Any], name: str, words: Asked, asked: Asked | None) -> None:
+    def _hand_out(self, worker: _Worker, what: Callable[..., Any], words: Asked, asked: Asked | None) -> None:
         assert self._client is not None
-        key = self._key(name)
+        key = f"{what.__name__}-{uuid.uuid4().hex}"
         try:
             future = self._client.submit(
-                what, self._sent, words, key=key, workers=[address], pure=False, priority=-words.test
+                what, self._sent, words, key=key, workers=[worker.address], pure=False, priority=-words.test
             )
         except Exception:
             # The connection has just broken: the link will say so.
@@ -259,26 +238,24 @@ class ClusterPool:
                 self._wait_again([asked])
             self._client = None
             return
-        used = {flight.slot for flight in self._flights.values()}
-        slot = next(number for number in range(len(used) + 1) if number not in used)
-        self._flights[key] = _Flight(address, future, asked, slot)
-        future.add_done_callback(lambda done: self._happenings.put(_Ended(key, _answer(done))))
+        worker.asked[key] = asked, future
+        ended = self._later(self._ended)
+        future.add_done_callback(lambda done: ended(worker, key, _answer(done)))
 
-    def _ended(self, happened: _Ended) -> None:
-        """Raises UserError if the world cannot be simulated."""
-        flight = self._flights.pop(happened.key, None)
-        if flight is None:
-            # Its worker was lost, and the test is made elsewhere.
+    def _ended(self, worker: _Worker, key: str, answer: Any) -> None:
+        """A result, a hello with a run, or an exception came back. Raises UserError if the world cannot be simulated."""
+        if key not in worker.asked:
+            # The worker was lost, and the test is made elsewhere.
             return
-        answer, asked = happened.answer, flight.asked
+        asked, _ = worker.asked.pop(key)
         if asked is None:
-            self._answered(flight.address, answer)
+            self._answered(worker, answer)
             return
         if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker):
             self._wait_again([asked])
-            if isinstance(answer, NotGreeted) and (worker := self._workers.get(flight.address)) is not None:
-                self._workers[worker.address] = replace(worker, isin=False)
-                self._ask(worker.address)
+            if isinstance(answer, NotGreeted):
+                worker.isin = False
+                self._ask(worker)
             return
         self._progress.pop(asked.test, None)
         if isinstance(answer, UserError):
@@ -288,29 +265,26 @@ class ClusterPool:
 
     # Who may make tests.
 
-    def _answered(self, address: str, answer: Any) -> None:
-        worker = self._workers.get(address)
-        if worker is None or isinstance(answer, CancelledError | KilledWorker):
+    def _answered(self, worker: _Worker, answer: Any) -> None:
+        if isinstance(answer, CancelledError | KilledWorker):
             return
         if isinstance(answer, BaseException):
             self._leave_out(worker, f"it cannot make tests: {printable(in_a_line(answer))}")
             return
-        hello, run = answer
-        self._workers[address] = replace(worker, hello=hello)
-        self._greeted.append((address, hello, run))
+        worker.hello, run = answer
+        self._greeted.append((worker, run))
 
     def _take_in(self) -> None:
         """Compares what new workers made, once there is something to compare with."""
         if self._compares and self._reference is None:
             return
-        for address, hello, run in self._greeted:
-            worker = self._workers.get(address)
-            if worker is None:
+        for worker, run in self._greeted:
+            if worker.hello is None or worker is not self._workers.get(worker.address):
                 continue
-            if why := refusal(hello, run, self._reference):
+            if why := refusal(worker.hello, run, self._reference):
                 self._leave_out(worker, why)
             else:
-                self._workers[address] = replace(worker, isin=True)
+                worker.isin = True
         self._greeted.clear()
 
     def _leave_out(self, worker: _Worker, why: str) -> None:
@@ -345,31 +319,17 @@ class ClusterPool:
 
         return found
 
-    def live(self) -> list[Live]:
-        """The running tests that have begun to move."""
-        return [
-            Live(
-                flight.slot,
-                flight.asked.test,
-                row["time"],
-                tuple(row["pose"]),
-                {name: tuple(pose) for name, pose in row["models"].items()},
-            )
-            for flight in list(self._flights.values())
-            if flight.asked is not None and (row := self._progress.get(flight.asked.test)) is not None
-        ]
-
-    def paces(self) -> list[Pace]:
-        """How far the running tests are that have begun to move."""
-        rows = [self._progress.get(each.asked.test) for each in self._flights.values() if each.asked is not None]
-        return [Pace(row["time"], row["real"]) for row in rows if row is not None and math.isfinite(row["time"])]
+    def live(self) -> list[tuple[Live, float]]:
+        """As `Pool.live`."""
+        rows = (row for test in self._tests if (row := self._progress.get(test)) is not None)
+        return [(Live(row["test"], row["test"], row["time"], row["pose"], row["models"]), row["real"]) for row in rows]
 
     def close(self) -> None:
         """Drops what runs: the workers end it by themselves."""
         if self._home is not None:
             self._home.close()
         client, taken = self._client, [worker.address for worker in self._workers.values() if worker.isin]
-        self._flights.clear()
+        self._workers.clear()
         if client is not None and taken:
             with suppress(Exception):
                 client.sync(client._run, forget, self._run, workers=taken, on_error="ignore", callback_timeout=GOODBYE)
@@ -416,11 +376,3 @@ def _same_bits(one: RunResult, other: RunResult) -> bool:
     ours, theirs = ({**run.motions, "": run.trajectory} for run in (one, other))
     same_models = ours.keys() == theirs.keys()
     return first == second and same_models and all(np.array_equal(ours[name], theirs[name]) for name in ours)
-
-
-_HANDLED: dict[type, Callable[[ClusterPool, Any], None]] = {
-    Attached: ClusterPool._attached,
-    Lost: ClusterPool._lost,
-    There: ClusterPool._there,
-    _Ended: ClusterPool._ended,
-}

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from queue import SimpleQueue
 from typing import Any
 
 from distributed import Client, Security, SSHCluster
@@ -22,33 +20,22 @@ ANSWER = 10.0
 GOODBYE = 2.0
 
 
-@dataclass(frozen=True)
-class Attached:
-    """There is a connection; all that was known of an earlier one is void."""
-
-    client: Client
-
-
-@dataclass(frozen=True)
-class There:
-    """The addresses of all workers that are there, with how many tests each can make at the same time."""
-
-    threads: Mapping[str, int]
-
-
-@dataclass(frozen=True)
-class Lost:
-    """The scheduler does not answer any more."""
-
-    why: str
-
-
 class Link:
-    """A connection to the scheduler of `cluster` that is made again when it is lost. What happens goes to `happenings`."""
+    """A connection to the scheduler of `cluster` that is made again when it is lost.
 
-    def __init__(self, cluster: str, happenings: SimpleQueue[Any]) -> None:
+    In its thread it calls `attached` with each new connection: all that was known of an earlier one is void; `there` with the
+    addresses of all workers that are there, and how many tests each can make at the same time; and `lost` with the reason.
+    """
+
+    def __init__(
+        self,
+        cluster: str,
+        attached: Callable[[Client], None],
+        there: Callable[[Mapping[str, int]], None],
+        lost: Callable[[str], None],
+    ) -> None:
         """Raises UserError if no scheduler answers."""
-        self._cluster, self._happenings = cluster, happenings
+        self._cluster, self._attached, self._there, self._lost = cluster, attached, there, lost
         self._ssh: Any = None
         self._closed = threading.Event()
         try:
@@ -76,11 +63,11 @@ class Link:
 
     def _follow(self) -> None:
         while not self._closed.is_set():
-            self._happenings.put(Attached(self._client))
+            self._attached(self._client)
             why = self._watch()
             if self._closed.is_set():
                 return
-            self._happenings.put(Lost(why))
+            self._lost(why)
             self._end()
             self._connect_again()
 
@@ -97,7 +84,7 @@ class Link:
                 return in_a_line(error)
             if threads != before:
                 before = threads
-                self._happenings.put(There(threads))
+                self._there(threads)
         return ""
 
     def _connect_again(self) -> None:

@@ -6,7 +6,6 @@ Dask cannot end a test that hangs, so the child is one of `Pool`: it has a limit
 from __future__ import annotations
 
 import multiprocessing
-import os
 import pickle
 import platform
 import threading
@@ -14,13 +13,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from distributed import Worker, get_worker
 
 from ddenv import __version__
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
+from ddenv.engine.worker import Broken
 from ddenv.robot.result import RunResult
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
@@ -56,7 +57,6 @@ class Hello:
     """Who a worker is, and what it computes with."""
 
     host: str
-    pid: int
     version: str
     simulator: str
     machine: str
@@ -80,7 +80,7 @@ def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]
     Raises UserError where that cannot be started.
     """
     _engines.add(asked.topic)
-    hello = Hello(platform.node(), os.getpid(), __version__, simulator(), machine())
+    hello = Hello(platform.node(), __version__, simulator(), machine())
     # The name of the run begins with the engine's version: another one may understand nothing else.
     if hello.version != asked.run.partition(" ")[0]:
         return hello, None
@@ -116,8 +116,8 @@ def _is_wanted(worker: Worker, key: Any) -> bool:
 
 
 def _report(worker: Worker, child: Pool, asked: Asked) -> None:
-    for live, pace in zip(child.live(), child.paces(), strict=False):
-        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models, "real": pace.real}
+    for live, real in child.live():
+        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models, "real": real}
         worker.log_event(asked.topic, row)
 
 
@@ -130,13 +130,16 @@ class _Idle:
 
 _idle: list[_Idle] = []
 _lock = threading.Lock()
-_watched = False
 
 
 @contextmanager
 def _child(parts: bytes, run: str) -> Iterator[Pool]:
     """A child process for `run`, kept for the next test unless this one goes wrong."""
-    child = _taken(run) or _new(parts)
+    taken = _taken(lambda idle: idle.run == run, 1)
+    # Those of other runs end where there is none: a worker has memory for one a thread.
+    for other in () if taken else _taken(lambda _: True, 1):
+        other.close()
+    child = taken[0] if taken else _new(parts)
     try:
         yield child
     except BaseException:
@@ -146,50 +149,38 @@ def _child(parts: bytes, run: str) -> Iterator[Pool]:
         _idle.append(_Idle(run, child, time.monotonic()))
 
 
-def _taken(run: str) -> Pool | None:
-    """An idle child of `run`. Those of other runs end where there is none: a worker has memory for one a thread."""
+def _taken(which: Callable[[_Idle], bool], most: int | None = None) -> list[Pool]:
+    """The idle children of this kind, at most so many, which are idle no longer."""
     with _lock:
-        own = [each for each in _idle if each.run == run]
-        if own:
-            _idle.remove(own[-1])
-            return own[-1].child
-        others = _idle[:1]
-        del _idle[:1]
-    for other in others:
-        other.child.close()
-    return None
+        taken = [idle for idle in _idle if which(idle)][:most]
+        for idle in taken:
+            _idle.remove(idle)
+    return [idle.child for idle in taken]
 
 
 def _new(parts: bytes) -> Pool:
-    global _watched
-    with _lock:
-        if not _watched:
-            _watched = True
-            threading.Thread(target=_end_unused, daemon=True).start()
+    _watch()
     # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
     known: Parts = pickle.loads(parts)
     return Pool(*known, 1, at_a_time=get_worker().state.nthreads)
 
 
+@cache
+def _watch() -> None:
+    """Once in this process: a thread ends children that nobody uses."""
+    threading.Thread(target=_end_unused, daemon=True).start()
+
+
 def _end_unused() -> None:
     while True:
         time.sleep(UNUSED / 10)
-        for child in _taken_out(lambda idle: time.monotonic() - idle.since > UNUSED):
+        for child in _taken(lambda idle: time.monotonic() - idle.since > UNUSED):
             child.close()
 
 
 def forget(run: str) -> None:
     """Ends the idle children of `run`."""
-    for child in _taken_out(lambda idle: idle.run == run):
+    for child in _taken(lambda idle: idle.run == run):
         # This is the thread in which the worker talks with the scheduler.
         threading.Thread(target=child.close).start()
-
-
-def _taken_out(which: Callable[[_Idle], bool]) -> list[Pool]:
-    """The idle children of this kind, which are idle no longer."""
-    with _lock:
-        taken = [idle for idle in _idle if which(idle)]
-        for idle in taken:
-            _idle.remove(idle)
-    return [idle.child for idle in taken]
