@@ -16,8 +16,8 @@ from ddenv.errors import UserError
 from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
-from ddenv.runfile.failures import Baseline, SeenFailure, grouped
+from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
+from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.text import count
@@ -68,7 +68,7 @@ def _to_ms(times: dict[str, float]) -> dict[str, float]:
     return {name: round(seconds, 3) for name, seconds in times.items()}
 
 
-def known_failure(state: RunState) -> Baseline:
+def known_failure(state: RunState) -> BaselineFinished:
     """The baseline, which fixed f. Raises UserError before it is done."""
     if state.baseline is None:
         raise UserError("damaged run file: f is not known before the baseline is done")
@@ -157,7 +157,7 @@ def fix_failure(
         position=failures[f].position,
         miss_chance=miss_chance(rate, iterations),
         iterations_95=iterations_needed(rate),
-        seen=tuple(Seen(failure.test, failure.runs, failure.kinds, failure.position) for failure in seen),
+        seen=tuple(seen),
         judged=Outcomes(
             {id: judgement.outcome for id, judgement in judged.items()},
             {id: judgement.distance for id, judgement in judged.items()},

@@ -17,7 +17,7 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Forecast, Node, PastRound, Point
+from ddenv.runfile.progress import Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
 from ddenv.runfile.store import Recorded, uncollected
 from ddenv.text import count
@@ -219,10 +219,9 @@ def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, 
 
 
 def _forecast(_: RunState, event: e.Forecast, __: float) -> Changes:
-    low, likely, high = event.tests
-    if not low <= likely <= high:
+    if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
-    return {"forecast": Forecast(low, likely, high, event.tests_done)}
+    return {"forecast": event}
 
 
 def _candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:

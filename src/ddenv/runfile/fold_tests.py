@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from ddenv.runfile import events as e
-from ddenv.runfile.failures import Baseline, SeenFailure
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, Point, Removal
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunState, Test, Trial
@@ -52,7 +51,7 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
         return changes | with_trial(state, replace(trial, tests=(*trial.tests, test.id)))
     if event.round is None or event.candidate is None:
         return changes
-    candidate = tried(state, event)
+    candidate = candidate_of(state, event.round, event.candidate)
     return changes | with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
 
 
@@ -129,28 +128,13 @@ def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
 
 
 def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
-    seen_failures = tuple(SeenFailure(one.test, one.runs, one.kinds, one.position) for one in event.seen)
-    baseline = Baseline(
-        runs=event.runs,
-        failures=event.failures,
-        rate=event.rate,
-        low=event.low,
-        high=event.high,
-        failure_test=event.failure_test,
-        position=event.position,
-        miss_chance=event.miss_chance,
-        iterations_95=event.iterations_95,
-        broken=event.broken,
-        wall_limit=event.wall_limit,
-        seen=seen_failures,
-    )
     judged, first = with_outcomes(state, event.judged), event.failure_test
     runs, shown = seen(judged.tests, (test.id for test in judged.tests if test.phase == "baseline"))
     return {
         "tests": judged.tests,
         "tally": judged.tally,
         "deflake_runs": judged.deflake_runs,
-        "baseline": baseline,
+        "baseline": event,
         "evidence_test": first,
         "failures": (first,),
         "nodes": with_node(state.nodes, replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown)),
@@ -266,21 +250,17 @@ def with_trial(state: RunState, trial: Trial) -> Changes:
     return {"trials": (*state.trials[: trial.number - 1], trial, *state.trials[trial.number :])}
 
 
-class OfCandidate(Protocol):
-    """An event of a candidate of the current round."""
-
-    @property
-    def round(self) -> int | None: ...
-    @property
-    def candidate(self) -> int | None: ...
-
-
-def tried(state: RunState, event: OfCandidate) -> Candidate:
+def tried(state: RunState, event: e.OfCandidate) -> Candidate:
     """The candidate that an event is about. Raises IndexError or ValueError if it is none of the current round."""
+    return candidate_of(state, event.round, event.candidate)
+
+
+def candidate_of(state: RunState, number: int, index: int) -> Candidate:
+    """A candidate of round `number`, as `tried`."""
     round = current(state)
-    if event.round != round.number or event.candidate is None:
-        raise ValueError(event.round)
-    return round.candidates[event.candidate]
+    if number != round.number:
+        raise ValueError(number)
+    return round.candidates[index]
 
 
 def with_candidate(state: RunState, candidate: Candidate) -> Changes:

@@ -133,19 +133,6 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Forecast:
-    """How many tests of candidates the engine expected to be left when `tests_done` were finished.
-
-    In one case of ten fewer than `low` are left, in one of ten more than `high`.
-    """
-
-    low: int
-    likely: int
-    high: int
-    tests_done: int
-
-
-@dataclass(frozen=True, slots=True)
 class Point:
     """The size of the environment after `tests` finished tests; at least `needed` of its models were known to be needed."""
 

@@ -7,10 +7,10 @@ from itertools import islice
 from typing import Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.failures import Baseline, Place
+from ddenv.runfile.events import BaselineFinished, Forecast, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
-from ddenv.runfile.progress import Certificate, Decision, Forecast, Isolation, Leg, Node, Point, Refusal, Removal
+from ddenv.runfile.progress import Certificate, Decision, Isolation, Leg, Node, Point, Refusal, Removal
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]
@@ -92,7 +92,7 @@ class RunState:
     paused: bool = False
     needs_room: int = 0
     waiting_candidate: int | None = None
-    baseline: Baseline | None = None
+    baseline: BaselineFinished | None = None
     round: Round | None = None
     rounds_done: int = 0
     forecast: Forecast | None = None
