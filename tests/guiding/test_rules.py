@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
-from ddenv.guiding.commands import KINDS, data_of, parse, refusal
+from ddenv.guiding.commands import KINDS, parse, refusal, send, written
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import ACTIONS, Pointed, offer
 from ddenv.guiding.situation import Situation
@@ -61,8 +61,7 @@ ANY = st.one_of(
 def test_each_command_is_written_as_it_is_read():
     assert {kind for kind, _ in WRITTEN} == set(KINDS)
     for kind, data in WRITTEN:
-        command = parse(kind, data)
-        assert (command.kind, data_of(command)) == (kind, data)
+        assert written(parse(kind, data)) == (kind, data)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +147,7 @@ def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, 
                 journal = Journal(file)
                 if offer(action, Situation(journal.state), pointed) != offered:
                     continue
-                command = file.send(offered.command.kind, **data_of(offered.command))
+                command = send(file, offered.command)
                 Control(journal, threading.Event()).poll()
                 assert journal.state.refusal[0] != command
 

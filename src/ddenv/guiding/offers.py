@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import AcceptMode, Change, Pause, Resume, StartEngine, Step, Undo
+from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
 from ddenv.guiding.selections import (
     Accept,
     AcceptOther,
@@ -23,7 +23,6 @@ from ddenv.guiding.selections import (
 )
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
 from ddenv.runfile.state import REFUSED, RunState, Trial
-from ddenv.settings import Value
 from ddenv.text import shortened
 
 
@@ -181,8 +180,3 @@ ACTIONS: dict[str, Meaning] = {
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,
 }
-
-
-def change(state: RunState, asked: Mapping[str, Value]) -> Change:
-    """The command for the settings in a dialog: only those that are new."""
-    return Change(Change(asked).new(state))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,8 +26,8 @@ NO_MODELS = "no such models"
 class Situation:
     """A run, and what else decides whether a command is possible.
 
-    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the kind of the viewer's last command until the
-    engine obeys it, or "".
+    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the viewer's last command in brief until
+    the engine obeys it, or "".
     """
 
     state: RunState
@@ -108,17 +108,13 @@ def next_candidate(state: RunState, after: int) -> str:
     return "It was the last one of this round" if following is None else f"Next is {following.label}"
 
 
-def lacks_pinned(state: RunState, models: Iterable[str]) -> str:
-    """Why a selection cannot become the environment, as the end of a sentence; or ""."""
+def lacks_pinned(state: RunState, label: str, models: Iterable[str]) -> str:
+    """Why a selection cannot become the environment, or ""."""
     pinned = state.pinned.difference(models)
     lacking = [name for name in state.environment if name in pinned]
-    return f"lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
+    return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
 
 
 def named(names: Iterable[str]) -> str:
     """The first names of some models, short enough for a line."""
     return first_of([shortened(name, LONGEST) for name in names], NAMED)
-
-
-def is_or_are(names: Collection[str]) -> str:
-    return "is" if len(names) == 1 else "are"
