@@ -9,7 +9,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.learn.recorded_oracle import Oracle
 from ddenv.runfile.events import TestFinished, TestStarted
-from ddenv.runfile.follow import steps
+from ddenv.runfile.fold import steps
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Split, Trial
 from ddenv.runfile.store import Recorded, RunFile

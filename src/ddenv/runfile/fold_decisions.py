@@ -145,14 +145,8 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
         "tally": judged.tally,
         "failures": failures_at(state, node.number),
         "nodes": nodes,
-        "node": node.number,
-        "came_at": state.tests_done,
-        "environment": node.environment,
         "pinned": state.pinned - gone,
-        "evidence_test": node.evidence_test,
-        "lower_bound": 0,
-        "minimal": False,
-        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+        **at_node(state, node),
         **decision(state, at, "undo" if event.rejected is not None else "go_back", words),
     }
 
@@ -231,15 +225,19 @@ def arrived(
     # Nothing is known yet about what another failure needs.
     needed = min(state.lower_bound, len(environment)) if inside and how not in ("accepted", "instead") else 0
     changes = {} if how == "reduced" else left_round(state) | {"search_due": True}
-    return changes | {
-        "nodes": (*state.nodes, node),
+    return changes | at_node(state, node, needed) | {"nodes": (*state.nodes, node)}
+
+
+def at_node(state: RunState, node: Node, needed: int = 0) -> Changes:
+    """The run is at a node from now on; at least `needed` of its models are known to be needed."""
+    return {
         "node": node.number,
         "came_at": state.tests_done,
-        "environment": environment,
-        "evidence_test": evidence_test,
+        "environment": node.environment,
+        "evidence_test": node.evidence_test,
         "lower_bound": needed,
         "minimal": False,
-        "history": (*state.history, Point(state.tests_done, len(environment), needed)),
+        "history": (*state.history, Point(state.tests_done, len(node.environment), needed)),
     }
 
 

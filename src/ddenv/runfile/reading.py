@@ -17,7 +17,6 @@ DIGITS = 250_000
 Data = TypeVar("Data")
 Reader = Callable[[Any], Any]
 
-
 # By dataclass, made once: its fields with their defaults, and what reads it.
 _FIELDS: dict[Any, list[tuple[str, Any]]] = {}
 _READERS: dict[Any, Reader] = {}
@@ -134,7 +133,13 @@ def _reader(hint: Any) -> Reader:
         return _dictionary(*arguments)
     if is_dataclass(hint) and hint is not Environment:
         return _of_dataclass(hint)
-    return {int: _number(int, None), float: _number(float, None), str: _text, bool: _flag, Environment: _models}[hint]
+    return {
+        int: _number(int, None),
+        float: _number(float, None),
+        str: _instance(str, "text"),
+        bool: _instance(bool, "true or false"),
+        Environment: _models,
+    }[hint]
 
 
 def _number(kind: type, within: Range | None) -> Reader:
@@ -194,7 +199,7 @@ def _pair(first: Reader, second: Reader) -> Reader:
 
 def _dictionary(key: Any, content: Any) -> Reader:
     """JSON has numbers as keys only in quotes."""
-    reader = _anything if content is Any else _reader(content)
+    reader: Reader = (lambda item: item) if content is Any else _reader(content)
 
     def dictionary(value: Any) -> Any:
         if type(value) is not dict:
@@ -206,20 +211,13 @@ def _dictionary(key: Any, content: Any) -> Reader:
     return dictionary
 
 
-def _anything(value: Any) -> Any:
-    return value
+def _instance(kind: type, what: str) -> Reader:
+    def instance(value: Any) -> Any:
+        if type(value) is not kind:
+            raise _wrong(what, value)
+        return value
 
-
-def _text(value: Any) -> str:
-    if type(value) is not str:
-        raise _wrong("text", value)
-    return value
-
-
-def _flag(value: Any) -> bool:
-    if type(value) is not bool:
-        raise _wrong("true or false", value)
-    return value
+    return instance
 
 
 def _models(value: Any) -> Environment:

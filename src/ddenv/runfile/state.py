@@ -9,8 +9,7 @@ from typing import Any
 from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.events import BaselineFinished, Forecast, Place
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.physics import Physics
-from ddenv.runfile.progress import Certificate, Decision, Isolation, Leg, Node, Point, Refusal, Removal
+from ddenv.runfile.progress import Certificate, Decision, Isolation, Leg, Node, Physics, Point, Refusal, Removal
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]

@@ -20,7 +20,7 @@ from ddenv.runfile.events import (
     Reduced,
     TestFinished,
 )
-from ddenv.runfile.follow import steps
+from ddenv.runfile.fold import steps
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded, RunFile
