@@ -65,20 +65,22 @@ def test_each_command_is_written_as_it_is_read():
 
 
 @pytest.mark.parametrize(
-    ("kind", "data"),
+    ("kind", "data", "why"),
     [
-        ("dance", {}),
-        ("veto", {"round": 1}),
-        ("veto", {"round": True, "candidate": 0}),
-        ("pin", {"models": "wall"}),
-        ("try", {"models": [True]}),
-        ("accept_mode", {"mode": "no"}),
-        ("change", {"settings": []}),
+        ("dance", {}, "there is no command 'dance'"),
+        ("veto", {"round": 1}, "no such candidate: is missing"),
+        ("veto", {"round": True, "candidate": 0}, "no such round: expected a whole number, found True"),
+        ("pin", {"models": "wall"}, "no such models: expected a list, found 'wall'"),
+        ("try", {"models": [True]}, "no such models: expected a whole number, found True"),
+        ("step", {"unit": "year"}, "no such unit: expected one of test, round, found 'year'"),
+        ("accept_mode", {"mode": "no"}, "no such mode: expected one of automatic, ask, found 'no'"),
+        ("change", {"settings": []}, "no such settings: expected an object, found a list of 0"),
     ],
 )
-def test_data_that_makes_no_sense_is_no_command(kind, data):
-    with pytest.raises(UserError):
+def test_data_that_makes_no_sense_is_no_command(kind, data, why):
+    with pytest.raises(UserError) as refused:
         parse(kind, data)
+    assert str(refused.value) == why
 
 
 def begun(folder, salt, plan, moment, mode):

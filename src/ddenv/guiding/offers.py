@@ -8,21 +8,9 @@ from dataclasses import dataclass
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, refusal
 from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
-from ddenv.guiding.selections import (
-    Accept,
-    AcceptOther,
-    Adopt,
-    Pin,
-    Reject,
-    Try,
-    Unpin,
-    Unveto,
-    Veto,
-    nearest_other,
-    round_over,
-)
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto, round_over
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
-from ddenv.runfile.state import REFUSED, RunState, Trial
+from ddenv.runfile.state import REFUSED, RunState, Test, Trial
 from ddenv.text import shortened
 
 
@@ -91,6 +79,13 @@ def _accept(now: Situation, pointed: Pointed) -> Command:
         why = f"is {row.verdict}" if row.verdict else "is not judged yet"
         raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
     return AcceptOther(test.id)
+
+
+def nearest_other(state: RunState, row: Row) -> Test | None:
+    """The test of a candidate or try that ended in another failure, nearest to the end of f."""
+    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
+    others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
+    return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
 def _reject(now: Situation, _: Pointed) -> Command:

@@ -5,22 +5,10 @@ adopt it, count its other failure as f.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ddenv.guiding.situation import (
-    LONGEST,
-    NO_FAILURE,
-    NO_MODELS,
-    Row,
-    Situation,
-    Words,
-    label_of,
-    lacks_pinned,
-    named,
-    names_of,
-    new_search,
-    next_candidate,
-)
+from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Situation, Words, label_of, named, new_search
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.text import count, printable, shortened
@@ -74,7 +62,7 @@ class Reject(OfCandidate):
         return self.not_waiting(now.state)
 
     def words(self, state: RunState) -> Words:
-        return Words("reject", f"{self.label(state)} is rejected. {next_candidate(state, self.candidate)}")
+        return Words("reject", f"{self.label(state)} is rejected. {_next_candidate(state, self.candidate)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +79,7 @@ class Veto(OfCandidate):
 
     def words(self, state: RunState) -> Words:
         said = f"{self.label(state)} is vetoed: it is not tried in any round; v again takes that back"
-        return Words("veto", f"{said}. {next_candidate(state, self.candidate)}")
+        return Words("veto", f"{said}. {_next_candidate(state, self.candidate)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +98,23 @@ class Unveto(OfCandidate):
         return Words("allow it again", f"{self.label(state)} is no longer {verdict}: it is tried after all")
 
 
+def _next_candidate(state: RunState, after: int) -> str:
+    """What is tried after a candidate of the round, as a sentence without a full stop."""
+    waiting = () if state.round is None else state.round.untried
+    following = next((one for one in waiting if one.index > after), None)
+    return "It was the last one of this round" if following is None else f"Next is {following.label}"
+
+
 def round_over(state: RunState) -> str:
     """Why candidates can no longer be left out."""
     return "the rounds are over" if state.confirming and not state.ended else "this round is over"
+
+
+def _names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -> tuple[str, ...] | None:
+    """The names of numbered models, each once; None if there are no such models, or if there are none and not `empty`."""
+    if not (numbers or empty) or not all(0 <= number < len(state.elements) for number in numbers):
+        return None
+    return tuple(state.elements[number] for number in dict.fromkeys(numbers))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,7 @@ class Pin:
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
-        state, names = now.state, names_of(now.state, self.models)
+        state, names = now.state, _names_of(now.state, self.models)
         if names is None:
             return NO_MODELS
         kept = frozenset(state.environment)
@@ -140,7 +142,7 @@ class Pin:
 
     def new(self, state: RunState) -> tuple[str, ...]:
         """The models that are not pinned yet."""
-        return tuple(name for name in names_of(state, self.models) or () if name not in state.pinned)
+        return tuple(name for name in _names_of(state, self.models) or () if name not in state.pinned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +161,7 @@ class Unpin:
 
     def pinned(self, state: RunState) -> tuple[str, ...]:
         """The models that are pinned."""
-        return tuple(name for name in names_of(state, self.models) or () if name in state.pinned)
+        return tuple(name for name in _names_of(state, self.models) or () if name in state.pinned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +171,7 @@ class Try:
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
-        state, names = now.state, names_of(now.state, self.models, empty=True)
+        state, names = now.state, _names_of(now.state, self.models, empty=True)
         if names is None:
             return NO_MODELS
         if state.baseline is None:
@@ -181,7 +183,7 @@ class Try:
         return "that is being tried already" if any(frozenset(each.models) == keep for each in under_way) else ""
 
     def words(self, state: RunState) -> Words:
-        names = names_of(state, self.models, empty=True) or ()
+        names = _names_of(state, self.models, empty=True) or ()
         keep = frozenset(names)
         without = [name for name in state.environment if name not in keep]
         is_part = keep < frozenset(state.environment)
@@ -205,7 +207,7 @@ class Adopt:
             return f"{trial.label} did not show f"
         if trial.models == state.environment:
             return f"{trial.label} is the environment already"
-        return lacks_pinned(state, trial.label, trial.models)
+        return _lacks_pinned(state, trial.label, trial.models)
 
     def words(self, state: RunState) -> Words:
         trial = self.meant(state)
@@ -215,6 +217,13 @@ class Adopt:
     def meant(self, state: RunState) -> Trial | None:
         """The try, None if no try has this number."""
         return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
+
+
+def _lacks_pinned(state: RunState, label: str, models: Iterable[str]) -> str:
+    """Why a selection cannot become the environment, or ""."""
+    pinned = state.pinned.difference(models)
+    lacking = [name for name in state.environment if name in pinned]
+    return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +250,7 @@ class AcceptOther:
         label, models = label_of(state, test), state.environments[test.environment]
         if state.here is None or not models < state.environments[state.here.id]:
             return f"{label} is not part of the current environment"
-        return lacks_pinned(state, label, models.names(state.elements))
+        return _lacks_pinned(state, label, models.names(state.elements))
 
     def words(self, state: RunState) -> Words:
         test = state.tests[self.test - 1]
@@ -253,13 +262,6 @@ class AcceptOther:
         return Words(
             "count another failure as f", f"the other failure of {label_of(state, test)} counts as f, too", asked
         )
-
-
-def nearest_other(state: RunState, row: Row) -> Test | None:
-    """The test of a candidate or try that ended in another failure, nearest to the end of f."""
-    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
-    others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
-    return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
 def _question(state: RunState, test: Test, instead: bool) -> str:

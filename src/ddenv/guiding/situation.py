@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -70,13 +70,6 @@ def label_of(state: RunState, test: Test) -> str:
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 
-def names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -> tuple[str, ...] | None:
-    """The names of numbered models, each once; None if there are no such models, or if there are none and not `empty`."""
-    if not (numbers or empty) or not all(0 <= number < len(state.elements) for number in numbers):
-        return None
-    return tuple(state.elements[number] for number in dict.fromkeys(numbers))
-
-
 def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
     """The numbers of models, in the order of the world."""
     number = {name: index for index, name in enumerate(state.elements)}
@@ -99,20 +92,6 @@ def new_search(state: RunState, size: int | None = None) -> str:
     else:
         ends = f"This round ends with {count(untried, 'candidate')} untried; a" if untried else "A"
     return f"{ends} new search begins from {count(len(state.environment) if size is None else size, 'model')}"
-
-
-def next_candidate(state: RunState, after: int) -> str:
-    """What is tried after a candidate of the round, as a sentence without a full stop."""
-    waiting = () if state.round is None else state.round.untried
-    following = next((one for one in waiting if one.index > after), None)
-    return "It was the last one of this round" if following is None else f"Next is {following.label}"
-
-
-def lacks_pinned(state: RunState, label: str, models: Iterable[str]) -> str:
-    """Why a selection cannot become the environment, or ""."""
-    pinned = state.pinned.difference(models)
-    lacking = [name for name in state.environment if name in pinned]
-    return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
 
 
 def named(names: Iterable[str]) -> str:

@@ -187,7 +187,6 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
     return {
         "tests": state.tests,
         "tally": state.tally,
-        "deflake_runs": state.deflake_runs,
         "trials": state.trials,
         **searched_anew(state),
         "implied": 0,

@@ -133,7 +133,6 @@ def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> C
     return {
         "tests": judged.tests,
         "tally": judged.tally,
-        "deflake_runs": judged.deflake_runs,
         "baseline": event,
         "evidence_test": first,
         "failures": (first,),
@@ -163,12 +162,11 @@ def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
 
 
 def counts(state: RunState, before: Test | None, after: Test) -> Changes:
-    tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
+    tally = dict(state.tally)
     tally[after.outcome] += 1
     if before is not None:
         tally[before.outcome] -= 1
-        reruns -= before.is_deflake_run
-    return {"tally": tally, "deflake_runs": reruns}
+    return {"tally": tally}
 
 
 def counted_ahead(before: RunState, event: e.Event, changes: Changes) -> Changes:

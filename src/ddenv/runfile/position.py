@@ -152,19 +152,14 @@ class Position:
             return None
         wanted = self._ids[place]
         if not (self._near and self._near[0].recorded.id <= wanted <= self._near[-1].recorded.id):
-            self._load((place - 1) // self._gap)
-        near = [each.recorded.id for each in self._near]
-        return self._near[bisect_right(near, wanted) - 1]
+            kept, end = self._kept[(place - 1) // self._gap], self._ids[-1]
+            noted = takewhile(lambda event: event.id <= end, self._read(kept.revision, self._gap))
+            self._near = [Moment(*step) for step in steps(noted, kept)]
+        return self._near[bisect_right(self._near, wanted, key=lambda each: each.recorded.id) - 1]
 
     def start_of(self, test: int) -> Moment | None:
         """The moment in which a test started; None if there is no such test."""
         return self.moment(self._starts[test - 1]) if 0 < test <= len(self._starts) else None
-
-    def _load(self, number: int) -> None:
-        """Folds the events that follow a kept state."""
-        state, end = self._kept[number], self._ids[-1]
-        noted = takewhile(lambda event: event.id <= end, self._read(state.revision, self._gap))
-        self._near = [Moment(*step) for step in steps(noted, state)]
 
     # Moves.
 

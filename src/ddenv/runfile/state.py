@@ -64,7 +64,7 @@ class RunState:
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
     `refusal` is the last command that the engine could not obey, with the reason.
-    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `needs_room` is how many bytes
+    `tally` counts the tests by outcome. `needs_room` is how many bytes
     have to be free on the disk before more tests start, 0 if there is room. `working_seconds` is the time that ended engines
     have worked, s; `started_at` (Unix time, s) is set while one works.
     """
@@ -97,7 +97,6 @@ class RunState:
     forecast: Forecast | None = None
     tests: PersistentTuple[Test] = field(default_factory=PersistentTuple)
     tally: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_TALLY, 0))
-    deflake_runs: int = 0
     confirming: bool = False
     history: tuple[Point, ...] = ()
     evidence_test: int | None = None
@@ -170,6 +169,11 @@ class RunState:
     def cut_tests(self) -> int:
         """How many tests were ended early."""
         return sum(test.cut for test in self.tests)
+
+    @property
+    def deflake_runs(self) -> int:
+        """How many finished tests were re-runs of candidates."""
+        return sum(test.is_deflake_run for test in self.tests)
 
     @property
     def budget(self) -> int | None:
