@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ddenv.runfile import events as e
 from ddenv.runfile.fold_decisions import arrived, at_node, listed, origin, searched_anew, without_open
-from ddenv.runfile.fold_tests import Changes, counts, with_node, with_removal
+from ddenv.runfile.fold_tests import Changes, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import OUTCOMES, RunState, Test
@@ -172,8 +172,7 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
         raise ValueError(event.by)
     for test in state.tests:
         if test.implied_by is not None and test.is_finished:
-            after = replace(test, outcome="lost")
-            state = state.changed(tests=state.tests.changed(test.id - 1, after), **counts(state, test, after))
+            state = state.changed(**with_test(state, test.id, {"outcome": "lost"}))
     state = state.changed(
         nodes=tuple(_without_void(reached, state) for reached in state.nodes),
         trials=tuple(

@@ -15,6 +15,8 @@ from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunS
 Changes = dict[str, Any]
 # The phases of tests that idle workers may make ahead of time.
 MAY_BE_AHEAD = ("round", CERTIFY)
+# How a test ended: an implied one as the test that implies it.
+END = ("outcome", "failure", "distance", "end_pose", "simulated_seconds", "cut", "took_part")
 
 
 def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) -> Changes:
@@ -77,17 +79,10 @@ def with_removal(state: RunState, environment: int) -> tuple[PersistentTuple[Rem
 def test_finished(state: RunState, event: e.TestFinished, _: float) -> Changes:
     if event.took_part is not None and not event.took_part <= state.environments[0]:
         raise ValueError("took_part")
-    values = {
-        "outcome": event.outcome,
-        "failure": event.failure,
-        "distance": event.distance,
-        "end_pose": event.end_pose,
-        "simulated_seconds": event.simulated_seconds,
+    values = {name: getattr(event, name) for name in END} | {
         "wall_seconds": event.wall_seconds,
         "first_sensed": tuple((state.elements[model], at) for model, at in event.first_sensed),
         "first_touched": tuple((state.elements[model], at) for model, at in event.first_touched),
-        "cut": event.cut,
-        "took_part": event.took_part,
         "taken": bool(event.taken),
     }
     return _ended_as(state, event.test, values)
@@ -106,17 +101,10 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
     if not made.is_finished or made.outcome in BROKEN or made.implied_by is not None or made.run != test.run:
         raise ValueError(event.by)
     there = frozenset(now.models_of(test))
-    values = {
-        "outcome": made.outcome,
-        "failure": made.failure,
-        "distance": made.distance,
-        "end_pose": made.end_pose,
-        "simulated_seconds": made.simulated_seconds,
+    values = {name: getattr(made, name) for name in END} | {
         # The robot may have had others in view.
         "first_sensed": tuple(sensed for sensed in made.first_sensed if sensed[0] in there),
         "first_touched": made.first_touched,
-        "cut": made.cut,
-        "took_part": made.took_part,
         "implied_by": event.by,
     }
     return {**started, **_ended_as(now, test.id, values), "implied": state.implied + 1}
@@ -128,11 +116,11 @@ def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
 
 
 def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
-    judged, first = with_outcomes(state, event.judged), event.failure_test
+    changes, first = with_outcomes(state, event.judged), event.failure_test
+    judged = state.changed(**changes)
     runs, shown = seen(judged.tests, (test.id for test in judged.tests if test.phase == "baseline"))
     return {
-        "tests": judged.tests,
-        "tally": judged.tally,
+        **changes,
         "baseline": event,
         "evidence_test": first,
         "failures": (first,),
@@ -145,12 +133,12 @@ def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> C
 # Their outcomes.
 
 
-def with_outcomes(state: RunState, judged: e.Outcomes) -> RunState:
-    """The state with the outcomes of tests updated, after f was fixed or another failure began to count as f."""
+def with_outcomes(state: RunState, judged: e.Outcomes) -> Changes:
+    """The outcomes of tests, updated after f was fixed or another failure began to count as f."""
     for test, outcome in judged.outcomes.items():
         values = {"outcome": outcome, "distance": judged.distances.get(test)}
         state = state.changed(**with_test(state, test, values))
-    return state
+    return {"tests": state.tests, "tally": state.tally}
 
 
 def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
