@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
@@ -56,10 +56,6 @@ def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
     if now.engine == "absent":
         return StartEngine()
     return Resume() if now.state.paused else Pause()
-
-
-def _mode(now: Situation, _: Pointed) -> Command:
-    return AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask")
 
 
 def _accept(now: Situation, pointed: Pointed) -> Command:
@@ -118,16 +114,7 @@ def _pin(now: Situation, pointed: Pointed) -> Command | None:
     return Pin(numbers_of(state, (name for name in models if name not in state.pinned)))
 
 
-def _without(now: Situation, pointed: Pointed) -> Command | None:
-    out = frozenset(pointed.models)
-    return _try(now, pointed, (name for name in now.state.environment if name not in out))
-
-
-def _only(now: Situation, pointed: Pointed) -> Command | None:
-    return _try(now, pointed, frozenset(pointed.models))
-
-
-def _try(now: Situation, pointed: Pointed, keep: Iterable[str]) -> Command | None:
+def _try(now: Situation, pointed: Pointed, keep: frozenset[str]) -> Command | None:
     if now.state.baseline is None:
         raise UserError(NO_FAILURE)
     return Try(numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
@@ -164,13 +151,13 @@ ACTIONS: dict[str, Meaning] = {
     "resume": lambda now, pointed: StartEngine(),
     "step": lambda now, pointed: Step("test"),
     "step_round": lambda now, pointed: Step("round"),
-    "mode": _mode,
+    "mode": lambda now, pointed: AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask"),
     "accept": _accept,
     "reject": _reject,
     "veto": _veto,
     "pin": _pin,
-    "without": _without,
-    "only": _only,
+    "without": lambda now, pointed: _try(now, pointed, frozenset(now.state.environment).difference(pointed.models)),
+    "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
     "undo": lambda now, pointed: Undo(),
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,
