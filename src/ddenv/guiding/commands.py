@@ -11,33 +11,15 @@ from typing import Any, get_args
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.guiding.course import AcceptMode, Change, GoBack, Isolate, Pause, Resume, StartEngine, Step, Stop, Undo
-from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
+from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
+from ddenv.guiding.selections import AcceptOther, Adopt, Pin, SelectionCommand, Try, Unpin
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.text import count, snake_case
 
-Command = (
-    Pause
-    | Resume
-    | Step
-    | AcceptMode
-    | Stop
-    | Accept
-    | Reject
-    | Veto
-    | Unveto
-    | Pin
-    | Unpin
-    | Try
-    | Adopt
-    | AcceptOther
-    | Undo
-    | GoBack
-    | Change
-)
+Command = CourseCommand | SelectionCommand
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)

@@ -201,6 +201,9 @@ class Change:
         }
 
 
+CourseCommand = Pause | Resume | Step | AcceptMode | Stop | Undo | GoBack | Change
+
+
 def place(node: Node) -> str:
     """A node in words."""
     models = count(len(node.environment), "model")

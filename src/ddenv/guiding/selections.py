@@ -264,6 +264,9 @@ class AcceptOther:
         )
 
 
+SelectionCommand = Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | AcceptOther
+
+
 def _question(state: RunState, test: Test, instead: bool) -> str:
     """What happened in the test, compared with f, and what follows."""
     label = f"test {test.id}" if instead else printable(label_of(state, test))
