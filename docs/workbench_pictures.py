@@ -23,7 +23,7 @@ from unittest.mock import patch
 from textual.pilot import Pilot
 from textual.widgets import Select
 
-from ddenv.guiding.selections import nearest_other
+from ddenv.guiding.offers import nearest_other
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.runfile.fold import fold

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import unicodedata
 from collections.abc import Sequence
 
@@ -55,6 +56,11 @@ def padded(text: str, columns: int) -> str:
 def count(number: int, word: str) -> str:
     """1 model, 2 models."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def snake_case(name: str) -> str:
+    """The name of a class as kinds are named in run files: "go_back" for GoBack."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
 def first_of(names: Sequence[str], most: int) -> str:

@@ -3,7 +3,7 @@
 import random
 
 from ddenv.evidence.claims import ended, meaning, smaller_known
-from ddenv.runfile.atlas import atlas
+from ddenv.runfile.failures import atlas
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.guided import Guided, at_once, guided, numbers, until  # noqa: F401
 from tests.engine.oracles import needs

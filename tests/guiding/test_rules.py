@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
-from ddenv.guiding.commands import KINDS, data_of, parse, refusal
+from ddenv.guiding.commands import KINDS, parse, refusal, send, written
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import ACTIONS, Pointed, offer
 from ddenv.guiding.situation import Situation
@@ -61,25 +61,26 @@ ANY = st.one_of(
 def test_each_command_is_written_as_it_is_read():
     assert {kind for kind, _ in WRITTEN} == set(KINDS)
     for kind, data in WRITTEN:
-        command = parse(kind, data)
-        assert (command.kind, data_of(command)) == (kind, data)
+        assert written(parse(kind, data)) == (kind, data)
 
 
 @pytest.mark.parametrize(
-    ("kind", "data"),
+    ("kind", "data", "why"),
     [
-        ("dance", {}),
-        ("veto", {"round": 1}),
-        ("veto", {"round": True, "candidate": 0}),
-        ("pin", {"models": "wall"}),
-        ("try", {"models": [True]}),
-        ("accept_mode", {"mode": "no"}),
-        ("change", {"settings": []}),
+        ("dance", {}, "there is no command 'dance'"),
+        ("veto", {"round": 1}, "no such candidate: is missing"),
+        ("veto", {"round": True, "candidate": 0}, "no such round: expected a whole number, found True"),
+        ("pin", {"models": "wall"}, "no such models: expected a list, found 'wall'"),
+        ("try", {"models": [True]}, "no such models: expected a whole number, found True"),
+        ("step", {"unit": "year"}, "no such unit: expected one of test, round, found 'year'"),
+        ("accept_mode", {"mode": "no"}, "no such mode: expected one of automatic, ask, found 'no'"),
+        ("change", {"settings": []}, "no such settings: expected an object, found a list of 0"),
     ],
 )
-def test_data_that_makes_no_sense_is_no_command(kind, data):
-    with pytest.raises(UserError):
+def test_data_that_makes_no_sense_is_no_command(kind, data, why):
+    with pytest.raises(UserError) as refused:
         parse(kind, data)
+    assert str(refused.value) == why
 
 
 def begun(folder, salt, plan, moment, mode):
@@ -148,7 +149,7 @@ def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, 
                 journal = Journal(file)
                 if offer(action, Situation(journal.state), pointed) != offered:
                     continue
-                command = file.send(offered.command.kind, **data_of(offered.command))
+                command = send(file, offered.command)
                 Control(journal, threading.Event()).poll()
                 assert journal.state.refusal[0] != command
 

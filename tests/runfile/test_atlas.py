@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.environment import Environment
-from ddenv.runfile.atlas import CHUNK, atlas
+from ddenv.runfile.failures import CHUNK, atlas
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile

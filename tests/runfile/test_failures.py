@@ -7,7 +7,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.runfile.failures import alike, grouped, named
+from ddenv.runfile.events import named
+from ddenv.runfile.failures import alike, grouped
 
 EPSILON = 1.0
 # A small grid, so that ends are often together and distances often equal.

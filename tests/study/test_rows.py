@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from ddenv.page.blocks import Paragraph, Strong, Table
-from ddenv.runfile.failures import Baseline
+from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.plan import PAIRS, make_plan
 from ddenv.study.results import Found, groups, spread
@@ -42,7 +42,7 @@ def found(cell, tests, left=1, **other):
         "tests": tests,
         "reruns": tests // 2,
         "seconds": 3.0 * tests,
-        "baseline": Baseline(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1),
+        "baseline": BaselineFinished(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1, Outcomes({}, {})),
         "baseline_runs": 10,
         "sizes": ((10, 16), (tests, left)),
         "certificate": certificate(left),

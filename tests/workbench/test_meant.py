@@ -2,7 +2,7 @@
 
 import fake_moments
 
-from ddenv.guiding.commands import data_of
+from ddenv.guiding.commands import written
 from ddenv.guiding.offers import Pointed, offer
 from ddenv.guiding.situation import Situation
 
@@ -12,8 +12,7 @@ def why_not(action, state, row=None, models=()):
 
 
 def meant(action, state, row=None, models=()):
-    command = offer(action, Situation(state), Pointed(row, models=tuple(models))).command
-    return command.kind, data_of(command)
+    return written(offer(action, Situation(state), Pointed(row, models=tuple(models))).command)
 
 
 def test_what_a_means_for_a_try(run):

@@ -4,7 +4,7 @@ import fake_moments
 from attached import Attached
 from textual.widgets import OptionList
 
-from ddenv.runfile.atlas import atlas
+from ddenv.runfile.failures import atlas
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.widgets.question import Question
 from tests.waiting import eventually

@@ -13,8 +13,7 @@ from typing import TextIO
 
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.errors import UserError
-from ddenv.runfile.fold import fold
-from ddenv.runfile.follow import Follower
+from ddenv.runfile.fold import Follower, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words, stop_engines

@@ -13,7 +13,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, rejudged
 from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.guiding.commands import Command, parse, refusal
+from ddenv.guiding.commands import KINDS, Command, parse, refusal
 from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
 from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import Situation, label_of, numbers_of
@@ -62,7 +62,7 @@ class Control:
         for command in self._journal.file.commands(self._journal.state.last_command):
             if command.id > after:
                 return
-            if command.kind in [each.kind for each in OF_THE_MOMENT]:
+            if KINDS.get(command.kind) in OF_THE_MOMENT:
                 self._handled(command)
             else:
                 self._obey(command)
@@ -75,7 +75,7 @@ class Control:
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
-            if command.kind == Accept.kind:
+            if KINDS.get(command.kind) is Accept:
                 # The reduction comes before any other decision.
                 return
 

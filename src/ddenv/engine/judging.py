@@ -19,8 +19,8 @@ from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
-from ddenv.runfile.failures import Baseline, grouped, named
+from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
+from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.text import count
@@ -74,7 +74,7 @@ def _to_ms(times: dict[str, float]) -> dict[str, float]:
     return {name: round(seconds, 3) for name, seconds in times.items()}
 
 
-def known_failure(state: RunState) -> Baseline:
+def known_failure(state: RunState) -> BaselineFinished:
     """The baseline, which fixed f. Raises UserError before it is done."""
     if state.baseline is None:
         raise UserError("damaged run file: f is not known before the baseline is done")
@@ -171,15 +171,14 @@ def fix_failure(
     )
 
 
-def _seen(group: Sequence[Test]) -> Seen:
+def _seen(group: Sequence[Test]) -> SeenFailure:
     """A group of failing tests, the one in their middle first."""
     kinds = Counter(test.failure for test in group)
-    return Seen(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
+    return SeenFailure(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
 
 
-def _no_such_failure(seen: Sequence[Seen], wanted: int, runs: int) -> str:
-    names = (f"{named(one.kinds, one.position)} in {count(one.runs, 'run')}" for one in seen)
-    listed = "; ".join(f"{number}. {name}" for number, name in enumerate(names, 1))
+def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str:
+    listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
     return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
 
 

@@ -5,52 +5,22 @@ A command is its kind with its fields as JSON: `veto {"round": 2, "candidate": 3
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, get_args
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.guiding.course import (
-    CHANGEABLE,
-    ONLY_CHANGEABLE,
-    AcceptMode,
-    Change,
-    GoBack,
-    Isolate,
-    Pause,
-    Resume,
-    StartEngine,
-    Step,
-    Stop,
-    Undo,
-)
-from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
-from ddenv.guiding.situation import NO_MODELS, Situation
+from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
+from ddenv.guiding.selections import AcceptOther, Adopt, Pin, SelectionCommand, Try, Unpin
+from ddenv.guiding.situation import Situation
+from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.state import RunState
-from ddenv.text import count
+from ddenv.runfile.store import RunFile
+from ddenv.text import count, snake_case
 
-Command = (
-    Pause
-    | Resume
-    | Step
-    | AcceptMode
-    | Stop
-    | Accept
-    | Reject
-    | Veto
-    | Unveto
-    | Pin
-    | Unpin
-    | Try
-    | Adopt
-    | AcceptOther
-    | Undo
-    | GoBack
-    | Change
-)
-KINDS: dict[str, Callable[..., Command]] = {each.kind: each for each in get_args(Command)}
-FIELDS: dict[str, list[str]] = {each.kind: [field.name for field in fields(each)] for each in get_args(Command)}
+Command = CourseCommand | SelectionCommand
+KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)
 # After these a new search begins, and a certificate that is being made is broken off.
@@ -90,58 +60,24 @@ def said(command: Command, now: Situation) -> str:
     return f"{words}; an engine starts for it" if starts else f"{words}; it waits for an engine, space starts one"
 
 
-def data_of(command: Command) -> dict[str, Any]:
-    """The fields of a command as JSON."""
-    values = ((name, getattr(command, name)) for name in FIELDS[command.kind])
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in values}
+def send(file: RunFile, command: Command) -> int:
+    """Asks the engine of a run; returns the number of the command. Raises UserError."""
+    kind, data = written(command)
+    return file.send(kind, **data)
+
+
+def written(command: Command) -> tuple[str, dict[str, Any]]:
+    """A command as it stands in the run file: its kind, and its fields as JSON."""
+    values = {field.name: getattr(command, field.name) for field in fields(command)}
+    data = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    return snake_case(type(command).__name__), data
 
 
 def parse(kind: str, data: Mapping[str, Any]) -> Command:
     """A command from a run file. Raises UserError for an unknown kind or invalid data."""
     if kind not in KINDS:
         raise UserError(f"there is no command '{kind[:40]}'")
-    return KINDS[kind](**{name: _READ[name](name, data.get(name)) for name in FIELDS[kind]})
-
-
-def _number(name: str, value: Any) -> int:
-    if type(value) is not int:
-        raise UserError(f"there is no such {name}: expected its number, found {str(value)[:20]!r}")
-    return value
-
-
-def _models(_: str, value: Any) -> tuple[int, ...]:
-    if not isinstance(value, list) or not all(type(number) is int for number in value):
-        raise UserError(f"{NO_MODELS}: expected their numbers")
-    return tuple(value)
-
-
-def _unit(_: str, value: Any) -> str:
-    return "round" if value == "round" else "test"
-
-
-def _mode(_: str, value: Any) -> str:
-    if value not in ("automatic", "ask"):
-        raise UserError("the accept mode is automatic or ask")
-    return str(value)
-
-
-def _yes(_: str, value: Any) -> bool:
-    return value is True
-
-
-def _settings(_: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise UserError(ONLY_CHANGEABLE)
-    # Another program may have written a number as text.
-    numbers = {name for name, one in CHANGEABLE.items() if one.kind is int}
-    return {str(key): int(each) if key in numbers and str(each).isdecimal() else each for key, each in value.items()}
-
-
-_READ: dict[str, Callable[[str, Any], Any]] = {
-    **dict.fromkeys(("round", "candidate", "trial", "test", "node"), _number),
-    "models": _models,
-    "unit": _unit,
-    "mode": _mode,
-    "instead": _yes,
-    "settings": _settings,
-}
+    try:
+        return read(KINDS[kind], data)
+    except Invalid as invalid:
+        raise UserError(f"no such {invalid}") from None

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import FINISHED, NO_FAILURE, Situation, Words, new_search
@@ -20,8 +19,6 @@ from ddenv.text import count, plain, printable
 class Pause:
     """Start no new test."""
 
-    kind: ClassVar[str] = "pause"
-
     def refusal(self, now: Situation) -> str:
         return now.needs_engine()
 
@@ -32,8 +29,6 @@ class Pause:
 @dataclass(frozen=True, slots=True)
 class Resume:
     """Go on; also ends a step."""
-
-    kind: ClassVar[str] = "resume"
 
     def refusal(self, now: Situation) -> str:
         return now.needs_engine()
@@ -46,7 +41,6 @@ class Resume:
 class Step:
     """Run one test, or to the end of the round, then pause."""
 
-    kind: ClassVar[str] = "step"
     unit: Literal["test", "round"] = "test"
 
     def refusal(self, now: Situation) -> str:
@@ -61,7 +55,6 @@ class Step:
 class AcceptMode:
     """Make each reduction at once ("automatic"), or wait for accept or reject ("ask")."""
 
-    kind: ClassVar[str] = "accept_mode"
     mode: Literal["automatic", "ask"]
 
     def refusal(self, now: Situation) -> str:
@@ -76,8 +69,6 @@ class AcceptMode:
 @dataclass(frozen=True, slots=True)
 class Stop:
     """End the engine; another one can go on from there."""
-
-    kind: ClassVar[str] = "stop"
 
     def refusal(self, now: Situation) -> str:
         return "no engine is running" if now.engine == "absent" else ""
@@ -127,8 +118,6 @@ class Isolate:
 class Undo:
     """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
 
-    kind: ClassVar[str] = "undo"
-
     def refusal(self, now: Situation) -> str:
         here = now.state.here
         if here is None or here.parent is None:
@@ -149,7 +138,6 @@ class Undo:
 class GoBack:
     """Make the environment of a node the current one again; the run pauses there."""
 
-    kind: ClassVar[str] = "go_back"
     node: int
 
     def refusal(self, now: Situation) -> str:
@@ -173,14 +161,13 @@ class GoBack:
 class Change:
     """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
 
-    kind: ClassVar[str] = "change"
-    settings: Mapping[str, Value]
+    settings: dict[str, Any]
 
     def refusal(self, now: Situation) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
             return ONLY_CHANGEABLE
         try:
-            for name, value in self.settings.items():
+            for name, value in self.asked.items():
                 _check(name, value)
         except UserError as error:
             return str(error)
@@ -203,7 +190,18 @@ class Change:
     def new(self, state: RunState) -> dict[str, Value]:
         """The settings that differ from the current ones."""
         now = settings(state)
-        return {key: value for key, value in self.settings.items() if getattr(now, key) != value}
+        return {key: value for key, value in self.asked.items() if getattr(now, key) != value}
+
+    @property
+    def asked(self) -> dict[str, Value]:
+        """The settings as a scenario holds them: another program may have written a number as text."""
+        numbers = {name for name, one in CHANGEABLE.items() if one.kind is int}
+        return {
+            key: int(each) if key in numbers and str(each).isdecimal() else each for key, each in self.settings.items()
+        }
+
+
+CourseCommand = Pause | Resume | Step | AcceptMode | Stop | Undo | GoBack | Change
 
 
 def place(node: Node) -> str:

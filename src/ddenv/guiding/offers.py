@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import AcceptMode, Change, Pause, Resume, StartEngine, Step, Undo
-from ddenv.guiding.selections import (
-    Accept,
-    AcceptOther,
-    Adopt,
-    Pin,
-    Reject,
-    Try,
-    Unpin,
-    Unveto,
-    Veto,
-    nearest_other,
-    round_over,
-)
+from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto, round_over
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
-from ddenv.runfile.state import REFUSED, RunState, Trial
-from ddenv.settings import Value
+from ddenv.runfile.state import REFUSED, RunState, Test, Trial
 from ddenv.text import shortened
 
 
@@ -71,10 +58,6 @@ def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
     return Resume() if now.state.paused else Pause()
 
 
-def _mode(now: Situation, _: Pointed) -> Command:
-    return AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask")
-
-
 def _accept(now: Situation, pointed: Pointed) -> Command:
     """Accept what waits, or else what is under the cursor."""
     state, row = now.state, pointed.row
@@ -92,6 +75,13 @@ def _accept(now: Situation, pointed: Pointed) -> Command:
         why = f"is {row.verdict}" if row.verdict else "is not judged yet"
         raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
     return AcceptOther(test.id)
+
+
+def nearest_other(state: RunState, row: Row) -> Test | None:
+    """The test of a candidate or try that ended in another failure, nearest to the end of f."""
+    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
+    others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
+    return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
 def _reject(now: Situation, _: Pointed) -> Command:
@@ -124,16 +114,7 @@ def _pin(now: Situation, pointed: Pointed) -> Command | None:
     return Pin(numbers_of(state, (name for name in models if name not in state.pinned)))
 
 
-def _without(now: Situation, pointed: Pointed) -> Command | None:
-    out = frozenset(pointed.models)
-    return _try(now, pointed, (name for name in now.state.environment if name not in out))
-
-
-def _only(now: Situation, pointed: Pointed) -> Command | None:
-    return _try(now, pointed, frozenset(pointed.models))
-
-
-def _try(now: Situation, pointed: Pointed, keep: Iterable[str]) -> Command | None:
+def _try(now: Situation, pointed: Pointed, keep: frozenset[str]) -> Command | None:
     if now.state.baseline is None:
         raise UserError(NO_FAILURE)
     return Try(numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
@@ -170,19 +151,14 @@ ACTIONS: dict[str, Meaning] = {
     "resume": lambda now, pointed: StartEngine(),
     "step": lambda now, pointed: Step("test"),
     "step_round": lambda now, pointed: Step("round"),
-    "mode": _mode,
+    "mode": lambda now, pointed: AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask"),
     "accept": _accept,
     "reject": _reject,
     "veto": _veto,
     "pin": _pin,
-    "without": _without,
-    "only": _only,
+    "without": lambda now, pointed: _try(now, pointed, frozenset(now.state.environment).difference(pointed.models)),
+    "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
     "undo": lambda now, pointed: Undo(),
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,
 }
-
-
-def change(state: RunState, asked: Mapping[str, Value]) -> Change:
-    """The command for the settings in a dialog: only those that are new."""
-    return Change(Change(asked).new(state))

@@ -5,71 +5,72 @@ adopt it, count its other failure as f.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
-from ddenv.guiding.situation import (
-    LONGEST,
-    NO_FAILURE,
-    NO_MODELS,
-    Row,
-    Situation,
-    Words,
-    is_or_are,
-    label_of,
-    lacks_pinned,
-    named,
-    names_of,
-    new_search,
-    next_candidate,
-)
+from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Situation, Words, label_of, named, new_search
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.text import count, printable, shortened
 
 
 @dataclass(frozen=True, slots=True)
-class Accept:
+class OfCandidate:
+    """A decision on a candidate of the current round."""
+
+    round: int
+    candidate: int
+
+    def meant(self, state: RunState) -> Candidate | None:
+        """The candidate, while its round goes on."""
+        current = state.round
+        if current is None or current.done or current.winner is not None or current.number != self.round:
+            return None
+        return current.candidates[self.candidate] if 0 <= self.candidate < len(current.candidates) else None
+
+    def label(self, state: RunState) -> str:
+        one = self.meant(state)
+        return "the candidate" if one is None else one.label
+
+    def not_waiting(self, state: RunState) -> str:
+        """Why it is not the reduction that waits, or ""."""
+        waits = None
+        # When a new search is due, earlier reductions can no longer be accepted.
+        if state.round is not None and state.waiting_candidate is not None and not state.search_due:
+            waits = state.round.number, state.waiting_candidate
+        return "" if (self.round, self.candidate) == waits else "that reduction no longer waits"
+
+
+@dataclass(frozen=True, slots=True)
+class Accept(OfCandidate):
     """Make the reduction that waits."""
 
-    kind: ClassVar[str] = "accept"
-    round: int
-    candidate: int
-
     def refusal(self, now: Situation) -> str:
-        return _not_waiting(now, self)
+        return self.not_waiting(now.state)
 
     def words(self, state: RunState) -> Words:
-        one = _candidate(state, self)
+        one = self.meant(state)
         left = "" if one is None else f": E is now its {count(one.size, 'model')}. The next round begins"
-        return Words("accept", f"{_label(state, self)} is accepted{left}")
+        return Words("accept", f"{self.label(state)} is accepted{left}")
 
 
 @dataclass(frozen=True, slots=True)
-class Reject:
+class Reject(OfCandidate):
     """Go on as if the candidate that waits had not shown f."""
 
-    kind: ClassVar[str] = "reject"
-    round: int
-    candidate: int
-
     def refusal(self, now: Situation) -> str:
-        return _not_waiting(now, self)
+        return self.not_waiting(now.state)
 
     def words(self, state: RunState) -> Words:
-        return Words("reject", f"{_label(state, self)} is rejected. {next_candidate(state, self.candidate)}")
+        return Words("reject", f"{self.label(state)} is rejected. {_next_candidate(state, self.candidate)}")
 
 
 @dataclass(frozen=True, slots=True)
-class Veto:
+class Veto(OfCandidate):
     """Leave out a candidate that has no verdict yet."""
 
-    kind: ClassVar[str] = "veto"
-    round: int
-    candidate: int
-
     def refusal(self, now: Situation) -> str:
-        one = _candidate(now.state, self)
+        one = self.meant(now.state)
         if one is None:
             return round_over(now.state)
         if one.index == now.state.waiting_candidate:
@@ -77,28 +78,31 @@ class Veto:
         return f"{one.label} is {one.verdict} already" if one.verdict else ""
 
     def words(self, state: RunState) -> Words:
-        said = f"{_label(state, self)} is vetoed: it is not tried in any round; v again takes that back"
-        return Words("veto", f"{said}. {next_candidate(state, self.candidate)}")
+        said = f"{self.label(state)} is vetoed: it is not tried in any round; v again takes that back"
+        return Words("veto", f"{said}. {_next_candidate(state, self.candidate)}")
 
 
 @dataclass(frozen=True, slots=True)
-class Unveto:
+class Unveto(OfCandidate):
     """Try a vetoed or rejected candidate after all."""
 
-    kind: ClassVar[str] = "unveto"
-    round: int
-    candidate: int
-
     def refusal(self, now: Situation) -> str:
-        one = _candidate(now.state, self)
+        one = self.meant(now.state)
         if one is None:
             return round_over(now.state)
         return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
 
     def words(self, state: RunState) -> Words:
-        one = _candidate(state, self)
+        one = self.meant(state)
         verdict = "vetoed" if one is None else one.verdict
-        return Words("allow it again", f"{_label(state, self)} is no longer {verdict}: it is tried after all")
+        return Words("allow it again", f"{self.label(state)} is no longer {verdict}: it is tried after all")
+
+
+def _next_candidate(state: RunState, after: int) -> str:
+    """What is tried after a candidate of the round, as a sentence without a full stop."""
+    waiting = () if state.round is None else state.round.untried
+    following = next((one for one in waiting if one.index > after), None)
+    return "It was the last one of this round" if following is None else f"Next is {following.label}"
 
 
 def round_over(state: RunState) -> str:
@@ -106,41 +110,21 @@ def round_over(state: RunState) -> str:
     return "the rounds are over" if state.confirming and not state.ended else "this round is over"
 
 
-_Of = Accept | Reject | Veto | Unveto
-
-
-def _candidate(state: RunState, command: _Of) -> Candidate | None:
-    """The command's candidate, while its round goes on."""
-    current = state.round
-    if current is None or current.done or current.winner is not None or current.number != command.round:
+def _names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -> tuple[str, ...] | None:
+    """The names of numbered models, each once; None if there are no such models, or if there are none and not `empty`."""
+    if not (numbers or empty) or not all(0 <= number < len(state.elements) for number in numbers):
         return None
-    return current.candidates[command.candidate] if 0 <= command.candidate < len(current.candidates) else None
-
-
-def _label(state: RunState, command: _Of) -> str:
-    one = _candidate(state, command)
-    return "the candidate" if one is None else one.label
-
-
-def _not_waiting(now: Situation, command: Accept | Reject) -> str:
-    state = now.state
-    waits = None
-    # When a new search is due, earlier reductions can no longer be accepted.
-    if state.round is not None and state.waiting_candidate is not None and not state.search_due:
-        waits = state.round.number, state.waiting_candidate
-    same = (command.round, command.candidate) == waits
-    return "" if same else "that reduction no longer waits"
+    return tuple(state.elements[number] for number in dict.fromkeys(numbers))
 
 
 @dataclass(frozen=True, slots=True)
 class Pin:
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
-    kind: ClassVar[str] = "pin"
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
-        state, names = now.state, names_of(now.state, self.models)
+        state, names = now.state, _names_of(now.state, self.models)
         if names is None:
             return NO_MODELS
         kept = frozenset(state.environment)
@@ -153,19 +137,18 @@ class Pin:
 
     def words(self, state: RunState) -> Words:
         new = self.new(state)
-        stays = "stays" if len(new) == 1 else "stay"
-        return Words("pin", f"{named(new)} {is_or_are(new)} pinned, and always {stays}. {new_search(state)}")
+        are = "is pinned, and always stays" if len(new) == 1 else "are pinned, and always stay"
+        return Words("pin", f"{named(new)} {are}. {new_search(state)}")
 
     def new(self, state: RunState) -> tuple[str, ...]:
         """The models that are not pinned yet."""
-        return tuple(name for name in names_of(state, self.models) or () if name not in state.pinned)
+        return tuple(name for name in _names_of(state, self.models) or () if name not in state.pinned)
 
 
 @dataclass(frozen=True, slots=True)
 class Unpin:
     """Let pinned models be removed again."""
 
-    kind: ClassVar[str] = "unpin"
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -173,22 +156,22 @@ class Unpin:
 
     def words(self, state: RunState) -> Words:
         pinned = self.pinned(state)
-        return Words("unpin", f"{named(pinned)} {is_or_are(pinned)} unpinned. {new_search(state)}")
+        are = "is" if len(pinned) == 1 else "are"
+        return Words("unpin", f"{named(pinned)} {are} unpinned. {new_search(state)}")
 
     def pinned(self, state: RunState) -> tuple[str, ...]:
         """The models that are pinned."""
-        return tuple(name for name in names_of(state, self.models) or () if name in state.pinned)
+        return tuple(name for name in _names_of(state, self.models) or () if name in state.pinned)
 
 
 @dataclass(frozen=True, slots=True)
 class Try:
     """Test a selection: `models` are the ones that are kept."""
 
-    kind: ClassVar[str] = "try"
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
-        state, names = now.state, names_of(now.state, self.models, empty=True)
+        state, names = now.state, _names_of(now.state, self.models, empty=True)
         if names is None:
             return NO_MODELS
         if state.baseline is None:
@@ -200,7 +183,7 @@ class Try:
         return "that is being tried already" if any(frozenset(each.models) == keep for each in under_way) else ""
 
     def words(self, state: RunState) -> Words:
-        names = names_of(state, self.models, empty=True) or ()
+        names = _names_of(state, self.models, empty=True) or ()
         keep = frozenset(names)
         without = [name for name in state.environment if name not in keep]
         is_part = keep < frozenset(state.environment)
@@ -213,7 +196,6 @@ class Try:
 class Adopt:
     """Make a try that showed f the environment."""
 
-    kind: ClassVar[str] = "adopt"
     trial: int
 
     def refusal(self, now: Situation) -> str:
@@ -225,8 +207,7 @@ class Adopt:
             return f"{trial.label} did not show f"
         if trial.models == state.environment:
             return f"{trial.label} is the environment already"
-        lacking = lacks_pinned(state, trial.models)
-        return f"{trial.label} {lacking}" if lacking else ""
+        return _lacks_pinned(state, trial.label, trial.models)
 
     def words(self, state: RunState) -> Words:
         trial = self.meant(state)
@@ -238,6 +219,13 @@ class Adopt:
         return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
 
 
+def _lacks_pinned(state: RunState, label: str, models: Iterable[str]) -> str:
+    """Why a selection cannot become the environment, or ""."""
+    pinned = state.pinned.difference(models)
+    lacking = [name for name in state.environment if name in pinned]
+    return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
+
+
 @dataclass(frozen=True, slots=True)
 class AcceptOther:
     """Count another failure as f from here on; the models of its test become the environment.
@@ -245,7 +233,6 @@ class AcceptOther:
     With `instead` it is a branch from where the test was made: only that failure is f in it.
     """
 
-    kind: ClassVar[str] = "accept_other"
     test: int
     instead: bool = False
 
@@ -263,27 +250,24 @@ class AcceptOther:
         label, models = label_of(state, test), state.environments[test.environment]
         if state.here is None or not models < state.environments[state.here.id]:
             return f"{label} is not part of the current environment"
-        lacking = lacks_pinned(state, models.names(state.elements))
-        return f"{label} {lacking}" if lacking else ""
+        return _lacks_pinned(state, label, models.names(state.elements))
 
     def words(self, state: RunState) -> Words:
         test = state.tests[self.test - 1]
+        asked = _question(state, test, self.instead)
         if self.instead:
             size = count(len(state.environments[test.environment]), "model")
             said = f"a branch reduces the failure of test {test.id}, from {size} on"
-            return Words("branch to another failure", said, _question(state, test, self.instead))
-        said = f"the other failure of {label_of(state, test)} counts as f, too"
-        return Words("count another failure as f", said, _question(state, test))
+            return Words("branch to another failure", said, asked)
+        return Words(
+            "count another failure as f", f"the other failure of {label_of(state, test)} counts as f, too", asked
+        )
 
 
-def nearest_other(state: RunState, row: Row) -> Test | None:
-    """The test of a candidate or try that ended in another failure, nearest to the end of f."""
-    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
-    others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
-    return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
+SelectionCommand = Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | AcceptOther
 
 
-def _question(state: RunState, test: Test, instead: bool = False) -> str:
+def _question(state: RunState, test: Test, instead: bool) -> str:
     """What happened in the test, compared with f, and what follows."""
     label = f"test {test.id}" if instead else printable(label_of(state, test))
     models = count(len(state.environments[test.environment]), "model")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,8 +26,8 @@ NO_MODELS = "no such models"
 class Situation:
     """A run, and what else decides whether a command is possible.
 
-    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the kind of the viewer's last command until the
-    engine obeys it, or "".
+    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the viewer's last command in brief until
+    the engine obeys it, or "".
     """
 
     state: RunState
@@ -70,13 +70,6 @@ def label_of(state: RunState, test: Test) -> str:
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 
-def names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -> tuple[str, ...] | None:
-    """The names of numbered models, each once; None if there are no such models, or if there are none and not `empty`."""
-    if not (numbers or empty) or not all(0 <= number < len(state.elements) for number in numbers):
-        return None
-    return tuple(state.elements[number] for number in dict.fromkeys(numbers))
-
-
 def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
     """The numbers of models, in the order of the world."""
     number = {name: index for index, name in enumerate(state.elements)}
@@ -101,24 +94,6 @@ def new_search(state: RunState, size: int | None = None) -> str:
     return f"{ends} new search begins from {count(len(state.environment) if size is None else size, 'model')}"
 
 
-def next_candidate(state: RunState, after: int) -> str:
-    """What is tried after a candidate of the round, as a sentence without a full stop."""
-    waiting = () if state.round is None else state.round.untried
-    following = next((one for one in waiting if one.index > after), None)
-    return "It was the last one of this round" if following is None else f"Next is {following.label}"
-
-
-def lacks_pinned(state: RunState, models: Iterable[str]) -> str:
-    """Why a selection cannot become the environment, as the end of a sentence; or ""."""
-    pinned = state.pinned.difference(models)
-    lacking = [name for name in state.environment if name in pinned]
-    return f"lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
-
-
 def named(names: Iterable[str]) -> str:
     """The first names of some models, short enough for a line."""
     return first_of([shortened(name, LONGEST) for name in names], NAMED)
-
-
-def is_or_are(names: Collection[str]) -> str:
-    return "is" if len(names) == 1 else "are"

@@ -12,7 +12,7 @@ from ddenv.errors import UserError
 from ddenv.learn.attempt import Attempt, Oracle
 from ddenv.learn.lesson import Answer, Question
 from ddenv.runfile.events import TestFinished, TestStarted
-from ddenv.runfile.follow import steps
+from ddenv.runfile.fold import steps
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, Candidate, RunState, Split, Trial
 from ddenv.runfile.store import Recorded, RunFile

@@ -23,9 +23,8 @@ from ddenv.page.blocks import (
 )
 from ddenv.page.step_chart import WIDTH, opening
 from ddenv.report.run_data import Record
-from ddenv.runfile.atlas import OtherFailure, atlas
-from ddenv.runfile.events import DEEDS
-from ddenv.runfile.failures import Baseline
+from ddenv.runfile.events import DEEDS, BaselineFinished
+from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
@@ -55,7 +54,7 @@ PHASES = (
 MOST, MOST_NAMES = 30, 6
 
 
-def interval(base: Baseline) -> str:
+def interval(base: BaselineFinished) -> str:
     """The line as SVG, its colours as classes of `style.css`."""
 
     def at(rate: float) -> float:
@@ -110,7 +109,7 @@ def _baseline(state: RunState) -> list[Block]:
     ]
 
 
-def _seen(base: Baseline) -> list[Block]:
+def _seen(base: BaselineFinished) -> list[Block]:
     """The failures of the whole world, if there are several."""
     if not base.others:
         return []
@@ -120,7 +119,7 @@ def _seen(base: Baseline) -> list[Block]:
     return [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
 
 
-def _missed(state: RunState, base: Baseline) -> list[Block]:
+def _missed(state: RunState, base: BaselineFinished) -> list[Block]:
     """What the failure rate means for a candidate."""
     iterations = section(state.scenario, "reduction").get("iterations", 3)
     if base.rate >= 1 or not isinstance(iterations, int):

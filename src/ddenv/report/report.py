@@ -30,8 +30,7 @@ from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left, why
-from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.failures import Place
+from ddenv.runfile.events import DEEDS, Place, deed
 from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState

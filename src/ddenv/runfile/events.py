@@ -6,11 +6,13 @@ from 1. A field with a default may be missing in a file. Times are in s, places 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Any, get_args
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
 from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.reading import OneOf, Range
+from ddenv.text import snake_case
 
 Natural = Annotated[int, Range(0)]
 Number = Annotated[int, Range(1)]
@@ -23,12 +25,40 @@ Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "i
 Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]
 Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
 
+# What the robot did, by the `failure` of a test. Any other `failure` says why the simulation broke.
+DEEDS = {
+    "stuck": "got stuck",
+    "tipped over": "tipped over",
+    "fell": "fell",
+    "lost": "was lost",
+    "out of time": "ran out of time",
+}
+
+
+def deed(failure: str) -> str:
+    """What the robot did, such as "tipped over"; "failed" if nothing more is known."""
+    return DEEDS.get(failure, "failed")
+
+
+def named(kinds: Sequence[str], position: Sequence[float]) -> str:
+    """A failure in words, such as "stuck at (5.42, -0.56)"."""
+    how = " or ".join(kind if kind in DEEDS else "failed" for kind in kinds) or "failed"
+    # Adding zero makes -0.0 the same as 0.0.
+    x, y = (round(value, 2) + 0.0 for value in position[:2])
+    return f"{how} at ({x:.2f}, {y:.2f})"
+
+
+class Event:
+    """Every event is one of these."""
+
+    __slots__ = ()
+
 
 # The engine.
 
 
 @dataclass(frozen=True, slots=True)
-class Created:
+class Created(Event):
     """The first event: the scenario as plain data, and the names of all models that may go."""
 
     scenario: dict[str, Any]
@@ -36,7 +66,7 @@ class Created:
 
 
 @dataclass(frozen=True, slots=True)
-class EngineStarted:
+class EngineStarted(Event):
     """`version` is that of ddenv, `simulator` has those of Drake and numpy, or the oracle, `machine` Python and the processor."""
 
     pid: int
@@ -47,7 +77,7 @@ class EngineStarted:
 
 
 @dataclass(frozen=True, slots=True)
-class Cluster:
+class Cluster(Event):
     """What has happened to a cluster, in `words`, and how many tests its workers can make at the same time now."""
 
     jobs: Natural
@@ -55,31 +85,31 @@ class Cluster:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparing:
+class Comparing(Event):
     """A test is made again, because this engine computes with something else than the earlier ones."""
 
     test: Number
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class Compared(Event):
     """Whether its bits are the same; if not, the user goes on with mixed tests."""
 
     same: bool
 
 
 @dataclass(frozen=True, slots=True)
-class Paused:
+class Paused(Event):
     """No new test starts."""
 
 
 @dataclass(frozen=True, slots=True)
-class Resumed:
+class Resumed(Event):
     """Tests start again."""
 
 
 @dataclass(frozen=True, slots=True)
-class DiskSpace:
+class DiskSpace(Event):
     """Whether the disk has room for more tests: `needed` bytes; `free` are there."""
 
     enough: bool
@@ -88,14 +118,14 @@ class DiskSpace:
 
 
 @dataclass(frozen=True, slots=True)
-class ClockJumped:
+class ClockJumped(Event):
     """Unix time went on or back by so many seconds at once: the machine slept, or its clock was set."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class Finished(Event):
     """The run ended by itself. `minimal` says whether no model can be removed."""
 
     minimal: bool
@@ -103,14 +133,14 @@ class Finished:
 
 
 @dataclass(frozen=True, slots=True)
-class EngineStopped:
+class EngineStopped(Event):
     """The engine was stopped and can be resumed."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class EngineFailed:
+class EngineFailed(Event):
     """The engine could not go on."""
 
     reason: str
@@ -120,12 +150,12 @@ class EngineFailed:
 
 
 @dataclass(frozen=True, slots=True)
-class SupportsStarted:
+class SupportsStarted(Event):
     """The piles are being settled, to find what rests on what; only if that takes more than a second."""
 
 
 @dataclass(frozen=True, slots=True)
-class Supports:
+class Supports(Event):
     """The first model of each pair rests on the second once the whole world has settled; `why` that is unknown.
 
     The first model of each tie would move by itself without the second; None if that is unknown.
@@ -137,12 +167,12 @@ class Supports:
 
 
 @dataclass(frozen=True, slots=True)
-class Still:
+class Still(Event):
     """Nothing in the world moves by itself: there are no ties."""
 
 
 @dataclass(frozen=True, slots=True)
-class Noted:
+class Noted(Event):
     """A sentence about something that is wrong with the whole world; one `about` each thing."""
 
     about: str
@@ -150,7 +180,7 @@ class Noted:
 
 
 @dataclass(frozen=True, slots=True)
-class EnvironmentNamed:
+class EnvironmentNamed(Event):
     """These models are environment number `environment`, from 0; the whole world is number 0 without an event."""
 
     environment: Number
@@ -161,10 +191,10 @@ class EnvironmentNamed:
 
 
 @dataclass(frozen=True, slots=True)
-class TestStarted:
+class Start:
     """Run number `run` of an environment, with a seed of its own. `phase` says what for: see `ddenv.runfile.state.Test`.
 
-    `without` is the model that a fresh run leaves out, or puts back. It `audits` the test that implies it.
+    `without` is the model that a fresh run leaves out, or puts back.
     """
 
     test: Number
@@ -176,27 +206,24 @@ class TestStarted:
     candidate: Natural | None = None
     trial: Number | None = None
     without: Natural | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TestStarted(Start, Event):
+    """A test starts. It `audits` the test that implies it."""
+
     audits: Number | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Implied:
-    """As `TestStarted`; the result is that of the test `by`, which has its trajectories."""
+class Implied(Start, Event):
+    """A test starts and ends at once: the result is that of the test `by`, which has its trajectories."""
 
-    test: Number
-    by: Number
-    environment: Natural
-    run: Natural
-    seed: Natural
-    phase: Phase
-    round: Number | None = None
-    candidate: Natural | None = None
-    trial: Number | None = None
-    without: Natural | None = None
+    by: Number = field(kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
-class TestFinished:
+class TestFinished(Event):
     """How a test ended; its trajectories stand beside it.
 
     `distance` is from the robot's end to that of f, m; `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` is a key of `DEEDS`, or
@@ -219,20 +246,10 @@ class TestFinished:
 
 
 @dataclass(frozen=True, slots=True)
-class TestLost:
+class TestLost(Event):
     """A test was running when the engine ended."""
 
     test: Number
-
-
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """A failure that `runs` of the whole world showed; `test` is the one in their middle, which ended at `position`, m."""
-
-    test: Number
-    runs: Natural
-    kinds: tuple[str, ...]
-    position: Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,8 +261,32 @@ class Outcomes:
 
 
 @dataclass(frozen=True, slots=True)
-class BaselineFinished:
-    """f is fixed: the fields are those of `ddenv.runfile.failures.Baseline`."""
+class SeenFailure:
+    """A failure that runs of the whole world showed: in `runs` of them, and `test` is the one in their middle.
+
+    `kinds` say how the robot failed, the most frequent one first. `position` is where `test` ended, x, y, z m.
+    """
+
+    test: Number
+    runs: Natural
+    kinds: tuple[str, ...]
+    position: Place
+
+    @property
+    def name(self) -> str:
+        return named(self.kinds, self.position)
+
+
+@dataclass(frozen=True, slots=True)
+class BaselineFinished(Event):
+    """f is fixed by the runs of the whole world: `failure_test` is the test whose end is f.
+
+    `failures` of `runs` showed f, at a `rate` of which `low`..`high` is Wilson's 95 % interval; `broken` more broke, and say
+    nothing. `seen` are all failures, the most frequent first, in the numbers of the setting `failure`. `miss_chance` is
+    (1-p)^(1+iterations), the chance that all tests of a candidate miss f; `iterations_95` is the number of iterations for a 95 %
+    chance of seeing f. `position` is f's end, x, y, z m. `wall_limit` is what a later test may take in real time by the speed
+    of these runs, s, None if unknown. It is the one thing here that differs from machine to machine.
+    """
 
     runs: Natural
     failures: Natural
@@ -259,14 +300,19 @@ class BaselineFinished:
     judged: Outcomes
     broken: Natural = 0
     wall_limit: Seconds | None = None
-    seen: tuple[Seen, ...] = ()
+    seen: tuple[SeenFailure, ...] = ()
+
+    @property
+    def others(self) -> tuple[tuple[int, SeenFailure], ...]:
+        """The failures that are not f, each with its number."""
+        return tuple((number, one) for number, one in enumerate(self.seen, 1) if one.test != self.failure_test)
 
 
 # The search.
 
 
 @dataclass(frozen=True, slots=True)
-class LegStarted:
+class LegStarted(Event):
     """A search starts from the current environment, with round number `round`.
 
     Its first round has `n_partitions`, None for the scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f
@@ -279,7 +325,7 @@ class LegStarted:
 
 
 @dataclass(frozen=True, slots=True)
-class RoundStarted:
+class RoundStarted(Event):
     """An environment is split into partitions; candidates are "partition" or "complement", the number of the partition, and the
     distance that ranks it, m, if it is one.
     """
@@ -293,8 +339,11 @@ class RoundStarted:
 
 
 @dataclass(frozen=True, slots=True)
-class Forecast:
-    """How many tests were left, low, likely and high, when `tests_done` of them were finished."""
+class Forecast(Event):
+    """How many tests of candidates the engine expected to be left, low, likely and high, when `tests_done` were finished.
+
+    In one case of ten fewer than the low number are left, in one of ten more than the high one.
+    """
 
     round: Number
     tests: tuple[Natural, Natural, Natural]
@@ -302,52 +351,51 @@ class Forecast:
 
 
 @dataclass(frozen=True, slots=True)
-class CandidateJudged:
-    """The verdict on a candidate, by these tests; `known` of them were made for something else."""
+class OfCandidate:
+    """Which candidate of the current round an event is about."""
 
     round: Number
     candidate: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateJudged(OfCandidate, Event):
+    """The verdict on a candidate, by these tests; `known` of them were made for something else."""
+
     verdict: Annotated[str, OneOf("similar", "missed", "dissimilar", "unknown")]
     tests: tuple[Number, ...]
     known: Natural = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Waiting:
+class Waiting(OfCandidate, Event):
     """A candidate showed f, and waits for the user."""
-
-    round: Number
-    candidate: Natural
 
 
 @dataclass(frozen=True, slots=True)
-class Decided:
+class Decided(OfCandidate, Event):
     """The user accepts or rejects it."""
 
-    round: Number
-    candidate: Natural
     decision: Annotated[str, OneOf("accept", "reject")]
 
 
 @dataclass(frozen=True, slots=True)
-class Reduced:
+class Reduced(OfCandidate, Event):
     """A candidate becomes the environment; `evidence_test` is a run of it that showed f."""
 
-    round: Number
-    candidate: Natural
     environment: Natural
     evidence_test: Number
 
 
 @dataclass(frozen=True, slots=True)
-class RoundFinished:
+class RoundFinished(Event):
     """A round is over."""
 
     round: Number
 
 
 @dataclass(frozen=True, slots=True)
-class Sliced:
+class Sliced(Event):
     """The environment is cut down to what took part in these tests. `audit`: one of them is simulated there, too."""
 
     environment: Natural
@@ -357,7 +405,7 @@ class Sliced:
 
 
 @dataclass(frozen=True, slots=True)
-class SlicesRefuted:
+class SlicesRefuted(Event):
     """The audit `test` does not repeat the test `by`, which implies it. Slices are no longer used, implied tests are void, and the
     run goes back to a node.
     """
@@ -371,7 +419,7 @@ class SlicesRefuted:
 
 
 @dataclass(frozen=True, slots=True)
-class CertificateStarted:
+class CertificateStarted(Event):
     """Full runs with fresh seeds follow, from run number `run` on. What is left has to keep `keep_rate` of `rate`."""
 
     certificate: Number
@@ -400,7 +448,7 @@ class ClaimMade:
 
 
 @dataclass(frozen=True, slots=True)
-class CertificateFinished:
+class CertificateFinished(Event):
     """What fresh runs show; the claims rest on these tests."""
 
     claims: tuple[ClaimMade, ...]
@@ -408,7 +456,7 @@ class CertificateFinished:
 
 
 @dataclass(frozen=True, slots=True)
-class RateLost:
+class RateLost(Event):
     """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is not taken again.
 
     The groups `again` are left out at once, or in halves.
@@ -421,7 +469,7 @@ class RateLost:
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
+class LeftOut(Event):
     """A certificate showed that a model is not needed."""
 
     without: Natural
@@ -433,7 +481,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True)
-class IsolationStarted:
+class IsolationStarted(Event):
     """The fewest models are sought that have to go from the whole world so that the robot reaches its goal.
 
     Fresh runs begin at number `run`; each check has `block` of them. A world passes at the rate `wanted` rather than `rather_than`.
@@ -454,7 +502,7 @@ class IsolationStarted:
 
 
 @dataclass(frozen=True, slots=True)
-class RemovalJudged:
+class RemovalJudged(Event):
     """What the search says of an environment of isolation."""
 
     environment: Natural
@@ -475,7 +523,7 @@ class ReturnedMade:
 
 
 @dataclass(frozen=True, slots=True)
-class IsolationChecked:
+class IsolationChecked(Event):
     """What fresh runs show of an environment; the claims rest on these tests."""
 
     environment: Natural
@@ -484,14 +532,14 @@ class IsolationChecked:
 
 
 @dataclass(frozen=True, slots=True)
-class IsolationFinished:
+class IsolationFinished(Event):
     """The environment in which the robot passes; None if there is none."""
 
     environment: Natural | None
 
 
 @dataclass(frozen=True, slots=True)
-class IsolationGivenUp:
+class IsolationGivenUp(Event):
     """The user ends it."""
 
 
@@ -499,46 +547,41 @@ class IsolationGivenUp:
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptModeChanged:
+class AcceptModeChanged(Event):
     """Reductions are made at once, or wait for the user."""
 
     mode: Annotated[str, OneOf("automatic", "ask")]
 
 
 @dataclass(frozen=True, slots=True)
-class Vetoed:
+class Vetoed(OfCandidate, Event):
     """A candidate is left out; `again`: because the same models were refused before."""
 
-    round: Number
-    candidate: Natural
     verdict: Annotated[str, OneOf("vetoed", "rejected", "undone")] = "vetoed"
     again: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Unvetoed:
+class Unvetoed(OfCandidate, Event):
     """It is tried after all."""
-
-    round: Number
-    candidate: Natural
 
 
 @dataclass(frozen=True, slots=True)
-class Pinned:
+class Pinned(Event):
     """These models always stay."""
 
     models: tuple[Natural, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Unpinned:
+class Unpinned(Event):
     """These models may go again."""
 
     models: tuple[Natural, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class TrialStarted:
+class TrialStarted(Event):
     """The user tries a selection."""
 
     trial: Number
@@ -546,7 +589,7 @@ class TrialStarted:
 
 
 @dataclass(frozen=True, slots=True)
-class TrialJudged:
+class TrialJudged(Event):
     """Its verdict, as of a candidate."""
 
     trial: Number
@@ -556,7 +599,7 @@ class TrialJudged:
 
 
 @dataclass(frozen=True, slots=True)
-class Adopted:
+class Adopted(Event):
     """A try becomes the environment."""
 
     trial: Number
@@ -565,7 +608,7 @@ class Adopted:
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptedOther:
+class AcceptedOther(Event):
     """The failure of a test counts as f from here on; `what` names it. `instead`: in a branch, in place of what was f."""
 
     test: Number
@@ -577,7 +620,7 @@ class AcceptedOther:
 
 
 @dataclass(frozen=True, slots=True)
-class WentBack:
+class WentBack(Event):
     """A node is the current one again; `rejected` is the node that is undone. `judged` if other failures count as f there."""
 
     node: Natural
@@ -586,96 +629,28 @@ class WentBack:
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class Changed(Event):
     """New values of keys in the scenario's section `reduction`."""
 
     settings: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class CommandRefused:
+class CommandRefused(Event):
     """A command was not possible."""
 
     why: str
 
 
 @dataclass(frozen=True, slots=True)
-class CommandHandled:
+class CommandHandled(Event):
     """A command caused no other event."""
 
 
-Event = (
-    Created
-    | EngineStarted
-    | Cluster
-    | Comparing
-    | Compared
-    | Paused
-    | Resumed
-    | DiskSpace
-    | ClockJumped
-    | Finished
-    | EngineStopped
-    | EngineFailed
-    | SupportsStarted
-    | Supports
-    | Still
-    | Noted
-    | EnvironmentNamed
-    | TestStarted
-    | Implied
-    | TestFinished
-    | TestLost
-    | BaselineFinished
-    | LegStarted
-    | RoundStarted
-    | Forecast
-    | CandidateJudged
-    | Waiting
-    | Decided
-    | Reduced
-    | RoundFinished
-    | Sliced
-    | SlicesRefuted
-    | CertificateStarted
-    | CertificateFinished
-    | RateLost
-    | LeftOut
-    | IsolationStarted
-    | RemovalJudged
-    | IsolationChecked
-    | IsolationFinished
-    | IsolationGivenUp
-    | AcceptModeChanged
-    | Vetoed
-    | Unvetoed
-    | Pinned
-    | Unpinned
-    | TrialStarted
-    | TrialJudged
-    | Adopted
-    | AcceptedOther
-    | WentBack
-    | Changed
-    | CommandRefused
-    | CommandHandled
-)
+# By their names in a file: `RoundStarted` is `round_started`.
 KINDS: dict[str, type[Event]] = {
-    "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in kind.__name__)[1:]: kind
-    for kind in get_args(Event)
+    snake_case(name): kind
+    for name, kind in list(globals().items())
+    if isinstance(kind, type) and issubclass(kind, Event) and kind is not Event
 }
 NAMES: dict[type[Event], str] = {kind: name for name, kind in KINDS.items()}
-
-# What the robot did, by the `failure` of a test. Any other `failure` says why the simulation broke.
-DEEDS = {
-    "stuck": "got stuck",
-    "tipped over": "tipped over",
-    "fell": "fell",
-    "lost": "was lost",
-    "out of time": "ran out of time",
-}
-
-
-def deed(failure: str) -> str:
-    """What the robot did, such as "tipped over"; "failed" if nothing more is known."""
-    return DEEDS.get(failure, "failed")

@@ -1,70 +1,83 @@
-"""The failures that runs show: which ones are the same, what each is called, and what the whole world showed."""
+"""Which runs show the same failure; and the failures other than f that tests of a run met: grouped by end and kind, each with the
+smallest environment that showed it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from itertools import combinations
-from math import dist, fsum
 
-from ddenv.runfile.events import DEEDS
+from ddenv.runfile.events import Place, named
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import RunState
 
-Place = tuple[float, float, float]
+# Tests grouped at a time: the first ones find the centres of frequent failures, and most of the later ones are close to these.
+CHUNK = 400
 
 
 @dataclass(frozen=True, slots=True)
-class SeenFailure:
-    """A failure that runs of the whole world showed: in `runs` of them, and `test` is the one in their middle.
+class OtherFailure:
+    """A failure f' that `tests` showed, in order. `position` (x, y, z m) is the end in their middle.
 
-    `kinds` say how the robot failed, the most frequent one first. `position` is where `test` ended, x, y, z m.
+    `smallest` is the first of the tests with the fewest models, `size` the number of these.
     """
 
-    test: int
-    runs: int
-    kinds: tuple[str, ...]
+    kind: str
     position: Place
+    tests: tuple[int, ...]
+    smallest: int
+    size: int
 
     @property
     def name(self) -> str:
-        return named(self.kinds, self.position)
+        return named((self.kind,), self.position)
 
 
-@dataclass(frozen=True, slots=True)
-class Baseline:
-    """The runs of the whole world. `failure_test` is the test whose end is f; `low`..`high` is Wilson's 95 % interval.
+def atlas(state: RunState) -> tuple[OtherFailure, ...]:
+    """All failures of tests whose outcome is "other", the most frequent first.
 
-    `failures` of `runs` showed f; `broken` more broke, and say nothing. `seen` are all failures, the most frequent first, in the
-    numbers of the setting `failure`. `miss_chance` is (1-p)^(1+iterations), the chance that all tests of a candidate miss f;
-    `iterations_95` is the number of iterations for a 95 % chance of seeing f. `position` is f's end, x, y, z m.
-    `wall_limit` is what a later test may take in real time by the speed of these runs, s, None if unknown. It is
-    the one thing here that differs from machine to machine.
+    Two ends are of one failure if they are of one kind and within epsilon of the same centre.
     """
-
-    runs: int
-    failures: int
-    rate: float
-    low: float
-    high: float
-    failure_test: int
-    position: Place
-    miss_chance: float
-    iterations_95: int
-    broken: int = 0
-    wall_limit: float | None = field(default=None, compare=False)
-    seen: tuple[SeenFailure, ...] = ()
-
-    @property
-    def others(self) -> tuple[tuple[int, SeenFailure], ...]:
-        """The failures that are not f, each with its number."""
-        return tuple((number, one) for number, one in enumerate(self.seen, 1) if one.test != self.failure_test)
+    kinds: dict[str, list[tuple[int, Place]]] = defaultdict(list)
+    for test in state.tests if state.tally["other"] else ():
+        if test.outcome == "other" and test.end_pose is not None:
+            x, y, z = test.end_pose[:3]
+            kinds[test.failure].append((test.id, (x, y, z)))
+    epsilon = settings(state).epsilon
+    found = [
+        _failure(state, kind, position, tests)
+        for kind, ends in kinds.items()
+        for position, tests in _by_end(ends, epsilon)
+    ]
+    return tuple(sorted(found, key=lambda one: (-len(one.tests), one.tests)))
 
 
-def named(kinds: Sequence[str], position: Sequence[float]) -> str:
-    """A failure in words, such as "stuck at (5.42, -0.56)"."""
-    how = " or ".join(kind if kind in DEEDS else "failed" for kind in kinds) or "failed"
-    # Adding zero makes -0.0 the same as 0.0.
-    x, y = (round(value, 2) + 0.0 for value in position[:2])
-    return f"{how} at ({x:.2f}, {y:.2f})"
+def _by_end(ends: list[tuple[int, Place]], epsilon: float) -> Iterable[tuple[Place, list[int]]]:
+    """Centres, each with the tests around it."""
+    groups: list[tuple[Place, list[int]]] = []
+    for start in range(0, len(ends), CHUNK):
+        rest: list[tuple[int, Place]] = []
+        for test, end in ends[start : start + CHUNK]:
+            distance, around = min(
+                ((math.dist(end, centre), tests) for centre, tests in groups), default=(math.inf, [])
+            )
+            if distance <= epsilon:
+                around.append(test)
+            else:
+                rest.append((test, end))
+        groups += [
+            (rest[group[0]][1], [rest[one][0] for one in group]) for group in alike([e for _, e in rest], epsilon)
+        ]
+    return groups
+
+
+def _failure(state: RunState, kind: str, position: Place, tests: list[int]) -> OtherFailure:
+    sizes = {test: len(state.environments[state.tests[test - 1].environment]) for test in tests}
+    smallest = min(tests, key=lambda test: (sizes[test], test))
+    return OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest])
 
 
 def grouped(number: int, apart: Callable[[int, int], float | None]) -> list[list[int]]:
@@ -81,7 +94,7 @@ def grouped(number: int, apart: Callable[[int, int], float | None]) -> list[list
             near[first][second] = near[second][first] = distance
 
     def rank(one: int) -> tuple[int, float, int]:
-        return -len(near[one]), fsum(near[one].values()), one
+        return -len(near[one]), math.fsum(near[one].values()), one
 
     groups = []
     while near:
@@ -97,7 +110,7 @@ def alike(ends: list[Place], epsilon: float) -> list[list[int]]:
     """The ends (m) in groups around centres, as `grouped` has them: an end belongs to a centre within `epsilon` (m)."""
 
     def apart(first: int, second: int) -> float | None:
-        distance = dist(ends[first], ends[second])
+        distance = math.dist(ends[first], ends[second])
         return distance if distance <= epsilon else None
 
     return grouped(len(ends), apart)

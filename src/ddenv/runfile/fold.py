@@ -5,7 +5,7 @@ What each event changes stands here and in the files `fold_*.py` beside this one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import reduce
 from typing import Any
@@ -17,9 +17,9 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Forecast, Node, PastRound, Point
+from ddenv.runfile.progress import Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
-from ddenv.runfile.store import Recorded, uncollected
+from ddenv.runfile.store import Recorded, RunFile, uncollected
 from ddenv.text import count
 
 # Verdicts that tests led to, not the user.
@@ -46,6 +46,27 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
             changes["refusal"] = recorded.command, event.why
     after = state.changed(revision=recorded.id, updated_at=recorded.time, **changes)
     return _with_clock(state, after)
+
+
+def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator[tuple[Recorded, RunState, RunState]]:
+    """(event, before, after) for each event, from the beginning or from an earlier `state`. Raises UserError at an invalid one."""
+    after = state or RunState()
+    for recorded in events:
+        before, after = after, apply(after, recorded)
+        yield recorded, before, after
+
+
+class Follower:
+    """Follows a run file as it grows. `state` is the one after the last event that was read and is valid."""
+
+    def __init__(self, file: RunFile, state: RunState | None = None) -> None:
+        self._file, self.state = file, state or RunState()
+
+    def new(self, most: int = -1) -> Iterator[tuple[Recorded, RunState, RunState]]:
+        """The events since then as `steps`, at most `most` unless that is negative. Raises UserError."""
+        for recorded, before, after in steps(self._file.read(self.state.revision, most), self.state):
+            self.state = after
+            yield recorded, before, after
 
 
 def _created(state: RunState, event: e.Created, _: float) -> Changes:
@@ -219,10 +240,9 @@ def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, 
 
 
 def _forecast(_: RunState, event: e.Forecast, __: float) -> Changes:
-    low, likely, high = event.tests
-    if not low <= likely <= high:
+    if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
-    return {"forecast": Forecast(low, likely, high, event.tests_done)}
+    return {"forecast": event}
 
 
 def _candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:

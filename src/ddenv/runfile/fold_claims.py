@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ddenv.runfile import events as e
-from ddenv.runfile.fold_decisions import arrived, listed, origin, searched_anew, without_open
-from ddenv.runfile.fold_tests import Changes, counts, with_node, with_removal
+from ddenv.runfile.fold_decisions import arrived, at_node, listed, origin, searched_anew, without_open
+from ddenv.runfile.fold_tests import Changes, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Point, Returned
+from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import OUTCOMES, RunState, Test
 
 
@@ -72,12 +72,7 @@ def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
         "lost": (*state.lost, (state.failures, state.environments[lost.id])),
         "steps_back": state.steps_back + 1,
         "again": event.again,
-        "node": node.number,
-        "came_at": state.tests_done,
-        "environment": node.environment,
-        "evidence_test": node.evidence_test,
-        "lower_bound": 0,
-        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+        **at_node(state, node),
     }
 
 
@@ -177,8 +172,7 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
         raise ValueError(event.by)
     for test in state.tests:
         if test.implied_by is not None and test.is_finished:
-            after = replace(test, outcome="lost")
-            state = state.changed(tests=state.tests.changed(test.id - 1, after), **counts(state, test, after))
+            state = state.changed(**with_test(state, test.id, {"outcome": "lost"}))
     state = state.changed(
         nodes=tuple(_without_void(reached, state) for reached in state.nodes),
         trials=tuple(
@@ -186,25 +180,17 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
             for trial in state.trials
         ),
     )
+    # Void tests are no longer counted.
     done = state.tests_done
+    state = state.changed(history=tuple(replace(point, tests=min(point.tests, done)) for point in state.history))
     return {
         "tests": state.tests,
         "tally": state.tally,
-        "deflake_runs": state.deflake_runs,
         "trials": state.trials,
         **searched_anew(state),
         "implied": 0,
         "refuted": (audit.id, event.by),
-        "node": node.number,
-        "environment": node.environment,
-        "evidence_test": node.evidence_test,
-        "came_at": done,
-        "lower_bound": 0,
-        # Void tests are no longer counted.
-        "history": (
-            *(replace(point, tests=min(point.tests, done)) for point in state.history),
-            Point(done, len(node.environment)),
-        ),
+        **at_node(state, node),
     }
 
 

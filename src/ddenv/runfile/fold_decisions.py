@@ -9,8 +9,8 @@ from ddenv.environment import Environment
 from ddenv.runfile import events as e
 from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal
-from ddenv.runfile.state import RunState, Test, Trial
-from ddenv.text import count
+from ddenv.runfile.state import RunState, Trial
+from ddenv.text import count, first_of, truncated
 
 # Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40
@@ -75,35 +75,21 @@ def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Change
     # A trial has a number; otherwise `what` names the candidate.
     trial = None if event.trial is None else state.trials[event.trial - 1]
     what = event.what if trial is None else trial.label
-    judged = with_outcomes(state, event.judged)
-    judged = judged.changed(nodes=counted_again(judged.nodes, judged.tests))
-    if event.instead:
-        return _branched(judged, test, event, at, what)
+    changes = with_outcomes(state, event.judged)
+    judged = state.changed(**changes, nodes=counted_again(state.nodes, changes["tests"]))
     runs = same_runs(judged, test)
-    return {
-        "tests": judged.tests,
-        "tally": judged.tally,
-        "failures": (*state.failures, test.id),
-        **({} if trial is None else with_trial(state, replace(trial, adopted=True))),
-        **arrived(judged, event.environment, test.id, at, "accepted", what, runs),
-        **decision(state, at, "accept_other", f"accepted another failure as f: {what}, test {test.id}"),
-    }
-
-
-def _branched(state: RunState, test: Test, event: e.AcceptedOther, at: float, what: str) -> Changes:
-    """Another failure is f from now on, in place of what was f, in the environment that showed it."""
-    runs = same_runs(state, test)
-    arrival = arrived(state, event.environment, test.id, at, "instead", what, runs, below=test.node)
-    gone = state.pinned.difference(arrival["environment"])
-    words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
-    return {
-        "tests": state.tests,
-        "tally": state.tally,
-        "failures": (test.id,),
-        "pinned": state.pinned - gone,
-        **arrival,
-        **decision(state, at, "accept_other", words),
-    }
+    if event.instead:
+        # In place of what was f, in a branch.
+        changes |= arrived(judged, event.environment, test.id, at, "instead", what, runs, below=test.node)
+        gone = state.pinned.difference(changes["environment"])
+        changes |= {"failures": (test.id,), "pinned": state.pinned - gone}
+        words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
+    else:
+        changes |= arrived(judged, event.environment, test.id, at, "accepted", what, runs)
+        changes |= {"failures": (*state.failures, test.id)}
+        changes |= {} if trial is None else with_trial(state, replace(trial, adopted=True))
+        words = f"accepted another failure as f: {what}, test {test.id}"
+    return changes | decision(state, at, "accept_other", words)
 
 
 def _unpinned(state: RunState, gone: frozenset[str]) -> str:
@@ -133,26 +119,17 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
     gone = state.pinned.difference(node.environment)
     words += _unpinned(state, gone)
     # A failure accepted after this node does not count as f here.
-    judged = state
     if event.judged is not None:
-        judged = with_outcomes(state, event.judged)
-        nodes = counted_again(nodes, judged.tests)
+        changes |= with_outcomes(state, event.judged)
+        nodes = counted_again(nodes, changes["tests"])
     return {
         **changes,
         **left_round(state),
         "search_due": True,
-        "tests": judged.tests,
-        "tally": judged.tally,
         "failures": failures_at(state, node.number),
         "nodes": nodes,
-        "node": node.number,
-        "came_at": state.tests_done,
-        "environment": node.environment,
         "pinned": state.pinned - gone,
-        "evidence_test": node.evidence_test,
-        "lower_bound": 0,
-        "minimal": False,
-        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+        **at_node(state, node),
         **decision(state, at, "undo" if event.rejected is not None else "go_back", words),
     }
 
@@ -231,15 +208,19 @@ def arrived(
     # Nothing is known yet about what another failure needs.
     needed = min(state.lower_bound, len(environment)) if inside and how not in ("accepted", "instead") else 0
     changes = {} if how == "reduced" else left_round(state) | {"search_due": True}
-    return changes | {
-        "nodes": (*state.nodes, node),
+    return changes | at_node(state, node, needed) | {"nodes": (*state.nodes, node)}
+
+
+def at_node(state: RunState, node: Node, needed: int = 0) -> Changes:
+    """The run is at a node from now on; at least `needed` of its models are known to be needed."""
+    return {
         "node": node.number,
         "came_at": state.tests_done,
-        "environment": environment,
-        "evidence_test": evidence_test,
+        "environment": node.environment,
+        "evidence_test": node.evidence_test,
         "lower_bound": needed,
         "minimal": False,
-        "history": (*state.history, Point(state.tests_done, len(environment), needed)),
+        "history": (*state.history, Point(state.tests_done, len(node.environment), needed)),
     }
 
 
@@ -316,6 +297,4 @@ def place(node: Node) -> str:
 
 def listed(models: Sequence[str]) -> str:
     """The first few names of `models`."""
-    shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
-    more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
-    return ", ".join(shown) + more
+    return first_of([truncated(name, LONGEST) for name in models], NAMED)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from ddenv.runfile import events as e
-from ddenv.runfile.failures import Baseline, SeenFailure
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, Point, Removal
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunState, Test, Trial
@@ -16,6 +15,8 @@ from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunS
 Changes = dict[str, Any]
 # The phases of tests that idle workers may make ahead of time.
 MAY_BE_AHEAD = ("round", CERTIFY)
+# How a test ended: an implied one as the test that implies it.
+END = ("outcome", "failure", "distance", "end_pose", "simulated_seconds", "cut", "took_part")
 
 
 def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) -> Changes:
@@ -52,7 +53,7 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
         return changes | with_trial(state, replace(trial, tests=(*trial.tests, test.id)))
     if event.round is None or event.candidate is None:
         return changes
-    candidate = tried(state, event)
+    candidate = candidate_of(state, event.round, event.candidate)
     return changes | with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
 
 
@@ -78,17 +79,10 @@ def with_removal(state: RunState, environment: int) -> tuple[PersistentTuple[Rem
 def test_finished(state: RunState, event: e.TestFinished, _: float) -> Changes:
     if event.took_part is not None and not event.took_part <= state.environments[0]:
         raise ValueError("took_part")
-    values = {
-        "outcome": event.outcome,
-        "failure": event.failure,
-        "distance": event.distance,
-        "end_pose": event.end_pose,
-        "simulated_seconds": event.simulated_seconds,
+    values = {name: getattr(event, name) for name in END} | {
         "wall_seconds": event.wall_seconds,
         "first_sensed": tuple((state.elements[model], at) for model, at in event.first_sensed),
         "first_touched": tuple((state.elements[model], at) for model, at in event.first_touched),
-        "cut": event.cut,
-        "took_part": event.took_part,
         "taken": bool(event.taken),
     }
     return _ended_as(state, event.test, values)
@@ -107,17 +101,10 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
     if not made.is_finished or made.outcome in BROKEN or made.implied_by is not None or made.run != test.run:
         raise ValueError(event.by)
     there = frozenset(now.models_of(test))
-    values = {
-        "outcome": made.outcome,
-        "failure": made.failure,
-        "distance": made.distance,
-        "end_pose": made.end_pose,
-        "simulated_seconds": made.simulated_seconds,
+    values = {name: getattr(made, name) for name in END} | {
         # The robot may have had others in view.
         "first_sensed": tuple(sensed for sensed in made.first_sensed if sensed[0] in there),
         "first_touched": made.first_touched,
-        "cut": made.cut,
-        "took_part": made.took_part,
         "implied_by": event.by,
     }
     return {**started, **_ended_as(now, test.id, values), "implied": state.implied + 1}
@@ -129,28 +116,12 @@ def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
 
 
 def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
-    seen_failures = tuple(SeenFailure(one.test, one.runs, one.kinds, one.position) for one in event.seen)
-    baseline = Baseline(
-        runs=event.runs,
-        failures=event.failures,
-        rate=event.rate,
-        low=event.low,
-        high=event.high,
-        failure_test=event.failure_test,
-        position=event.position,
-        miss_chance=event.miss_chance,
-        iterations_95=event.iterations_95,
-        broken=event.broken,
-        wall_limit=event.wall_limit,
-        seen=seen_failures,
-    )
-    judged, first = with_outcomes(state, event.judged), event.failure_test
+    changes, first = with_outcomes(state, event.judged), event.failure_test
+    judged = state.changed(**changes)
     runs, shown = seen(judged.tests, (test.id for test in judged.tests if test.phase == "baseline"))
     return {
-        "tests": judged.tests,
-        "tally": judged.tally,
-        "deflake_runs": judged.deflake_runs,
-        "baseline": baseline,
+        **changes,
+        "baseline": event,
         "evidence_test": first,
         "failures": (first,),
         "nodes": with_node(state.nodes, replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown)),
@@ -162,12 +133,12 @@ def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> C
 # Their outcomes.
 
 
-def with_outcomes(state: RunState, judged: e.Outcomes) -> RunState:
-    """The state with the outcomes of tests updated, after f was fixed or another failure began to count as f."""
+def with_outcomes(state: RunState, judged: e.Outcomes) -> Changes:
+    """The outcomes of tests, updated after f was fixed or another failure began to count as f."""
     for test, outcome in judged.outcomes.items():
         values = {"outcome": outcome, "distance": judged.distances.get(test)}
         state = state.changed(**with_test(state, test, values))
-    return state
+    return {"tests": state.tests, "tally": state.tally}
 
 
 def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
@@ -179,12 +150,11 @@ def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
 
 
 def counts(state: RunState, before: Test | None, after: Test) -> Changes:
-    tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
+    tally = dict(state.tally)
     tally[after.outcome] += 1
     if before is not None:
         tally[before.outcome] -= 1
-        reruns -= before.is_deflake_run
-    return {"tally": tally, "deflake_runs": reruns}
+    return {"tally": tally}
 
 
 def counted_ahead(before: RunState, event: e.Event, changes: Changes) -> Changes:
@@ -266,21 +236,17 @@ def with_trial(state: RunState, trial: Trial) -> Changes:
     return {"trials": (*state.trials[: trial.number - 1], trial, *state.trials[trial.number :])}
 
 
-class OfCandidate(Protocol):
-    """An event of a candidate of the current round."""
-
-    @property
-    def round(self) -> int | None: ...
-    @property
-    def candidate(self) -> int | None: ...
-
-
-def tried(state: RunState, event: OfCandidate) -> Candidate:
+def tried(state: RunState, event: e.OfCandidate) -> Candidate:
     """The candidate that an event is about. Raises IndexError or ValueError if it is none of the current round."""
+    return candidate_of(state, event.round, event.candidate)
+
+
+def candidate_of(state: RunState, number: int, index: int) -> Candidate:
+    """A candidate of round `number`, as `tried`."""
     round = current(state)
-    if event.round != round.number or event.candidate is None:
-        raise ValueError(event.round)
-    return round.candidates[event.candidate]
+    if number != round.number:
+        raise ValueError(number)
+    return round.candidates[index]
 
 
 def with_candidate(state: RunState, candidate: Candidate) -> Changes:

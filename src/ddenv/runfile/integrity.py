@@ -13,9 +13,8 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.runfile.events import Created, Implied, TestFinished
 from ddenv.runfile.fold import apply
-from ddenv.runfile.reading import plain
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.runfile.store import Motions, Recorded, Request, RunFile, create
+from ddenv.runfile.store import Recorded, Request, RunFile, create
 
 # How many faults SQLite lists.
 MOST_FAULTS = 3
@@ -38,7 +37,7 @@ class Whole:
 def faults(file: RunFile) -> list[str]:
     """What SQLite finds wrong with the file; nothing if it is sound."""
     try:
-        with closing(_connected(file)) as db:
+        with closing(sqlite3.connect(file.address, uri=True)) as db:
             rows = db.execute(f"PRAGMA integrity_check({MOST_FAULTS})").fetchall()
     except sqlite3.Error as error:
         return [str(error)]
@@ -93,13 +92,13 @@ def rescue(file: RunFile, copy: Path) -> Whole:
 
 
 def _fill(file: RunFile, made: Path) -> Whole:
-    with closing(_connected(file)) as source, closing(sqlite3.connect(made, isolation_level=None)) as db:
+    with closing(sqlite3.connect(made, isolation_level=None)) as db:
 
         def keep(event: Recorded) -> None:
             db.execute("INSERT INTO event VALUES (?, ?, ?, ?)", _row(event))
             if isinstance(event.event, TestFinished | Implied):
-                samples = _samples(source, event.event.test).items()
-                db.executemany("INSERT INTO motion VALUES (?, ?, ?)", [(event.event.test, *row) for row in samples])
+                rows = [(event.event.test, *row) for row in file.samples(event.event.test).items()]
+                db.executemany("INSERT INTO motion VALUES (?, ?, ?)", rows)
 
         db.execute("BEGIN")
         db.execute("DELETE FROM event")
@@ -118,23 +117,5 @@ def _is_bare(file: RunFile, event: Recorded) -> bool:
     return not file.motion(test) or not file.trajectory(test)
 
 
-def _connected(file: RunFile) -> sqlite3.Connection:
-    db = sqlite3.connect(file.address, uri=True)
-    db.execute("PRAGMA trusted_schema = OFF")
-    return db
-
-
 def _row(entry: Recorded | Request) -> tuple[int, float, str, str]:
-    if isinstance(entry, Request):
-        data = entry.data
-    else:
-        data = plain(entry.event) | ({} if entry.command is None else {"command": entry.command})
-    return entry.id, entry.time, entry.kind, json.dumps(data, allow_nan=False, separators=(",", ":"))
-
-
-def _samples(source: sqlite3.Connection, test: int) -> Motions:
-    """What the file has beside the end of a test, as it is in the file."""
-    try:
-        return dict(source.execute("SELECT model, samples FROM motion WHERE test = ?", (test,)))
-    except sqlite3.Error as error:
-        raise UserError(f"damaged run file: {error}") from None
+    return entry.id, entry.time, entry.kind, json.dumps(entry.data, allow_nan=False, separators=(",", ":"))

@@ -6,9 +6,10 @@ from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import Literal, get_args
 
-from ddenv.runfile.fold import apply
+from ddenv.runfile.fold import steps
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded
 
@@ -102,9 +103,8 @@ class Position:
 
     def catch_up(self) -> None:
         """Reads and notes all new events. Raises UserError for an invalid one."""
-        for event in self._read(self.end.revision, -1):
-            before = self.end
-            self.note(event.kind, before, apply(before, event))
+        for event, before, after in steps(self._read(self.end.revision, -1), self.end):
+            self.note(event.kind, before, after)
 
     def _add_to_chapter(self, kind: str, before: RunState, after: RunState) -> None:
         id, models, last = after.revision, len(after.environment), self.chapters[-1] if self.chapters else None
@@ -152,23 +152,14 @@ class Position:
             return None
         wanted = self._ids[place]
         if not (self._near and self._near[0].recorded.id <= wanted <= self._near[-1].recorded.id):
-            self._load((place - 1) // self._gap)
-        near = [each.recorded.id for each in self._near]
-        return self._near[bisect_right(near, wanted) - 1]
+            kept, end = self._kept[(place - 1) // self._gap], self._ids[-1]
+            noted = takewhile(lambda event: event.id <= end, self._read(kept.revision, self._gap))
+            self._near = [Moment(*step) for step in steps(noted, kept)]
+        return self._near[bisect_right(self._near, wanted, key=lambda each: each.recorded.id) - 1]
 
     def start_of(self, test: int) -> Moment | None:
         """The moment in which a test started; None if there is no such test."""
         return self.moment(self._starts[test - 1]) if 0 < test <= len(self._starts) else None
-
-    def _load(self, number: int) -> None:
-        """Folds the events that follow a kept state."""
-        state, near = self._kept[number], []
-        for event in self._read(state.revision, self._gap):
-            if event.id > self._ids[-1]:
-                break
-            before, state = state, apply(state, event)
-            near.append(Moment(event, before, state))
-        self._near = near
 
     # Moves.
 

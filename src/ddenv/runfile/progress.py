@@ -1,11 +1,14 @@
-"""What a run has found so far, as plain frozen data: searches, environments, certificates, decisions of the user, isolation."""
+"""What a run has found so far, as plain frozen data: searches, environments, certificates, decisions of the user, isolation;
+and what its tests were computed with.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import Environment
+from ddenv.runfile.events import EngineStarted
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,19 +136,6 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Forecast:
-    """How many tests of candidates the engine expected to be left when `tests_done` were finished.
-
-    In one case of ten fewer than `low` are left, in one of ten more than `high`.
-    """
-
-    low: int
-    likely: int
-    high: int
-    tests_done: int
-
-
-@dataclass(frozen=True, slots=True)
 class Point:
     """The size of the environment after `tests` finished tests; at least `needed` of its models were known to be needed."""
 
@@ -231,3 +221,43 @@ class Isolation:
     ended: bool = False
     found: int | None = None
     broken_off: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Physics:
+    """What the tests were computed with: the same ones give the same bits only by the same software on the same processor.
+
+    `now` is what the last engine computes with, `proven` what gave the same bits as the tests before it.
+
+    Both are lists in words, such as "ddenv 0.1.0, drake 1.51.1, Python 3.11.7, Intel Xeon"; "" before the first engine. `mixed`
+    has a sentence for each time that the user went on although the bits differ.
+    """
+
+    now: str = ""
+    proven: str = ""
+    mixed: tuple[str, ...] = ()
+
+    def started(self, engine: EngineStarted, tests: int) -> Physics:
+        """After the start of an engine, when `tests` tests were finished."""
+        words = (f"ddenv {engine.version}", engine.simulator, engine.machine)
+        now = ", ".join(each for each in words if each)
+        return replace(self, now=now, proven=self.proven if tests else now)
+
+    def compared(self, same: bool) -> Physics:
+        """After a test was made again, with the same bits or not."""
+        mixed = self.mixed if same else (*self.mixed, f"first {self.before}, then {self.after}")
+        return replace(self, proven=self.now, mixed=mixed)
+
+    @property
+    def before(self) -> str:
+        """What of `proven` is different now."""
+        return _lacking(self.proven, self.now)
+
+    @property
+    def after(self) -> str:
+        """What is different from `proven`."""
+        return _lacking(self.now, self.proven)
+
+
+def _lacking(these: str, those: str) -> str:
+    return ", ".join(each for each in these.split(", ") if each not in those.split(", ")) or "something unknown"

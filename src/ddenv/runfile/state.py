@@ -7,10 +7,9 @@ from itertools import islice
 from typing import Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.failures import Baseline, Place
+from ddenv.runfile.events import BaselineFinished, Forecast, Place
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.physics import Physics
-from ddenv.runfile.progress import Certificate, Decision, Forecast, Isolation, Leg, Node, Point, Refusal, Removal
+from ddenv.runfile.progress import Certificate, Decision, Isolation, Leg, Node, Physics, Point, Refusal, Removal
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]
@@ -65,7 +64,7 @@ class RunState:
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
     `refusal` is the last command that the engine could not obey, with the reason.
-    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `needs_room` is how many bytes
+    `tally` counts the tests by outcome. `needs_room` is how many bytes
     have to be free on the disk before more tests start, 0 if there is room. `working_seconds` is the time that ended engines
     have worked, s; `started_at` (Unix time, s) is set while one works.
     """
@@ -92,13 +91,12 @@ class RunState:
     paused: bool = False
     needs_room: int = 0
     waiting_candidate: int | None = None
-    baseline: Baseline | None = None
+    baseline: BaselineFinished | None = None
     round: Round | None = None
     rounds_done: int = 0
     forecast: Forecast | None = None
     tests: PersistentTuple[Test] = field(default_factory=PersistentTuple)
     tally: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_TALLY, 0))
-    deflake_runs: int = 0
     confirming: bool = False
     history: tuple[Point, ...] = ()
     evidence_test: int | None = None
@@ -171,6 +169,11 @@ class RunState:
     def cut_tests(self) -> int:
         """How many tests were ended early."""
         return sum(test.cut for test in self.tests)
+
+    @property
+    def deflake_runs(self) -> int:
+        """How many finished tests were re-runs of candidates."""
+        return sum(test.is_deflake_run for test in self.tests)
 
     @property
     def budget(self) -> int | None:

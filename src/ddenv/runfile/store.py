@@ -17,7 +17,7 @@ import time
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +68,12 @@ class Recorded:
         """The name of its kind in the file."""
         return NAMES[type(self.event)]
 
+    @property
+    def data(self) -> dict[str, Any]:
+        """What the file says of it, as JSON."""
+        fields: dict[str, Any] = plain(self.event)
+        return fields if self.command is None else fields | {"command": self.command}
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
@@ -107,8 +113,7 @@ def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
         connection.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;")
         connection.executescript(_SCHEMA)
         connection.executemany("INSERT INTO document VALUES (?, ?)", documents.items())
-        first = (time.time(), "created", json.dumps(plain(created), allow_nan=False))
-        connection.execute("INSERT INTO event (time, kind, data) VALUES (?, ?, ?)", first)
+        _insert(connection, "event", "created", plain(created), time.time())
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         connection.close()
@@ -265,8 +270,11 @@ class RunFile:
 
     def motions(self, test: int) -> dict[str, array[float]]:
         """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
-        rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (self._made(test),))
-        return {model: _floats(samples, self.path) for model, samples in rows}
+        return {model: _floats(samples, self.path) for model, samples in self.samples(self._made(test)).items()}
+
+    def samples(self, test: int) -> Motions:
+        """What the file has beside the end of a test, as it is there."""
+        return dict(self._all("SELECT model, samples FROM motion WHERE test = ?", (test,)))
 
     def _made(self, test: int) -> int:
         """The test that has the samples of `test`: itself, or the one that implies it."""
@@ -308,10 +316,10 @@ class RunFile:
                     raise
 
     def _append(self, event: Event, motions: Motions | None, command: int | None) -> Recorded:
-        data, at = plain(event) | ({} if command is None else {"command": command}), time.time()
+        new = Recorded(0, time.time(), event, command)
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
-            id = _insert(db, "event", NAMES[type(event)], data, at)
+            new = replace(new, id=_insert(db, "event", new.kind, new.data, new.time))
             if motions and isinstance(event, TestFinished | Implied):
                 rows = [(event.test, model, samples) for model, samples in motions.items()]
                 db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
@@ -319,7 +327,7 @@ class RunFile:
         if not self._logs:
             logs = [self.path.with_name(f"{self.path.name}{ending}") for ending in LOGS]
             self._logs = {log: _identity(log) for log in logs if log.exists()}
-        return Recorded(id, at, event, command)
+        return new
 
     def _take_log(self) -> None:
         """Merges the log into the file, wherever it is now, and removes it: SQLite would add it to another file of this name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.runfile.events import CandidateJudged, Implied, TestFinished, TestLost, TestStarted
+from ddenv.runfile.events import CandidateJudged, Implied, OfCandidate, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import CERTIFY, Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import stack_with
@@ -56,5 +56,4 @@ def pointed(moment: Moment) -> Candidate | None:
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         row = made_for(state, state.tests[event.test - 1])
         return row if isinstance(row, Candidate) else None
-    index = getattr(event, "candidate", None)
-    return None if index is None else state.round.candidates[index]
+    return state.round.candidates[event.candidate] if isinstance(event, OfCandidate) else None

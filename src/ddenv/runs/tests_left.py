@@ -74,12 +74,12 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     if forecast is None or baseline is None:
         return None
     done = state.tests_done - forecast.tests_done
-    if done >= forecast.high:
+    if done >= forecast.tests[-1]:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
     certificate = certificate_tests(rate, settings(state).keep_rate, left, baseline.runs, baseline.runs)
-    search = (max(0, each - done) for each in (forecast.low, forecast.likely, forecast.high))
+    search = (max(0, each - done) for each in forecast.tests)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
 

@@ -27,8 +27,7 @@ from ddenv.runfile.events import (
     Reduced,
     TestFinished,
 )
-from ddenv.runfile.failures import Baseline
-from ddenv.runfile.follow import steps
+from ddenv.runfile.fold import steps
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded, RunFile
@@ -92,7 +91,7 @@ class Found:
     certificate_seconds: float = 0.0
     version: str = ""
     simulator: str = ""
-    baseline: Baseline | None = None
+    baseline: BaselineFinished | None = None
     baseline_runs: int = 0
     whole_shown: int = 0
     whole_runs: int = 0

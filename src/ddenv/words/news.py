@@ -16,8 +16,7 @@ from ddenv.evidence.claims import (
     verdict_on,
 )
 from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
-from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.failures import Baseline
+from ddenv.runfile.events import DEEDS, BaselineFinished, deed
 from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
@@ -231,13 +230,13 @@ def baseline(state: RunState) -> str:
     )
 
 
-def failed_in(state: RunState, found: Baseline) -> str:
+def failed_in(state: RunState, found: BaselineFinished) -> str:
     """What the robot did in the f of the baseline; on a branch another failure is f."""
     known = 0 < found.failure_test <= len(state.tests)
     return deed(state.tests[found.failure_test - 1].failure if known else "")
 
 
-def other_failures(found: Baseline) -> str:
+def other_failures(found: BaselineFinished) -> str:
     """The failures of the baseline besides f, with their numbers; "" if there is none."""
     listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
     return f"other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""

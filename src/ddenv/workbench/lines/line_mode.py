@@ -13,7 +13,7 @@ from typing import TextIO
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import drift
-from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
+from ddenv.guiding.commands import Command, question, said, send, starts_engine
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.situation import Row, Situation
@@ -275,7 +275,7 @@ class LineMode:
     def _send(self, command: Command) -> None:
         now = self._situation
         try:
-            self._poll.file.send(command.kind, **data_of(command))
+            send(self._poll.file, command)
         except UserError as error:
             self._say(str(error))
             return

@@ -14,7 +14,7 @@ from typing import Any
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.guiding.commands import Command, data_of, question, refusal, said, starts_engine
+from ddenv.guiding.commands import Command, question, refusal, said, send, starts_engine
 from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
@@ -56,7 +56,7 @@ class Asking:
     def situation(self) -> Situation:
         """What the rules look at."""
         snapshot, last = self._poll.snapshot, self._last[1]
-        pending = last.kind if last is not None and self.waiting_for() else ""
+        pending = last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
         return Situation(snapshot.state, snapshot.engine, self.barred, pending)
 
     @property
@@ -184,7 +184,7 @@ class Asking:
     ) -> None:
         id, error = 0, ""
         try:
-            id = self._poll.file.send(command.kind, **data_of(command))
+            id = send(self._poll.file, command)
         except UserError as trouble:
             error = str(trouble)
         # The screen may be gone by now.

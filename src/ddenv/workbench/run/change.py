@@ -14,7 +14,6 @@ from textual.widgets import Button, Input, Select, Static
 
 from ddenv.errors import UserError
 from ddenv.guiding import course
-from ddenv.guiding.offers import change
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
@@ -95,7 +94,7 @@ class Change(ModalScreen[course.Change | None]):
             "algorithm": kinds["algorithm"],
             **{one.name: course.number(one.name, self.query_one(f"#{one.name}", Input).value) for one in NUMBERS},
         }
-        command = change(self._state, asked)
+        command = course.Change(course.Change(asked).new(self._state))
         if why := command.refusal(Situation(self._state)):
             raise UserError(why)
         return command

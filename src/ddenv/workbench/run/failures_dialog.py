@@ -17,8 +17,8 @@ from textual.widgets.option_list import Option
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.selections import AcceptOther
 from ddenv.guiding.situation import Situation
-from ddenv.runfile.atlas import OtherFailure, atlas
-from ddenv.runfile.failures import named
+from ddenv.runfile.events import named
+from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.state import RunState
 from ddenv.text import first_of, plain, shortened
 from ddenv.workbench.help.hints import Framed

@@ -13,8 +13,7 @@ from pathlib import Path
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
-from ddenv.runfile.fold import spent
-from ddenv.runfile.follow import Follower
+from ddenv.runfile.fold import Follower, spent
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
