@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ddenv.evidence.claims import current, rate
 from ddenv.page.blocks import Block, Picture, Section, Table, say
-from ddenv.report.report_map import CORNERS, two_ways
+from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import Record
 from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Reason, no_reasons, parting_sentence, sentence
@@ -60,7 +60,7 @@ def _passing(record: Record, found: Nearest, drawn: tuple[Drawn, ...]) -> list[B
             f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without, "
             f"seed {one.seed}."
         )
-        blocks.append(Picture("nearest", two_ways(there, drawn, ways, "nearest", found.gone), plain(words)))
+        blocks.append(Picture("nearest", picture(there, drawn, "nearest", ways, found.gone), plain(words)))
     rows = tuple(
         (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
         for each in found.instants
@@ -79,4 +79,4 @@ def _map(record: Record, drawn: tuple[Drawn, ...], reason: Reason, name: str) ->
     ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
     there = replace(record, kept=record.kept - frozenset(reason.gone))
     words = f"The world from above without {reason.without}: the robot's paths with it and without it, seed {one.seed}."
-    return Picture(name, two_ways(there, drawn, ways, name), plain(words))
+    return Picture(name, picture(there, drawn, name, ways), plain(words))
