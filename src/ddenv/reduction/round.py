@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 from ddenv.environment import Environment
 
-CANDIDATES = ("both", "partitions", "complements")
-COMPLEMENT_ORDERS = ("paper", "far-first")
-
 # Models by their numbers, in an order that the algorithm chose.
 Partition = tuple[int, ...]
 
