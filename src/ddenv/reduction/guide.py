@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -21,15 +22,8 @@ Rank = Callable[[Sequence[Partition]], list[float]]
 Chances = Callable[[Partition], Floats]
 Search = Generator[Round, Candidate | None, Environment]
 
-# The fields of the evidence in the words of `ddenv.reduce`.
-_ARGUMENTS = {
-    "positions": "positions",
-    "trajectory": "a trajectory",
-    "failure_position": "a failure_pose",
-    "first_sensed": "first_sensed",
-    "traits": "traits",
-    "touched": "touched",
-}
+# Fields of the evidence in the words of `ddenv.reduce`, where those are others.
+_ARGUMENTS = {"trajectory": "a trajectory", "failure_position": "a failure_pose"}
 
 
 @dataclass(frozen=True)
@@ -89,10 +83,8 @@ def guide_of(
     def split_now(environment: Partition, n: int) -> list[Partition]:
         known = evidence()
         names = _names(known, environment)
-        try:
+        with _told("partitioning", partitioning):
             partitions = [tuple(part) for part in split(names, n, known)]
-        except Lacking as lacking:
-            raise _complaint("partitioning", partitioning, lacking) from None
         models = [name for part in partitions for name in part]
         if not all(partitions) or len(models) != len(names) or set(models) != set(names):
             raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
@@ -101,10 +93,8 @@ def guide_of(
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
         known = evidence()
-        try:
+        with _told("prioritization", prioritization):
             scores = [float(score) for score in rank([_names(known, part) for part in partitions], known)]
-        except Lacking as lacking:
-            raise _complaint("prioritization", prioritization, lacking) from None
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
             raise UserError(
                 f"prioritization '{prioritization}': expected a score for each of {len(partitions)} partitions"
@@ -144,9 +134,12 @@ def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:
         raise UserError(f"{kind} '{name}': cannot be instantiated: {error}") from error
 
 
-def _complaint(kind: schemas.Kind, name: str, lacking: Lacking) -> UserError:
-    what = str(lacking)
-    others = [other for other in schemas.names(kind) if other != name]
-    return UserError(
-        f"{kind} '{name}' needs {_ARGUMENTS.get(what, what)}, which is missing; or use one of {', '.join(others)}"
-    )
+@contextmanager
+def _told(kind: schemas.Kind, name: str) -> Iterator[None]:
+    """Raises UserError where the schema of this name lacks evidence."""
+    try:
+        yield
+    except Lacking as lacking:
+        what = _ARGUMENTS.get(str(lacking), str(lacking))
+        others = ", ".join(other for other in schemas.names(kind) if other != name)
+        raise UserError(f"{kind} '{name}' needs {what}, which is missing; or use one of {others}") from None
