@@ -78,19 +78,18 @@ class Setting:
 
     @property
     def range(self) -> str:
-        """The allowed numbers, in words."""
-        if self.least is not None:
-            return f"{self.least:g} or more" if self.most is None else f"{self.least:g} to {number_text(self.most)}"
-        above = "any number" if self.above is None else f"more than {self.above:g}"
-        return above if self.most is None else f"{above}, at most {self.most:g}"
+        """The allowed numbers, in words; "" if it is no number."""
+        if self.above is not None:
+            return f"more than {self.above:g}, at most {self.most:g}"
+        if self.least is None:
+            return ""
+        return f"{self.least:g} or more" if self.most is None else f"{self.least:g} to {number_text(self.most)}"
 
     @property
     def wanted(self) -> str:
         """What kind of number it is, and the allowed ones, in words."""
         kind = "a whole number" if self.kind is int else "a number"
-        if self.least is not None and self.most is not None:
-            return f"{kind} from {self.range}"
-        return kind if self.range == "any number" else f"{kind}, {self.range}"
+        return f"{kind} from {self.range}" if " to " in self.range else f"{kind}, {self.range}"
 
     def words(self, value: Value) -> list[str]:
         """The option with `value`, as typed on the command line."""

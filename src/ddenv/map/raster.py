@@ -133,13 +133,12 @@ class Outlines:
 class Spans:
     """Runs of pixels in a grid in row-major order: `lengths[i]` pixels from `starts[i]` on belong to `models[i]`.
 
-    They are sorted by model; there are `count` models.
+    They are sorted by model.
     """
 
     models: np.ndarray
     starts: np.ndarray
     lengths: np.ndarray
-    count: int
 
 
 def pack(prints: Sequence[Footprint]) -> Outlines:
@@ -177,7 +176,7 @@ def spans(outlines: Outlines, view: View) -> Spans:
     starts = np.concatenate([row * width + left, dots[:, 1] * width + dots[:, 0]])
     lengths = np.concatenate([right - left + 1, np.ones(len(dots), dtype=np.intp)])
     order = np.argsort(models, kind="stable")
-    return Spans(models[order], starts[order], lengths[order], len(outlines.areas))
+    return Spans(models[order], starts[order], lengths[order])
 
 
 def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
@@ -189,11 +188,11 @@ def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
     with np.errstate(invalid="ignore", over="ignore"):
         low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
         extent = high - low
-        # Twice the area of each polygon, by the cross products of its edges.
+        # By the cross products of the edges.
         following = np.arange(1, len(corners) + 1)
         following[last] = first
-        ahead = corners[following] - low[np.repeat(np.arange(len(first)), outlines.counts)]
-        here = corners - low[np.repeat(np.arange(len(first)), outlines.counts)]
+        here = corners - np.repeat(low, outlines.counts, axis=0)
+        ahead = here[following]
         area = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
         length = np.hypot(extent[:, 0], extent[:, 1])
         thin = np.isfinite(length) & (length > SHORT) & (area < length) & (outlines.counts > 2)
@@ -203,8 +202,7 @@ def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
         return nothing
     ends, which = _in_view(_ends(corners, outlines, which, extent), which, view)
     steps = np.ceil(2 * np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)).astype(np.intp) + 2
-    part = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
-    along = (part / np.repeat(steps - 1, steps))[:, None]
+    along = (_within(steps) / np.repeat(steps - 1, steps))[:, None]
     begin, end = np.repeat(ends[:, 0], steps, axis=0), np.repeat(ends[:, 1], steps, axis=0)
     dots = np.floor(begin * (1 - along) + end * along)
     seen = ((dots >= 0) & (dots < (view.columns, 2 * view.rows))).all(axis=1)
@@ -252,7 +250,7 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
     seen = np.flatnonzero((low < high).all(axis=1))
     heights = (high - low)[seen, 1]
     polygon = np.repeat(seen, heights)
-    row = low[polygon, 1] + np.arange(len(polygon)) - np.repeat(np.cumsum(heights) - heights, heights)
+    row = low[polygon, 1] + _within(heights)
     left, right = low[polygon, 0].astype(float), high[polygon, 0] - 1.0
     for edge in range(int(outlines.counts[seen].max(initial=0))):
         _cut(corners, outlines, edge, polygon, row + 0.5, left, right)
@@ -287,25 +285,28 @@ def _cut(
     right[some[flat & (lean > 0)]] = -1.0
 
 
-def owners(filled: Spans, view: View, drawn: Iterable[int] | None = None) -> np.ndarray:
+def owners(filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
     """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all) that fill it, else EMPTY."""
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
     models, starts, lengths = filled.models, filled.starts, filled.lengths
     if drawn is not None:
-        wanted = np.zeros(filled.count, dtype=bool)
-        wanted[list(drawn) if not isinstance(drawn, np.ndarray) else drawn] = True
-        some = wanted[models]
+        some = np.isin(models, drawn)
         models, starts, lengths = models[some], starts[some], lengths[some]
     ends = np.cumsum(lengths)
     # Large overlapping models have many pixels: paint a limited number at a time.
     cuts = np.searchsorted(ends, np.arange(0, ends[-1] if len(ends) else 0, MOST_PIXELS))
     for start, stop in pairwise([*np.unique(cuts).tolist(), len(ends)]):
         part = slice(start, stop)
-        first = ends[part] - lengths[part]
-        pixels = np.arange(first[0], ends[stop - 1]) + np.repeat(starts[part] - first, lengths[part])
+        pixels = _within(lengths[part]) + np.repeat(starts[part], lengths[part])
         # The last of several values for one pixel is kept.
         grid[pixels] = np.repeat(models[part], lengths[part])
     return grid.reshape(2 * view.rows, view.columns)
+
+
+def _within(counts: np.ndarray) -> np.ndarray:
+    """0, 1, ... up to each of `counts` in turn."""
+    numbers: np.ndarray = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return numbers
 
 
 def label_cells(grid: np.ndarray, centers: np.ndarray) -> np.ndarray:
@@ -356,19 +357,12 @@ def _dense(dots: np.ndarray) -> np.ndarray:
     """The integer dots along a polyline, without gaps."""
     # Points far outside are invisible, and would only make the line long.
     dots = np.clip(dots, -4000, 4000)
-    steps = np.abs(np.diff(dots, axis=0)).max(axis=1) if len(dots) > 1 else np.zeros(0)
+    steps = np.abs(np.diff(dots, axis=0)).max(axis=1)
     counts = np.maximum(1, np.ceil(steps).astype(int))
-    if not len(counts):
-        return _floored(dots)
     start = np.repeat(np.arange(len(counts)), counts)
-    along = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    part = (along / np.repeat(counts, counts))[:, None]
+    part = (_within(counts) / np.repeat(counts, counts))[:, None]
     line = dots[start] * (1 - part) + dots[start + 1] * part
-    return _floored(np.vstack([line, dots[-1:]]))
-
-
-def _floored(dots: np.ndarray) -> np.ndarray:
-    whole: np.ndarray = np.floor(dots).astype(int)
+    whole: np.ndarray = np.floor(np.vstack([line, dots[-1:]])).astype(int)
     return whole
 
 
