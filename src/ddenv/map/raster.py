@@ -181,9 +181,6 @@ def spans(outlines: Outlines, view: View) -> Spans:
 
 def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Pixels along polygons that are thinner than one, which would have gaps or vanish: their models, and (column, row) of each."""
-    nothing = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    if not len(outlines.first):
-        return nothing
     corners, first, last = view.pixels(outlines.corners), outlines.first, outlines.first + outlines.counts - 1
     with np.errstate(invalid="ignore", over="ignore"):
         low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
@@ -198,8 +195,6 @@ def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
         thin = np.isfinite(length) & (length > SHORT) & (area < length) & (outlines.counts > 2)
         thin &= (high >= 0).all(axis=1) & (low < (view.columns, 2 * view.rows)).all(axis=1)
     which = np.flatnonzero(thin)
-    if not len(which):
-        return nothing
     ends, which = _in_view(_ends(corners, outlines, which, extent), which, view)
     steps = np.ceil(2 * np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)).astype(np.intp) + 2
     along = (_within(steps) / np.repeat(steps - 1, steps))[:, None]
@@ -239,8 +234,6 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
 
     A pixel belongs to a polygon if its centre is inside.
     """
-    if not len(outlines.first):
-        return (np.zeros(0, dtype=np.intp),) * 4
     with np.errstate(invalid="ignore"):
         low = np.floor(np.minimum.reduceat(corners, outlines.first))
         high = np.ceil(np.maximum.reduceat(corners, outlines.first))
@@ -252,37 +245,23 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
     polygon = np.repeat(seen, heights)
     row = low[polygon, 1] + _within(heights)
     left, right = low[polygon, 0].astype(float), high[polygon, 0] - 1.0
+    # Each edge in turn narrows the rows to its inner side.
     for edge in range(int(outlines.counts[seen].max(initial=0))):
-        _cut(corners, outlines, edge, polygon, row + 0.5, left, right)
+        some = np.flatnonzero(outlines.counts[polygon] > edge)
+        start, count = outlines.first[polygon[some]], outlines.counts[polygon[some]]
+        ax, ay = corners[start + edge].T
+        bx, by = corners[start + (edge + 1) % count].T
+        # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
+        dx, dy = bx - ax, by - ay
+        lean = dx * (row[some] + 0.5 - ay) - SLACK
+        up, down, flat = dy > 0, dy < 0, dy == 0
+        with np.errstate(over="ignore"):
+            at = ax + lean / np.where(flat, 1.0, dy) - 0.5
+        left[some[up]] = np.maximum(left[some[up]], np.ceil(at[up]))
+        right[some[down]] = np.minimum(right[some[down]], np.floor(at[down]))
+        right[some[flat & (lean > 0)]] = -1.0
     filled = left <= right
     return polygon[filled], row[filled], left[filled].astype(np.intp), right[filled].astype(np.intp)
-
-
-def _cut(
-    corners: np.ndarray,
-    outlines: Outlines,
-    edge: int,
-    polygon: np.ndarray,
-    ys: np.ndarray,
-    left: np.ndarray,
-    right: np.ndarray,
-) -> None:
-    """Narrows `left` and `right` of all rows (at `ys`) to the inner side of edge number `edge` of their polygons."""
-    some = np.flatnonzero(outlines.counts[polygon] > edge)
-    own = polygon[some]
-    start = outlines.first[own]
-    ax, ay = corners[start + edge].T
-    bx, by = corners[start + (edge + 1) % outlines.counts[own]].T
-    # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
-    dx, dy = bx - ax, by - ay
-    lean = dx * (ys[some] - ay) - SLACK
-    flat = dy == 0
-    with np.errstate(over="ignore"):
-        at = ax + lean / np.where(flat, 1.0, dy) - 0.5
-    up, down = dy > 0, dy < 0
-    left[some[up]] = np.maximum(left[some[up]], np.ceil(at[up]))
-    right[some[down]] = np.minimum(right[some[down]], np.floor(at[down]))
-    right[some[flat & (lean > 0)]] = -1.0
 
 
 def owners(filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
