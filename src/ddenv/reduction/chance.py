@@ -32,11 +32,6 @@ def sigmoid(logits: Floats) -> Floats:
     return np.clip(1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0))), LEAST, MOST)
 
 
-def uniform_prior(environment: Names) -> Floats:
-    """The same probability for each model, shape (len(environment),)."""
-    return np.full(len(environment), UNIFORM)
-
-
 def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
     """A probability that falls with the rank of a model's distance to the failure, as 1 / rank; shape (len(environment),).
 

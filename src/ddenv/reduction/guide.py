@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from ddenv import schemas
 from ddenv.arrays import Floats
 from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.reduction.chance import spatial_prior, uniform_prior
+from ddenv.reduction.chance import UNIFORM, spatial_prior
 from ddenv.reduction.evidence import Evidence, Lacking, Names
 from ddenv.reduction.round import Candidate, Partition, Round
 
@@ -105,7 +107,7 @@ def guide_of(
         known = evidence()
         names = _names(known, environment)
         if prior == "uniform" or known.positions is None or known.failure_position is None:
-            return uniform_prior(names)
+            return np.full(len(names), UNIFORM)
         return spatial_prior(names, known)
 
     return Guide(split_now, rank_now, chances_now, **more)
