@@ -6,7 +6,6 @@ new setting is one line in a class below. Nothing heavy is imported: the command
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -104,12 +103,10 @@ class Setting:
             return bool(self.none)
         if self.kind in (bool, str) or isinstance(value, bool):
             return isinstance(value, self.kind) and (not self.choices or value in self.choices)
-        if not isinstance(value, int if self.kind is int else (int, float)) or (
-            isinstance(value, float) and not math.isfinite(value)
-        ):
+        if not isinstance(value, int if self.kind is int else (int, float)):
             return False
-        below = (self.least is not None and value < self.least) or (self.above is not None and value <= self.above)
-        return not below and (self.most is None or value <= self.most)
+        high = self.most is None or value <= self.most
+        return high and (value > self.above if self.above is not None else self.least is None or value >= self.least)
 
 
 def number_text(value: Value) -> str:
