@@ -26,9 +26,23 @@ class Said:
 
 def ddenv(*words: object, **options) -> Said:
     """A process of its own. `options` are those of `subprocess.run`."""
-    done = subprocess.run(
-        [*DDENV, *map(str, words)], capture_output=True, timeout=PATIENCE, stdin=subprocess.DEVNULL, **options
-    )
+    return _said([*DDENV, *map(str, words)], **options)
+
+
+def python(code: str) -> Said:
+    """A new Python that does nothing but this."""
+    return _said([sys.executable, "-c", code])
+
+
+def loaded(code: str, *modules: str) -> list[str]:
+    """Those of `modules` that a new Python has imported after this."""
+    done = python(f"import sys\n{code}\nprint(*(name for name in {modules} if name in sys.modules))")
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1].split()
+
+
+def _said(words: list[str], **options) -> Said:
+    done = subprocess.run(words, capture_output=True, timeout=PATIENCE, stdin=subprocess.DEVNULL, **options)
     return Said(done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace"))
 
 

@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 
 import pytest
 from rich.cells import cell_len
@@ -27,24 +27,7 @@ from tests.tiers import slow
 # A batch of runs is one test.
 SIZE = 5
 BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0])
-KEYS = (
-    "1",
-    "4",
-    "h",
-    "escape",
-    "e",
-    "escape",
-    "E",
-    "escape",
-    "W",
-    "down",
-    "enter",
-    "escape",
-    "escape",
-    "P",
-    "right",
-    "escape",
-)
+KEYS = ("1", "4", "h", "escape", "e", "escape", "E", "escape", "W", "down", "enter", "escape", "escape", "P", "right")
 
 
 @pytest.fixture(scope="module")
@@ -64,36 +47,43 @@ def hostile(scenes, home):
     return made
 
 
+@contextmanager
+def of_run(seed):
+    """What is damaged is said in a line; any other error is told with the number of the run."""
+    try:
+        yield
+    except UserError as error:
+        assert "\n" not in str(error)
+    except Exception as error:
+        raise AssertionError(f"run {seed}") from error
+
+
+def lines_are_whole(app, columns):
+    lines = ["".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()]
+    return all(cell_len(line) == columns for line in lines)
+
+
 @pytest.mark.parametrize("batch", BATCHES)
 def test_the_report_is_written_or_says_what_is_damaged(hostile, batch):
     for seed, path in hostile(batch):
-        try:
+        with of_run(seed):
             report = content(read_run(path))
-            assert html(report) and markdown(report, "report"), seed
-        except UserError as error:
-            assert "\n" not in str(error)
-        except Exception as error:
-            raise AssertionError(f"run {seed}") from error
+            assert html(report) and markdown(report, "report")
 
 
 @pytest.mark.parametrize("batch", BATCHES)
 def test_the_scene_is_drawn_or_says_what_is_damaged(hostile, batch):
     for seed, path in hostile(batch):
         sent = []
-        try:
-            with RunFile(path) as run, engine_lock(path):
-                player = Player(run, Stage(lambda message, _, to=sent: to.append(message)), lambda **_: None)
-                for now in (0.0, 0.5, 2.0, 9.0):
-                    player.tick(now)
-                assert sent, seed
-                assert json.dumps(player.pairs(), allow_nan=False)
-                for test in range(1, 4):
-                    with suppress(UserError):
-                        assert json.dumps(player.play(test), allow_nan=False) and player.drawings("way", test), seed
-        except UserError as error:
-            assert "\n" not in str(error)
-        except Exception as error:
-            raise AssertionError(f"run {seed}") from error
+        with of_run(seed), RunFile(path) as run, engine_lock(path):
+            player = Player(run, Stage(lambda message, _, to=sent: to.append(message)), lambda **_: None)
+            for now in (0.0, 0.5, 2.0, 9.0):
+                player.tick(now)
+            assert sent
+            assert json.dumps(player.pairs(), allow_nan=False)
+            for test in range(1, 4):
+                with suppress(UserError):
+                    assert json.dumps(player.play(test), allow_nan=False) and player.drawings("way", test)
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -109,10 +99,9 @@ async def test_the_workbench_stands(hostile, batch):
                     app.post_message(ShowRun(path, watch=bool(seed % 2)))
                     await pilot.pause()
                     await app.workers.wait_for_complete()
-                    await pilot.press(*KEYS)
-                    assert app.is_running, seed
-                    lines = ["".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()]
-                    assert all(cell_len(line) == size[0] for line in lines), seed
+                    await pilot.press(*KEYS, "escape")
+                    assert app.is_running
+                    assert lines_are_whole(app, size[0])
     except Exception as error:
         raise AssertionError(f"run {now}") from error
 
@@ -125,20 +114,17 @@ async def test_races_stand(hostile, batch):
         for seed, path in hostile(batch):
             copy = path.with_name(f"[b]{path.name}")
             shutil.copy(path, copy)
-            try:
+            race = None
+            with of_run(seed):
                 race = race_of_runs([path, copy])
-            except UserError as error:
-                assert "\n" not in str(error)
+            if race is None:
                 continue
-            except Exception as error:
-                raise AssertionError(f"run {seed}") from error
             app.push_screen(race)
             await pilot.pause()
             # The setup screen below replaces its workers while it reads.
             with suppress(WorkerCancelled):
                 await app.workers.wait_for_complete()
             await pilot.press("right", "end", "home")
-            lines = ["".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()]
-            assert all(cell_len(line) == size[0] for line in lines), seed
+            assert lines_are_whole(app, size[0]), seed
             await pilot.press("escape")
             assert app.is_running, seed

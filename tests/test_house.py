@@ -1,9 +1,8 @@
 """The house: what neither ruff nor the import contracts can see. `.ci/run` runs these."""
 
 import re
-import subprocess
-import sys
 
+from tests.command import loaded
 from tests.conftest import ROOT
 
 
@@ -13,18 +12,10 @@ def test_drake_is_never_imported_with_a_star():
 
 
 def test_views_start_without_drake_and_scikit_learn():
-    code = (
-        "import sys, ddenv.cli, ddenv.workbench.app, ddenv.scene.__main__, ddenv.cli.follow;"
-        "print([name for name in ('pydrake', 'sklearn') if name in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
+    views = "import ddenv.cli, ddenv.workbench.app, ddenv.scene.__main__, ddenv.cli.follow"
+    assert loaded(views, "pydrake", "sklearn") == []
 
 
 def test_the_first_paint_of_a_run_waits_for_no_slow_import():
-    code = (
-        "import sys, ddenv.workbench.launch, ddenv.workbench.run.run_screen;"
-        "print([name for name in ('numpy', 'pydantic', 'yaml') if name in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
+    first = "import ddenv.workbench.launch, ddenv.workbench.run.run_screen"
+    assert loaded(first, "numpy", "pydantic", "yaml") == []

@@ -1,14 +1,12 @@
 """The registry: every schema and algorithm by name, ours and other packages'."""
 
-import subprocess
-import sys
-
 import pytest
 
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.runs.tests_left import SCALE
 from ddenv.workbench.run.methods import LISTINGS, SMALLER
+from tests.command import loaded, python
 
 KINDS = ("partitioning", "prioritization", "algorithm")
 EVERY = [(kind, name) for kind in KINDS for name in schemas.names(kind)]
@@ -47,14 +45,9 @@ def test_each_can_be_loaded_and_explains_itself_in_a_paragraph(kind, name):
 
 
 def test_explaining_imports_nothing_numerical():
-    code = (
-        "import sys; from ddenv import schemas\n"
-        "assert all(schemas.explanation(kind, name) for kind in ('partitioning', 'prioritization', 'algorithm')"
-        " for name in schemas.names(kind))\n"
-        "print([name for name in ('numpy', 'sklearn', 'scipy') if name in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
+    every = "schemas.explanation(kind, name) for kind in schemas.OURS for name in schemas.names(kind)"
+    code = f"from ddenv import schemas\nassert all({every})"
+    assert loaded(code, "numpy", "sklearn", "scipy") == []
 
 
 def test_an_unknown_name_is_told_with_the_nearest():
@@ -144,11 +137,7 @@ def plugin(tmp_path):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-robotics-lab\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(ENTRY_POINTS)
 
-    def python(code):
-        words = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{code}"]
-        return subprocess.run(words, capture_output=True, text=True)
-
-    return python
+    return lambda code: python(f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{code}")
 
 
 @pytest.mark.programs

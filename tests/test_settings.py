@@ -1,8 +1,6 @@
 """Each setting is declared once, and is everywhere it belongs."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 import yaml
@@ -16,6 +14,7 @@ from ddenv.settings import CHANGEABLE, OPTIONS, PRINTED, SETTINGS, Failure, Redu
 from ddenv.workbench.setup import form
 from ddenv.world.load import load_scenario, validate
 from ddenv.world.scenario import Scenario
+from tests.command import loaded
 from tests.conftest import DATA
 
 EVERY = pytest.mark.parametrize("one", SETTINGS.values(), ids=SETTINGS.keys())
@@ -107,8 +106,7 @@ def test_what_may_change_on_the_way_is_in_the_dialog_and_nothing_else():
 
 
 def test_nothing_slow_is_imported_for_them():
-    code = "import sys, ddenv.settings; print([n for n in ('pydantic', 'numpy', 'click', 'yaml') if n in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+    assert loaded("import ddenv.settings", "pydantic", "numpy", "click", "yaml") == []
 
 
 # As printed.

@@ -12,6 +12,7 @@ import importlib.util
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -120,15 +121,13 @@ def explanation(kind: Kind, name: str) -> str:
 
 def _source(module: str) -> Path:
     """The file of a module, found without importing the packages around it, as Python would. Raises ImportError."""
-    top, *rest = module.split(".")
+    top, *inside = module.split(".")
     spec = importlib.util.find_spec(top)
+    for name in inside:
+        spec = PathFinder.find_spec(name, spec.submodule_search_locations or ()) if spec else None
     if spec is None or spec.origin is None:
         raise ImportError(module)
-    if not rest:
-        return Path(spec.origin)
-    places = [Path(folder, *rest) for folder in spec.submodule_search_locations or ()]
-    files = [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]
-    return next(file for file in files if file.is_file())
+    return Path(spec.origin)
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
@@ -139,23 +138,19 @@ def nearest(word: str, known: Sequence[str]) -> str:
 
 @cache
 def _installed() -> dict[str, list[EntryPoint]]:
-    """Ours of all packages, by their groups. They stand in many files, which are read once."""
+    """Those of all packages, by their kinds. They stand in many files, which are read once."""
     from importlib.metadata import entry_points
 
     found = entry_points()
-    return {group: list(found.select(group=group)) for group in map(_group, OURS)}
-
-
-def _group(kind: str) -> str:
-    return f"ddenv.{kind}s"
+    return {kind: list(found.select(group=f"ddenv.{kind}s")) for kind in OURS}
 
 
 @cache
 def _known(kind: Kind) -> dict[str, EntryPoint]:
     from importlib.metadata import EntryPoint
 
-    group = _group(kind)
+    group = f"ddenv.{kind}s"
     ours = {name: EntryPoint(name, value, group) for name, value in OURS[kind].items()}
     # A name with a slash would look like a pair.
-    others = {each.name: each for each in _installed()[group] if each.name not in ours and "/" not in each.name}
+    others = {each.name: each for each in _installed()[kind] if each.name not in ours and "/" not in each.name}
     return ours | others

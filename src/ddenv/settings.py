@@ -6,7 +6,6 @@ new setting is one line in a class below. Nothing heavy is imported: the command
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -78,19 +77,18 @@ class Setting:
 
     @property
     def range(self) -> str:
-        """The allowed numbers, in words."""
-        if self.least is not None:
-            return f"{self.least:g} or more" if self.most is None else f"{self.least:g} to {number_text(self.most)}"
-        above = "any number" if self.above is None else f"more than {self.above:g}"
-        return above if self.most is None else f"{above}, at most {self.most:g}"
+        """The allowed numbers, in words; "" if it is no number."""
+        if self.above is not None:
+            return f"more than {self.above:g}, at most {self.most:g}"
+        if self.least is None:
+            return ""
+        return f"{self.least:g} or more" if self.most is None else f"{self.least:g} to {number_text(self.most)}"
 
     @property
     def wanted(self) -> str:
         """What kind of number it is, and the allowed ones, in words."""
         kind = "a whole number" if self.kind is int else "a number"
-        if self.least is not None and self.most is not None:
-            return f"{kind} from {self.range}"
-        return kind if self.range == "any number" else f"{kind}, {self.range}"
+        return f"{kind} from {self.range}" if " to " in self.range else f"{kind}, {self.range}"
 
     def words(self, value: Value) -> list[str]:
         """The option with `value`, as typed on the command line."""
@@ -105,12 +103,10 @@ class Setting:
             return bool(self.none)
         if self.kind in (bool, str) or isinstance(value, bool):
             return isinstance(value, self.kind) and (not self.choices or value in self.choices)
-        if not isinstance(value, int if self.kind is int else (int, float)) or (
-            isinstance(value, float) and not math.isfinite(value)
-        ):
+        if not isinstance(value, int if self.kind is int else (int, float)):
             return False
-        below = (self.least is not None and value < self.least) or (self.above is not None and value <= self.above)
-        return not below and (self.most is None or value <= self.most)
+        high = self.most is None or value <= self.most
+        return high and (value > self.above if self.above is not None else self.least is None or value >= self.least)
 
 
 def number_text(value: Value) -> str:

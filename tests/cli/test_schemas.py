@@ -50,7 +50,7 @@ def test_those_of_other_packages_are_listed_and_cannot_steer_the_terminal(tmp_pa
     monkeypatch.syspath_prepend(tmp_path)
     entry = EntryPoint("halves", "theirs:halves", "ddenv.partitionings")
     gone = EntryPoint("gone", "nowhere.at_all:gone", "ddenv.partitionings")
-    monkeypatch.setattr(schemas, "_installed", lambda: defaultdict(list, {"ddenv.partitionings": [entry, gone]}))
+    monkeypatch.setattr(schemas, "_installed", lambda: defaultdict(list, {"partitioning": [entry, gone]}))
     schemas._known.cache_clear()
     schemas.explanation.cache_clear()
     told = "\n".join(lines())

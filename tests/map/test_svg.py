@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from ddenv.map.labels import place_labels, spot
+from ddenv.map.drawing import place_labels, spot
 from ddenv.map.svg import MOST_LABELS, svg_map
 from tests.map.worlds import GROUND, box, world_of
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ddenv.map.cells import FAINT, picture, signs
 from ddenv.map.colors import PLAIN
+from ddenv.map.drawing import tick_step, tick_text, ticks
 from ddenv.map.footprints import Drawn, plan
-from ddenv.map.frame import tick_step, tick_text, ticks
 from ddenv.map.paint import Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
 from ddenv.text import count, padded, shortened, width

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -49,10 +50,7 @@ class Canvas:
         self.bold = np.zeros((rows, columns), dtype=bool)
 
     def copy(self) -> Canvas:
-        twin = object.__new__(Canvas)
-        twin.chars, twin.fore = self.chars.copy(), self.fore.copy()
-        twin.back, twin.bold = self.back.copy(), self.bold.copy()
-        return twin
+        return deepcopy(self)
 
     def put(self, cell: tuple[int, int] | None, text: str, color: int | None = None, back: int | None = None) -> None:
         """Puts bold `text` from a cell (row, column) on; without `color` in a readable one."""

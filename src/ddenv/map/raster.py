@@ -133,13 +133,12 @@ class Outlines:
 class Spans:
     """Runs of pixels in a grid in row-major order: `lengths[i]` pixels from `starts[i]` on belong to `models[i]`.
 
-    They are sorted by model; there are `count` models.
+    They are sorted by model.
     """
 
     models: np.ndarray
     starts: np.ndarray
     lengths: np.ndarray
-    count: int
 
 
 def pack(prints: Sequence[Footprint]) -> Outlines:
@@ -177,34 +176,28 @@ def spans(outlines: Outlines, view: View) -> Spans:
     starts = np.concatenate([row * width + left, dots[:, 1] * width + dots[:, 0]])
     lengths = np.concatenate([right - left + 1, np.ones(len(dots), dtype=np.intp)])
     order = np.argsort(models, kind="stable")
-    return Spans(models[order], starts[order], lengths[order], len(outlines.areas))
+    return Spans(models[order], starts[order], lengths[order])
 
 
 def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Pixels along polygons that are thinner than one, which would have gaps or vanish: their models, and (column, row) of each."""
-    nothing = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    if not len(outlines.first):
-        return nothing
     corners, first, last = view.pixels(outlines.corners), outlines.first, outlines.first + outlines.counts - 1
     with np.errstate(invalid="ignore", over="ignore"):
         low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
         extent = high - low
-        # Twice the area of each polygon, by the cross products of its edges.
+        # By the cross products of the edges.
         following = np.arange(1, len(corners) + 1)
         following[last] = first
-        ahead = corners[following] - low[np.repeat(np.arange(len(first)), outlines.counts)]
-        here = corners - low[np.repeat(np.arange(len(first)), outlines.counts)]
+        here = corners - np.repeat(low, outlines.counts, axis=0)
+        ahead = here[following]
         area = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
         length = np.hypot(extent[:, 0], extent[:, 1])
         thin = np.isfinite(length) & (length > SHORT) & (area < length) & (outlines.counts > 2)
         thin &= (high >= 0).all(axis=1) & (low < (view.columns, 2 * view.rows)).all(axis=1)
     which = np.flatnonzero(thin)
-    if not len(which):
-        return nothing
     ends, which = _in_view(_ends(corners, outlines, which, extent), which, view)
     steps = np.ceil(2 * np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)).astype(np.intp) + 2
-    part = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
-    along = (part / np.repeat(steps - 1, steps))[:, None]
+    along = (_within(steps) / np.repeat(steps - 1, steps))[:, None]
     begin, end = np.repeat(ends[:, 0], steps, axis=0), np.repeat(ends[:, 1], steps, axis=0)
     dots = np.floor(begin * (1 - along) + end * along)
     seen = ((dots >= 0) & (dots < (view.columns, 2 * view.rows))).all(axis=1)
@@ -241,8 +234,6 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
 
     A pixel belongs to a polygon if its centre is inside.
     """
-    if not len(outlines.first):
-        return (np.zeros(0, dtype=np.intp),) * 4
     with np.errstate(invalid="ignore"):
         low = np.floor(np.minimum.reduceat(corners, outlines.first))
         high = np.ceil(np.maximum.reduceat(corners, outlines.first))
@@ -252,60 +243,49 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
     seen = np.flatnonzero((low < high).all(axis=1))
     heights = (high - low)[seen, 1]
     polygon = np.repeat(seen, heights)
-    row = low[polygon, 1] + np.arange(len(polygon)) - np.repeat(np.cumsum(heights) - heights, heights)
+    row = low[polygon, 1] + _within(heights)
     left, right = low[polygon, 0].astype(float), high[polygon, 0] - 1.0
+    # Each edge in turn narrows the rows to its inner side.
     for edge in range(int(outlines.counts[seen].max(initial=0))):
-        _cut(corners, outlines, edge, polygon, row + 0.5, left, right)
+        some = np.flatnonzero(outlines.counts[polygon] > edge)
+        start, count = outlines.first[polygon[some]], outlines.counts[polygon[some]]
+        ax, ay = corners[start + edge].T
+        bx, by = corners[start + (edge + 1) % count].T
+        # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
+        dx, dy = bx - ax, by - ay
+        lean = dx * (row[some] + 0.5 - ay) - SLACK
+        up, down, flat = dy > 0, dy < 0, dy == 0
+        with np.errstate(over="ignore"):
+            at = ax + lean / np.where(flat, 1.0, dy) - 0.5
+        left[some[up]] = np.maximum(left[some[up]], np.ceil(at[up]))
+        right[some[down]] = np.minimum(right[some[down]], np.floor(at[down]))
+        right[some[flat & (lean > 0)]] = -1.0
     filled = left <= right
     return polygon[filled], row[filled], left[filled].astype(np.intp), right[filled].astype(np.intp)
 
 
-def _cut(
-    corners: np.ndarray,
-    outlines: Outlines,
-    edge: int,
-    polygon: np.ndarray,
-    ys: np.ndarray,
-    left: np.ndarray,
-    right: np.ndarray,
-) -> None:
-    """Narrows `left` and `right` of all rows (at `ys`) to the inner side of edge number `edge` of their polygons."""
-    some = np.flatnonzero(outlines.counts[polygon] > edge)
-    own = polygon[some]
-    start = outlines.first[own]
-    ax, ay = corners[start + edge].T
-    bx, by = corners[start + (edge + 1) % outlines.counts[own]].T
-    # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
-    dx, dy = bx - ax, by - ay
-    lean = dx * (ys[some] - ay) - SLACK
-    flat = dy == 0
-    with np.errstate(over="ignore"):
-        at = ax + lean / np.where(flat, 1.0, dy) - 0.5
-    up, down = dy > 0, dy < 0
-    left[some[up]] = np.maximum(left[some[up]], np.ceil(at[up]))
-    right[some[down]] = np.minimum(right[some[down]], np.floor(at[down]))
-    right[some[flat & (lean > 0)]] = -1.0
-
-
-def owners(filled: Spans, view: View, drawn: Iterable[int] | None = None) -> np.ndarray:
+def owners(filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
     """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all) that fill it, else EMPTY."""
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
     models, starts, lengths = filled.models, filled.starts, filled.lengths
     if drawn is not None:
-        wanted = np.zeros(filled.count, dtype=bool)
-        wanted[list(drawn) if not isinstance(drawn, np.ndarray) else drawn] = True
-        some = wanted[models]
+        some = np.isin(models, drawn)
         models, starts, lengths = models[some], starts[some], lengths[some]
     ends = np.cumsum(lengths)
     # Large overlapping models have many pixels: paint a limited number at a time.
     cuts = np.searchsorted(ends, np.arange(0, ends[-1] if len(ends) else 0, MOST_PIXELS))
     for start, stop in pairwise([*np.unique(cuts).tolist(), len(ends)]):
         part = slice(start, stop)
-        first = ends[part] - lengths[part]
-        pixels = np.arange(first[0], ends[stop - 1]) + np.repeat(starts[part] - first, lengths[part])
+        pixels = _within(lengths[part]) + np.repeat(starts[part], lengths[part])
         # The last of several values for one pixel is kept.
         grid[pixels] = np.repeat(models[part], lengths[part])
     return grid.reshape(2 * view.rows, view.columns)
+
+
+def _within(counts: np.ndarray) -> np.ndarray:
+    """0, 1, ... up to each of `counts` in turn."""
+    numbers: np.ndarray = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return numbers
 
 
 def label_cells(grid: np.ndarray, centers: np.ndarray) -> np.ndarray:
@@ -356,19 +336,12 @@ def _dense(dots: np.ndarray) -> np.ndarray:
     """The integer dots along a polyline, without gaps."""
     # Points far outside are invisible, and would only make the line long.
     dots = np.clip(dots, -4000, 4000)
-    steps = np.abs(np.diff(dots, axis=0)).max(axis=1) if len(dots) > 1 else np.zeros(0)
+    steps = np.abs(np.diff(dots, axis=0)).max(axis=1)
     counts = np.maximum(1, np.ceil(steps).astype(int))
-    if not len(counts):
-        return _floored(dots)
     start = np.repeat(np.arange(len(counts)), counts)
-    along = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    part = (along / np.repeat(counts, counts))[:, None]
+    part = (_within(counts) / np.repeat(counts, counts))[:, None]
     line = dots[start] * (1 - part) + dots[start + 1] * part
-    return _floored(np.vstack([line, dots[-1:]]))
-
-
-def _floored(dots: np.ndarray) -> np.ndarray:
-    whole: np.ndarray = np.floor(dots).astype(int)
+    whole: np.ndarray = np.floor(np.vstack([line, dots[-1:]])).astype(int)
     return whole
 
 

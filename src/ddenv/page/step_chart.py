@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from ddenv.map.frame import tick_step, tick_text, ticks
+from ddenv.map.drawing import tick_step, tick_text, ticks
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import RunState
 from ddenv.text import count

@@ -16,15 +16,7 @@ from ddenv.arrays import Floats
 from ddenv.environment import Environment
 from ddenv.reduction.chance import LEAST
 from ddenv.reduction.guide import Guide, Search
-from ddenv.reduction.round import (
-    Candidate,
-    Partition,
-    Round,
-    left_out,
-    make_round,
-    one_model_partitions,
-    round_of,
-)
+from ddenv.reduction.round import Candidate, Partition, Round, in_order, left_out, make_round, one_model_partitions
 
 # A model is taken to be needed once the probability that it is not is below this; it is tried again at the end.
 DOUBT = 0.25
@@ -132,7 +124,7 @@ def by_chunks(elements: Partition) -> Search:
     """`ddmin`, which asks nothing of a guide."""
     environment, partitions = elements, _cut(elements, 2)
     while environment:
-        winner = yield _round(environment, partitions)
+        winner = yield in_order(environment, partitions, "partition", "complement")
         if winner is None:
             if len(partitions) == len(environment):
                 break
@@ -154,14 +146,6 @@ def _cut(environment: Partition, n: int) -> list[Partition]:
     return [environment[size * part // n : size * (part + 1) // n] for part in range(n)]
 
 
-def _round(environment: Partition, partitions: list[Partition]) -> Round:
-    """All partitions first, then all complements."""
-    n = len(partitions)
-    ranked = [(partition, float(place)) for place, partition in enumerate(partitions)]
-    wanted = [(kind, place) for kind in ("partition", "complement") for place in range(n)]
-    return round_of(n, environment, ranked, wanted)
-
-
 def probdd(elements: Partition, guide: Guide) -> Search:
     """Probabilistic delta debugging. Each model has a probability of being needed, at first from its distance to the failure (or
     the same for all, with the scenario's key `reduction.prior: uniform`). Each test leaves out the group with the greatest expected
@@ -179,7 +163,7 @@ def probdd(elements: Partition, guide: Guide) -> Search:
         if winner is None:
             _raise_chances(group, chance)
         else:
-            environment = tuple(model for model in environment if model not in set(group))
+            environment = tuple(model for model in environment if model in winner.models)
     return (yield from sweep(tuple(sorted(environment, key=chance.__getitem__))))
 
 
@@ -231,7 +215,7 @@ def splitting(elements: Partition, guide: Guide) -> Search:
         if winner is None:
             misses[size] = runs if round.candidates else guide.runs()
             continue
-        environment = tuple(model for model in environment if model not in set(group))
+        environment = tuple(model for model in environment if model in winner.models)
         passed += sum(weight[model] for model in group)
         line, misses = line[size:], {more - size: count for more, count in misses.items() if more > size}
     return (yield from sweep(environment, guide.runs()))
@@ -267,8 +251,7 @@ def sweep(environment: Partition, runs: int | None = None) -> Search:
     """
     looks = None if runs is None else 1
     while environment:
-        ranked = [(part, float(place)) for place, part in enumerate(one_model_partitions(environment))]
-        round = round_of(len(environment), environment, ranked, [("complement", place) for place in range(len(ranked))])
+        round = in_order(environment, one_model_partitions(environment), "complement")
         winner = yield replace(round, runs=looks)
         if winner is not None:
             place = winner.partition

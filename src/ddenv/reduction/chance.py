@@ -21,9 +21,15 @@ DENSITY = 0.5
 SWEEPS = 12
 
 
-def uniform_prior(environment: Names) -> Floats:
-    """The same probability for each model, shape (len(environment),)."""
-    return np.full(len(environment), UNIFORM)
+def logit(chances: Floats) -> Floats:
+    """The log odds of probabilities."""
+    chances = np.clip(chances, LEAST, MOST)
+    return np.log(chances) - np.log1p(-chances)
+
+
+def sigmoid(logits: Floats) -> Floats:
+    """The probabilities of log odds."""
+    return np.clip(1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0))), LEAST, MOST)
 
 
 def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
@@ -53,17 +59,16 @@ def beliefs(prior: Floats, groups: Booleans, miss_chance: float = 0.0) -> Floats
     groups = groups[groups.any(axis=1)]
     if not len(groups):
         return prior
-    logit = np.log(prior) - np.log1p(-prior)
+    before = logit(prior)
     messages = np.zeros(groups.shape)
     for _ in range(SWEEPS):
         # The odds of each model without the message of the test that asks.
-        odds = np.clip(logit + messages.sum(axis=0) - messages, -30.0, 30.0)
+        odds = np.clip(before + messages.sum(axis=0) - messages, -30.0, 30.0)
         spared = np.where(groups, -np.logaddexp(0.0, odds), 0.0)
         others = np.exp(spared.sum(axis=1, keepdims=True) - spared)
         unexplained = 1.0 - others + others * miss_chance
         messages = (messages + np.where(groups, -np.log(np.clip(unexplained, LEAST, 1.0)), 0.0)) / 2.0
-    total = np.clip(logit + messages.sum(axis=0), -30.0, 30.0)
-    return np.asarray(np.clip(1.0 / (1.0 + np.exp(-total)), LEAST, MOST))
+    return sigmoid(before + messages.sum(axis=0))
 
 
 def undominated(groups: Booleans) -> Integers:

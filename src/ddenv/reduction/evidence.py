@@ -65,7 +65,7 @@ class Evidence:
     miss_chance: float = 0.0
     delta: float = 0.5
     seed: int = 0
-    _memory: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict, repr=False, compare=False)
+    _nearest: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False, compare=False)
 
     def need(self, what: str) -> Any:
         """The value of the field `what`. Raises Lacking if it is unknown."""
@@ -91,12 +91,11 @@ class Evidence:
 
         Computed once for the whole world: rounds ask for it again and again.
         """
-        if "nearest" not in self._memory:
+        if not self._nearest:
             times = self.need("trajectory")[:, 0]
             pairs = zip(*nearest_on_path(self.places(self.elements), times, self.path()), strict=True)
-            self._memory["nearest"] = dict(zip(self.elements, pairs, strict=True))
-        known = self._memory["nearest"]
-        return np.array([known[name] for name in models]).reshape(-1, 2)
+            self._nearest.update(zip(self.elements, pairs, strict=True))
+        return np.array([self._nearest[name] for name in models]).reshape(-1, 2)
 
     def path(self) -> Floats:
         """The robot's path, shape (N, 3), m. Raises Lacking."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from ddenv import schemas
 from ddenv.arrays import Floats
 from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.reduction.chance import spatial_prior, uniform_prior
+from ddenv.reduction.chance import UNIFORM, spatial_prior
 from ddenv.reduction.evidence import Evidence, Lacking, Names
 from ddenv.reduction.round import Candidate, Partition, Round
 
@@ -21,15 +24,8 @@ Rank = Callable[[Sequence[Partition]], list[float]]
 Chances = Callable[[Partition], Floats]
 Search = Generator[Round, Candidate | None, Environment]
 
-# The fields of the evidence in the words of `ddenv.reduce`.
-_ARGUMENTS = {
-    "positions": "positions",
-    "trajectory": "a trajectory",
-    "failure_position": "a failure_pose",
-    "first_sensed": "first_sensed",
-    "traits": "traits",
-    "touched": "touched",
-}
+# Fields of the evidence in the words of `ddenv.reduce`, where those are others.
+_ARGUMENTS = {"trajectory": "a trajectory", "failure_position": "a failure_pose"}
 
 
 @dataclass(frozen=True)
@@ -89,10 +85,8 @@ def guide_of(
     def split_now(environment: Partition, n: int) -> list[Partition]:
         known = evidence()
         names = _names(known, environment)
-        try:
+        with _told("partitioning", partitioning):
             partitions = [tuple(part) for part in split(names, n, known)]
-        except Lacking as lacking:
-            raise _complaint("partitioning", partitioning, lacking) from None
         models = [name for part in partitions for name in part]
         if not all(partitions) or len(models) != len(names) or set(models) != set(names):
             raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
@@ -101,10 +95,8 @@ def guide_of(
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
         known = evidence()
-        try:
+        with _told("prioritization", prioritization):
             scores = [float(score) for score in rank([_names(known, part) for part in partitions], known)]
-        except Lacking as lacking:
-            raise _complaint("prioritization", prioritization, lacking) from None
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
             raise UserError(
                 f"prioritization '{prioritization}': expected a score for each of {len(partitions)} partitions"
@@ -115,7 +107,7 @@ def guide_of(
         known = evidence()
         names = _names(known, environment)
         if prior == "uniform" or known.positions is None or known.failure_position is None:
-            return uniform_prior(names)
+            return np.full(len(names), UNIFORM)
         return spatial_prior(names, known)
 
     return Guide(split_now, rank_now, chances_now, **more)
@@ -144,9 +136,12 @@ def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:
         raise UserError(f"{kind} '{name}': cannot be instantiated: {error}") from error
 
 
-def _complaint(kind: schemas.Kind, name: str, lacking: Lacking) -> UserError:
-    what = str(lacking)
-    others = [other for other in schemas.names(kind) if other != name]
-    return UserError(
-        f"{kind} '{name}' needs {_ARGUMENTS.get(what, what)}, which is missing; or use one of {', '.join(others)}"
-    )
+@contextmanager
+def _told(kind: schemas.Kind, name: str) -> Iterator[None]:
+    """Raises UserError where the schema of this name lacks evidence."""
+    try:
+        yield
+    except Lacking as lacking:
+        what = _ARGUMENTS.get(str(lacking), str(lacking))
+        others = ", ".join(other for other in schemas.names(kind) if other != name)
+        raise UserError(f"{kind} '{name}' needs {what}, which is missing; or use one of {others}") from None

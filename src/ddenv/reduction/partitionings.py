@@ -65,23 +65,17 @@ def by_span(environment: Names, cuts: Floats, evidence: Evidence) -> list[Names]
 
 def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:
     """The times (s) at which the trajectory (N, 5) is cut into `n_spans`, sorted, shape (n_spans - 1,)."""
-    times, sharpness = turns(trajectory)
+    times, lasted = trajectory[:, 0], np.diff(trajectory[:, 0])
+    turn_rates = np.diff(np.unwrap(trajectory[:, 4])) / np.where(lasted > 0, lasted, np.inf)
+    sharpness = np.abs(np.diff(turn_rates))
     sharp = np.flatnonzero(sharpness > delta)
     sharpest = sharp[np.argsort(-sharpness[sharp], kind="stable")][: n_spans - 1]
-    chosen = sorted({float(time) for time in times[sharpest]})
-    ends = [float(trajectory[0, 0]), *chosen, float(trajectory[-1, 0])]
+    chosen = sorted({float(time) for time in times[1:-1][sharpest]})
+    ends = [float(times[0]), *chosen, float(times[-1])]
     while len(ends) - 1 < n_spans:
         longest = int(np.argmax(np.diff(ends)))
         ends.insert(longest + 1, (ends[longest] + ends[longest + 1]) / 2)
     return np.array(ends[1:-1])
-
-
-def turns(trajectory: Floats) -> tuple[Floats, Floats]:
-    """The inner times (s) of the trajectory (N, 5), and how much the angular velocity (rad/s) changes there: two (N - 2,)."""
-    times, yaw = trajectory[:, 0], np.unwrap(trajectory[:, 4])
-    lasted = np.diff(times)
-    rates = np.diff(yaw) / np.where(lasted > 0, lasted, np.inf)
-    return times[1:-1], np.abs(np.diff(rates))
 
 
 def grouped(environment: Names, labels: Iterable[int]) -> list[Names]:

@@ -4,13 +4,12 @@ UserError, in one line.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,36 +18,20 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, Verdict, error_of
 from ddenv.evidence.rates import Shown, estimated_rate, wilson_interval
+from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
 from ddenv.reduction.guide import Search, make_guide, search
-from ddenv.reduction.procedure import (
-    BaselineRan,
-    Certificate,
-    CertificateDue,
-    Certified,
-    FailureFixed,
-    LeftOut,
-    Leg,
-    NamedClaim,
-    RoundBegan,
-    Similar,
-    SteppedBack,
-    Wants,
-    baseline,
-    procedure,
-    search_on,
-)
-from ddenv.reduction.procedure import Step as ProcedureStep
-from ddenv.reduction.procedure import Test as ProcedureTest
-from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Partition, Round
+from ddenv.reduction.round import Partition, Round
 from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance, standing
+from ddenv.settings import SETTINGS
 
 NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothing to reduce"
 # Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
 FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 100_000
 
 Test = Callable[[frozenset[str]], bool]
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -164,42 +147,45 @@ def reduce(
     is called with each round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are
     passed on.
     """
-    names = checked_names(elements)
+    names = _names(elements)
+    accept_rate = accept_rate or ("kept" if iterations else "first")
+    variants = {
+        "candidates": candidates,
+        "complement_order": complement_order,
+        "growth": growth,
+        "skip": skip,
+        "prior": prior,
+    }
+    for name, word in (variants | {"accept_rate": accept_rate}).items():
+        _check_choice(name, word)
+    counts = {"iterations": iterations, "n_partitions": n_partitions, "seed": seed, "baseline_runs": baseline_runs}
+    for name, number in counts.items():
+        _check_count(name, number)
+    _check_number("delta", delta)
+    _check_number("keep_rate", keep_rate, 0.95)
+    path = _trajectory(trajectory)
+    failure = path[-1, 1:4] if failure_pose is None and path is not None else failure_pose
     known = Evidence(
         names,
-        checked_positions(names, positions),
-        path := checked_trajectory(trajectory),
-        checked_failure(failure_pose, path),
-        checked_times(first_sensed),
+        _each("positions", positions, names, _place),
+        path,
+        None if failure is None else _place("failure_pose", failure),
+        _each("first_sensed", first_sensed, None, _time),
         None if touched is None else frozenset(touched),
-        checked_traits(names, traits),
-        delta=checked_number("delta", delta),
-        seed=checked_count("seed", seed, 0),
+        _each("traits", traits, names, _known_traits),
+        delta=float(delta),
+        seed=int(seed),
     )
-    checked_count("iterations", iterations, 0)
-    checked_count("n_partitions", n_partitions, 2)
-    checked_choice("candidates", candidates, CANDIDATES)
-    checked_choice("complement_order", complement_order, COMPLEMENT_ORDERS)
-    checked_choice("growth", growth, ("paper", "steady"))
-    checked_choice("skip", skip, ("known", "implied"))
-    checked_choice("prior", prior, ("spatial", "uniform"))
-    checked_count("baseline_runs", baseline_runs, 1)
-    checked_number("keep_rate", keep_rate, 0.95)
-    checked_choice("accept_rate", accept_rate := accept_rate or ("kept" if iterations else "first"), ("first", "kept"))
 
-    def begin(leg: Leg) -> Search:
+    def begin(leg: steps.Leg) -> Search:
         guide = make_guide(
             partitioning,
             prioritization,
             lambda: replace(known, trials=caller.trials),
-            prior=prior,
             n_partitions=leg.n_partitions or n_partitions,
-            candidates=candidates,
-            complement_order=complement_order,
-            growth=growth,
-            skip=skip,
             rate=lambda: leg.rule.rate or caller.share_shown,
             runs=lambda: leg.rule.misses,
+            **variants,
         )
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
 
@@ -208,50 +194,49 @@ def reduce(
     # A missing argument is reported before the first test.
     next(begin(caller.leg()), None)
     if keeps_rate:
-        caller.carry_out(procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
+        caller.carry_out(steps.procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
         minimal = all(claim.verdict in ("kept", "needed") for claim in caller.claims)
     else:
         if check:
-            caller.carry_out(baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
+            caller.carry_out(steps.baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
         leg = caller.leg()
-        caller.carry_out(search_on(caller, leg))
+        caller.carry_out(steps.search_on(caller, leg))
         rests = [caller.left - Environment.of((element,)) for element in caller.left]
         minimal = all(standing([rest], caller.shown, leg.rule).verdicts[0] == "dissimilar" for rest in rests)
     tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
     return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
 
 
+@dataclass
 class _Caller:
-    """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides."""
+    """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides.
 
-    refusals, workers = 0, 1
+    `calls` counts them by what they were made for: "baseline", "round" or "certify".
+    """
 
-    def __init__(
-        self,
-        names: Names,
-        test: Test,
-        begin: Callable[[Leg], Search],
-        keep_rate: float,
-        iterations: int,
-        baseline_runs: int,
-        on_round: Callable[[NamedRound], None] | None,
-    ) -> None:
-        self._names, self._test, self._begin, self._on_round = names, test, begin, on_round
-        self._keep_rate, self._iterations, self._baseline_runs = keep_rate, iterations, baseline_runs
-        self.whole = Environment.whole(len(names))
-        # By what they were made for: "baseline", "round" or "certify".
+    names: Names
+    test: Test
+    begin: Callable[[steps.Leg], Search]
+    keep_rate: float
+    iterations: int
+    baseline_runs: int
+    on_round: Callable[[NamedRound], None] | None
+    rounds: int = 0
+    claims: tuple[RateClaim, ...] = ()
+    refusals: int = 0
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        self.whole = Environment.whole(len(self.names))
         self.calls: Counter[str] = Counter()
         self.trials: list[Trial] = []
-        self.rounds = 0
-        self.history = [Step(0, names)]
-        self.claims: tuple[RateClaim, ...] = ()
+        self.history = [Step(0, self.names)]
         self._known: dict[tuple[Environment, int], bool] = {}
         # What calls with all elements showed.
         self._of_whole: list[bool] = []
         self._chain: tuple[Environment, ...] = (self.whole,)
         # n of the last round in each environment, or of the round that reached it.
-        self._n_partitions: dict[Environment, int] = {}
-        self._last_n: int | None = None
+        self._n_partitions: dict[Environment, int | None] = {}
         self._lost: list[Environment] = []
         self._certificates = 0
 
@@ -277,53 +262,53 @@ class _Caller:
     def goes_on(self) -> bool:
         return True
 
-    def algorithm(self, leg: Leg) -> Search:
-        return self._begin(leg)
+    def algorithm(self, leg: steps.Leg) -> Search:
+        return self.begin(leg)
 
     # What it finds.
 
-    def carry_out(self, steps: Generator[ProcedureStep, Any, object]) -> None:
+    def carry_out(self, work: Generator[steps.Step, Any, object]) -> None:
         """To the end. Raises UserError if the failure never shows in the baseline."""
         answer: object = None
         while True:
             try:
-                step = steps.send(answer)
+                step = work.send(answer)
             except StopIteration:
                 return
             answer = self._answer(step)
 
-    def _answer(self, step: ProcedureStep) -> object:
+    def _answer(self, step: steps.Step) -> object:
         match step:
-            case Wants():
+            case steps.Wants():
                 self._call(step.tests[0])
-            case BaselineRan():
+            case steps.BaselineRan():
                 return self._failures()
-            case FailureFixed():
+            case steps.FailureFixed():
                 return self.leg()
-            case RoundBegan():
+            case steps.RoundBegan():
                 self._begin_round(step.round)
-            case Similar():
+            case steps.Similar():
                 self._go(*self._chain, step.environment)
                 return True
-            case CertificateDue():
+            case steps.CertificateDue():
                 return self._certificate()
-            case Certified():
+            case steps.Certified():
                 self.claims = tuple(self._claim(claim, step.certificate.first_run) for claim in step.claims)
-            case LeftOut():
+            case steps.LeftOut():
                 self._go(*self._chain, step.environment)
                 return self.leg()
-            case SteppedBack():
+            case steps.SteppedBack():
                 self._lost.append(self._chain[step.place + 1])
                 self._go(*self._chain[: step.place + 1])
                 return self.leg(step.again)
         return None
 
-    def _call(self, asked: ProcedureTest) -> None:
-        shown = bool(self._test(frozenset(asked.environment.names(self._names))))
+    def _call(self, asked: steps.Test) -> None:
+        shown = bool(self.test(frozenset(asked.environment.names(self.names))))
         self.calls[asked.why] += 1
         self._known[asked.environment, asked.run] = shown
         if asked.why == "round":
-            self.trials.append(Trial(asked.environment, shown, self._names))
+            self.trials.append(Trial(asked.environment, shown, self.names))
         elif asked.environment == self.whole:
             self._of_whole.append(shown)
 
@@ -332,13 +317,13 @@ class _Caller:
             raise UserError(NOTHING_TO_REDUCE)
         return sum(self._of_whole)
 
-    def leg(self, again: tuple[Partition, ...] = ()) -> Leg:
+    def leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
         """The next search, from what is left."""
-        rate = self.rate() if self._keep_rate else 0.0
-        rule = Acceptance(1 + self._iterations, rate, self._keep_rate, len(self._lost))
+        rate = self.rate() if self.keep_rate else 0.0
+        rule = Acceptance(1 + self.iterations, rate, self.keep_rate, len(self._lost))
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
-        return Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
+        return steps.Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
 
     @property
     def left(self) -> Environment:
@@ -347,32 +332,30 @@ class _Caller:
 
     def _begin_round(self, round: Round) -> None:
         self.rounds += 1
-        self._last_n = self._n_partitions[self.left] = round.n_partitions
-        if self._on_round is not None:
+        self._n_partitions[self.left] = round.n_partitions
+        if self.on_round is not None:
             candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
-            self._on_round(
-                NamedRound(self._named(round.environment), tuple(map(self._named, round.partitions)), candidates)
-            )
+            parts = tuple(map(self._named, round.partitions))
+            self.on_round(NamedRound(self._named(round.environment), parts, candidates))
 
     def _named(self, models: Partition) -> Names:
-        return tuple(self._names[model] for model in models)
+        return tuple(self.names[model] for model in models)
 
     def _go(self, *chain: Environment) -> None:
         """On, or back, along `chain`."""
+        self._n_partitions.setdefault(chain[-1], self._n_partitions.get(self.left))
         self._chain = chain
-        if self._last_n is not None:
-            self._n_partitions.setdefault(self.left, self._last_n)
-        self.history.append(Step(self.calls.total(), self.left.names(self._names)))
+        self.history.append(Step(self.calls.total(), self.left.names(self.names)))
 
-    def _certificate(self) -> Certificate:
+    def _certificate(self) -> steps.Certificate:
         self._certificates += 1
-        terms = Terms(self._keep_rate, self.rate(), error_of(self._certificates), self._baseline_runs)
-        return Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+        terms = Terms(self.keep_rate, self.rate(), error_of(self._certificates), self.baseline_runs)
+        return steps.Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
 
-    def _claim(self, named: NamedClaim, first: int) -> RateClaim:
+    def _claim(self, named: steps.NamedClaim, first: int) -> RateClaim:
         runs = named.claim.runs
         shown = sum(self._known[named.environment, first + run] for run in range(runs))
-        without = None if named.model is None else self._names[named.model]
+        without = None if named.model is None else self.names[named.model]
         return RateClaim(without, named.claim.verdict, shown, runs, *wilson_interval(shown, runs))
 
 
@@ -380,28 +363,40 @@ class _Caller:
 LARGEST = 1e9
 
 
-def checked_names(elements: Iterable[str]) -> tuple[str, ...]:
-    """The elements as a tuple. Raises UserError if they are no names, or if a name occurs twice."""
+def _check_choice(name: str, value: str) -> None:
+    """Raises UserError for a word that the setting of this name cannot be."""
+    choices = SETTINGS[name].choices
+    if value not in choices:
+        raise UserError(f"{name}: {value!r} is not allowed; use one of {', '.join(choices)}")
+
+
+def _check_count(name: str, value: int) -> None:
+    """Raises UserError for what is no whole number, or less than the setting of this name can be."""
+    least = SETTINGS[name].least or 0
+    if not isinstance(value, Integral) or not least <= value < 2**31:
+        raise UserError(f"{name}: expected {least} or more, found {value!r}")
+
+
+def _check_number(name: str, value: float, most: float = LARGEST) -> None:
+    """Raises UserError for what is no number above 0, at most `most`."""
+    if not isinstance(value, Real) or not 0 < value <= most:
+        limit = "" if most == LARGEST else f", at most {most:g}"
+        raise UserError(f"{name}: expected a number above 0{limit}, found {value!r}")
+
+
+def _names(elements: Iterable[str]) -> Names:
+    """The elements. Raises UserError if they are no names, or if a name occurs twice."""
     try:
         names = tuple(elements)
-        different = len(set(names))
+        twice = [name for name, times in Counter(names).items() if times > 1]
     except TypeError:
         raise UserError(f"elements: expected names, found {elements!r}") from None
-    if different != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise UserError(f"elements: {twice!r} occurs twice; give each element its own name")
+    if twice:
+        raise UserError(f"elements: {twice[0]!r} occurs twice; give each element its own name")
     return names
 
 
-def checked_positions(names: tuple[str, ...], positions: Mapping[str, Place] | None) -> dict[str, Place] | None:
-    """The position of each name, m. Raises UserError."""
-    if positions is None:
-        return None
-    _check_mapping("positions", positions)
-    return {name: _place(f"positions[{name!r}]", positions.get(name)) for name in names}
-
-
-def checked_trajectory(trajectory: Floats | None) -> Floats | None:
+def _trajectory(trajectory: Floats | None) -> Floats | None:
     """The trajectory, shape (N, 5). Raises UserError."""
     if trajectory is None:
         return None
@@ -417,71 +412,37 @@ def checked_trajectory(trajectory: Floats | None) -> Floats | None:
     return path
 
 
-def checked_failure(failure_pose: Iterable[float] | None, path: Floats | None) -> Place | None:
-    """The position of the failure, m: given, or the end of the path (N, 5). Raises UserError."""
-    if failure_pose is not None:
-        return _place("failure_pose", failure_pose)
-    if path is None:
+def _each(
+    what: str, values: Mapping[str, Any] | None, names: Names | None, read: Callable[[str, Any], Value]
+) -> dict[str, Value] | None:
+    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError if it is no mapping."""
+    if values is None:
         return None
-    x, y, z = path[-1, 1:4].tolist()
-    return x, y, z
+    if not isinstance(values, Mapping):
+        raise UserError(f"{what}: expected a mapping from names to values, found {type(values).__name__}")
+    return {name: read(f"{what}[{name!r}]", values.get(name)) for name in (values if names is None else names)}
 
 
-def checked_times(first_sensed: Mapping[str, float] | None) -> dict[str, float] | None:
-    """The time of each name that was sensed, s. Raises UserError."""
-    if first_sensed is None:
-        return None
-    _check_mapping("first_sensed", first_sensed)
-    for name, at in first_sensed.items():
-        if not isinstance(at, Real) or not 0 <= at <= LARGEST:
-            raise UserError(f"first_sensed[{name!r}]: expected a time in s, found {at!r}")
-    return {name: float(at) for name, at in first_sensed.items()}
-
-
-def checked_traits(names: tuple[str, ...], traits: Mapping[str, Traits] | None) -> Mapping[str, Traits] | None:
-    """The traits of each name. Raises UserError."""
-    if traits is None:
-        return None
-    _check_mapping("traits", traits)
-    for name in names:
-        if not isinstance(traits.get(name), Traits):
-            raise UserError(f"traits[{name!r}]: expected ddenv.Traits, found {traits.get(name)!r}")
-    return traits
-
-
-def checked_number(what: str, value: float, most: float = LARGEST) -> float:
-    """`value` as a number above 0, at most `most`. Raises UserError."""
-    if not isinstance(value, Real) or not 0 < value <= most:
-        limit = "" if most == LARGEST else f", at most {most:g}"
-        raise UserError(f"{what}: expected a number above 0{limit}, found {value!r}")
-    return float(value)
-
-
-def checked_count(what: str, value: int, least: int) -> int:
-    """`value` as a whole number, `least` or more. Raises UserError."""
-    if not isinstance(value, Integral) or not least <= value < 2**31:
-        raise UserError(f"{what}: expected {least} or more, found {value!r}")
-    return int(value)
-
-
-def checked_choice(what: str, value: str, allowed: tuple[str, ...]) -> None:
-    """Raises UserError if `value` is not allowed."""
-    if value not in allowed:
-        raise UserError(f"{what}: {value!r} is not allowed; use one of {', '.join(allowed)}")
-
-
-def _check_mapping(what: str, value: object) -> None:
-    if not isinstance(value, Mapping):
-        raise UserError(f"{what}: expected a mapping from names to values, found {type(value).__name__}")
-
-
-def _place(what: str, values: Iterable[float] | None) -> Place:
+def _place(what: str, values: Any) -> Place:
+    """A position, m. Raises UserError, as those below."""
     if values is None:
         raise UserError(f"{what}: is missing")
     try:
         numbers = [] if isinstance(values, str) else [float(value) for value in values][:3]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = []
-    if len(numbers) < 3 or not all(math.isfinite(number) and abs(number) <= LARGEST for number in numbers):
+    if len(numbers) < 3 or not all(abs(number) <= LARGEST for number in numbers):
         raise UserError(f"{what}: expected x, y, z m, found {values!r}")
     return numbers[0], numbers[1], numbers[2]
+
+
+def _time(what: str, value: float) -> float:
+    if not isinstance(value, Real) or not 0 <= value <= LARGEST:
+        raise UserError(f"{what}: expected a time in s, found {value!r}")
+    return float(value)
+
+
+def _known_traits(what: str, value: Any) -> Traits:
+    if not isinstance(value, Traits):
+        raise UserError(f"{what}: expected ddenv.Traits, found {value!r}")
+    return value

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 from ddenv.environment import Environment
 
-CANDIDATES = ("both", "partitions", "complements")
-COMPLEMENT_ORDERS = ("paper", "far-first")
-
 # Models by their numbers, in an order that the algorithm chose.
 Partition = tuple[int, ...]
 
@@ -97,9 +94,16 @@ def round_of(
     return Round(n_partitions, environment, tuple(partitions), tuple(scores), tuple(candidates))
 
 
-def left_out(group: Partition, environment: Partition, score: float = 0.0) -> Round:
+def in_order(environment: Partition, partitions: Sequence[Partition], *kinds: str) -> Round:
+    """A round with all candidates of each kind in turn, in the order of the partitions."""
+    ranked = [(part, float(place)) for place, part in enumerate(partitions)]
+    wanted = [(kind, place) for kind in kinds for place in range(len(partitions))]
+    return round_of(len(partitions), environment, ranked, wanted)
+
+
+def left_out(group: Partition, environment: Partition) -> Round:
     """A round with one candidate, E without `group`. The group is the first partition, the rest the second."""
     gone = frozenset(group)
     rest = tuple(model for model in environment if model not in gone)
-    ranked = [(group, score), (rest, score)] if rest else [(group, score)]
+    ranked = [(part, 0.0) for part in (group, rest) if part]
     return round_of(len(ranked), environment, ranked, [("complement", 0)])

@@ -61,16 +61,13 @@ class Stacks:
             winner = None if won is None else round.candidates[whole.candidates.index(won)]
 
     def _expanded(self, round: Round) -> Round:
-        candidates = tuple(
-            Candidate(
-                candidate.kind,
-                candidate.partition,
-                self.expanded(candidate.part),
-                Environment.of(self.expanded(candidate.models)),
-                Environment.of(self.expanded(candidate.lacks)),
-            )
-            for candidate in round.candidates
+        def stacks(models: Iterable[int]) -> Environment:
+            return Environment.of(self.expanded(models))
+
+        candidates = (
+            replace(one, part=self.expanded(one.part), models=stacks(one.models), lacks=stacks(one.lacks))
+            for one in round.candidates
         )
         partitions = tuple(map(self.expanded, round.partitions))
         environment = self.expanded(round.environment)
-        return replace(round, environment=environment, partitions=partitions, candidates=candidates)
+        return replace(round, environment=environment, partitions=partitions, candidates=tuple(candidates))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ddenv.evidence.claims import current, rate
 from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, place, say
-from ddenv.report.report_map import CORNERS, close_up, picture, two_ways
+from ddenv.report.report_map import CORNERS, close_up, picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
@@ -147,7 +147,7 @@ def _passing(record: Record, found: Nearest, drawn: tuple[Drawn, ...]) -> list[B
             f"seed {one.seed}."
         )
         blocks.append(
-            Picture("nearest", two_ways(there, drawn, _ways(record, one), "nearest", found.gone), plain(words))
+            Picture("nearest", picture(there, drawn, "nearest", _ways(record, one), found.gone), plain(words))
         )
     rows = tuple(
         (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
@@ -166,7 +166,7 @@ def _map(record: Record, drawn: tuple[Drawn, ...], reason: Reason, name: str) ->
     assert one is not None
     there = replace(record, kept=record.kept - frozenset(reason.gone))
     words = f"The world from above without {reason.without}: the robot's paths with it and without it, seed {one.seed}."
-    return Picture(name, two_ways(there, drawn, _ways(record, one), name), plain(words))
+    return Picture(name, picture(there, drawn, name, _ways(record, one)), plain(words))
 
 
 def _ways(record: Record, one: Parting) -> dict[str, array[float]]:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.map.frame import tick_step, tick_text, ticks
+from ddenv.map.drawing import tick_step, tick_text, ticks
 from ddenv.text import padded, shortened, width
 
 
