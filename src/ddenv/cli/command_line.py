@@ -18,25 +18,15 @@ import click
 from click.shell_completion import CompletionItem
 
 from ddenv import __version__
-from ddenv.cli.certify_command import certify_command
-from ddenv.cli.completing import runs_and_scenarios
-from ddenv.cli.config_command import config_command
 from ddenv.cli.doctor_command import doctor_command
-from ddenv.cli.export_command import export_command
-from ddenv.cli.isolate_command import isolate_command
 from ddenv.cli.learn_command import learn_command
-from ddenv.cli.open_command import open_command
-from ddenv.cli.options import given_reading, reading_options
-from ddenv.cli.report_command import report_command
-from ddenv.cli.reproduce_command import CANNOT_SAY, reproduce_command
-from ddenv.cli.resume_command import resume_command
-from ddenv.cli.run_command import run_command
-from ddenv.cli.runs_command import runs_command
+from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
+from ddenv.cli.result_command import export_command, report_command, runs_command, why_command
+from ddenv.cli.run_command import certify_command, isolate_command, resume_command, run_command
 from ddenv.cli.schemas_command import schemas_command
-from ddenv.cli.serve_command import serve_command
 from ddenv.cli.study_command import study_command
-from ddenv.cli.test_command import test_command
-from ddenv.cli.why_command import why_command
+from ddenv.cli.test_command import CANNOT_SAY, reproduce_command, test_command
+from ddenv.cli.workbench_command import config_command, open_command, serve_command
 from ddenv.cli.world_command import world_group
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
@@ -156,8 +146,7 @@ def main() -> None:
         code = 130
     except Exception as error:
         code = _told(error, answers)
-        if answers:
-            code = CANNOT_SAY
+        code = CANNOT_SAY if answers else code
     sys.exit(code)
 
 

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
@@ -24,18 +25,17 @@ from ddenv.words.news import headline, news
 POLL = 0.2
 
 
+@dataclass(eq=False)
 class Interrupted(Exception):
     """The user interrupted, and the engine was stopped; `state` is what it left."""
 
-    def __init__(self, state: RunState) -> None:
-        super().__init__()
-        self.state = state
+    state: RunState
 
 
 def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> tuple[int, RunState]:
     """Prints what happens and the result, as one JSON object if asked; returns the exit code and the last state."""
     try:
-        state = follow(path, engine, sys.stderr if as_json else sys.stdout)
+        state = follow(path, engine, as_json)
         code = 0 if state.certified else 1
     except Interrupted as interrupted:
         # It may have ended just then.
@@ -49,10 +49,13 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
     return code, state
 
 
-def follow(path: Path, engine: subprocess.Popen[bytes], out: TextIO) -> RunState:
-    """Prints what happens until the engine ends; returns the last state. Raises UserError and Interrupted."""
+def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunState:
+    """Prints what happens until the engine ends, on stderr if stdout is for JSON; returns the last state.
+
+    Raises UserError and Interrupted.
+    """
     signal.signal(signal.SIGTERM, _interrupt)
-    view = _View(out)
+    view = _View(sys.stderr if as_json else sys.stdout)
     with RunFile(path) as file:
         follower = Follower(file, fold(file.events()))
         before = follower.state.revision

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.completing import scenarios
-from ddenv.cli.options import Numbers, announce, announced, reading_options
+from ddenv.cli.options import Numbers, reading_options, scenarios, together
+from ddenv.cli.terminal import announce, announced, say_written, terminal_columns
 from ddenv.errors import UserError
 from ddenv.text import printable
 
@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 # A line names so many models.
 MOST_NAMES = 5
 
+# A world, as it is read.
+world_argument = together(
+    click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
+    reading_options,
+)
+
 
 @click.group("world")
 def world_group() -> None:
@@ -32,13 +38,11 @@ def world_group() -> None:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def check(file: Path, as_json: bool, **reading: Any) -> int:
     """Shows how FILE is read: each model, what was replaced or ignored, and why."""
     from ddenv.cli.world_check import lines, report
-    from ddenv.cli.wrapping import terminal_columns
 
     world = _read(file, reading)
     print(json.dumps(report(world)) if as_json else "\n".join(lines(world, terminal_columns())))
@@ -46,8 +50,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
@@ -77,9 +80,9 @@ def show(
     start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
     if svg is not None:
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
-        print(printable(f"wrote {svg}"))
-        return 0
-    print(_map(world, spawn=start, goal=goal))
+        say_written([svg])
+    else:
+        print(_map(world, spawn=start, goal=goal))
     return 0
 
 
@@ -134,8 +137,7 @@ def _of_run(name: str) -> tuple[Path, World, RunState]:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option(
     "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
 )
@@ -143,14 +145,12 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
     """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
     from ddenv.world.write import write_converted
 
-    for path in write_converted(_read(file, reading), output):
-        print(printable(f"wrote {path}"))
+    say_written(write_converted(_read(file, reading), output))
     return 0
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:
     """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""

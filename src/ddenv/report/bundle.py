@@ -45,7 +45,7 @@ from pathlib import Path
 
 run = Path(__file__).resolve().with_name("{RUN}")
 # Without it Python itself exits with 1, and PyPI has another program of that name.
-if subprocess.call([sys.executable, "-c", "import ddenv.cli.reproduce_command"], stderr=subprocess.DEVNULL):
+if subprocess.call([sys.executable, "-c", "import ddenv.runfile"], stderr=subprocess.DEVNULL):
     print("repro.py: {NEEDS}", file=sys.stderr)
     sys.exit(125)
 sys.exit(subprocess.call([sys.executable, "-m", "ddenv", "reproduce", str(run), "--trust", *sys.argv[1:]]))

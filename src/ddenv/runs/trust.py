@@ -12,7 +12,7 @@ import json
 import os
 import shlex
 import stat
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -21,8 +21,10 @@ from typing import Any
 import yaml
 
 from ddenv.errors import UserError
-from ddenv.runs.clusters import HERE
+from ddenv.runfile.store import RunFile
+from ddenv.runs.clusters import HERE, check_cluster, made_here
 from ddenv.runs.remembered import read_state, write_state
+from ddenv.runs.subject import read_scenario
 from ddenv.world.command import start_folder
 from ddenv.world.scenario import Scenario
 
@@ -153,7 +155,31 @@ def trust_cluster(scenario: Scenario) -> None:
         trust(cluster)
 
 
-def check_trusted(scenario: Scenario, where: Path | str) -> None:
-    """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted."""
-    if program := untrusted(scenario):
+def check_trusted(scenario: Scenario, where: Path | str, asks: Callable[[str], bool] = lambda _: False) -> None:
+    """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted.
+
+    `asks` puts a question to the user; a yes is remembered.
+    """
+    program = untrusted(scenario)
+    if program and asks(f"{where} starts {program.words}. Do you trust it?"):
+        trust(program)
+        program = untrusted(scenario)
+    if program:
         raise UserError(f"{where}: would start {program.words}; if you trust it, give --trust")
+
+
+def check_named(scenario: Scenario, name: str, asks: Callable[[str], bool]) -> None:
+    """The same for what the user named: a file of the user's own is trusted."""
+    trust_own(scenario, Path(name))
+    check_trusted(scenario, name, asks)
+
+
+def trusted_scenario(file: RunFile, asks: Callable[[str], bool], cluster: str | None = None) -> Scenario:
+    """The scenario of a run, after the same check; the user has typed another `cluster`, if any.
+
+    Raises UserError for a damaged file, too.
+    """
+    scenario = read_scenario(file)
+    check_cluster(cluster or scenario.reduction.cluster)
+    check_trusted(made_here(scenario) if cluster else scenario, file.path, asks)
+    return scenario
