@@ -11,6 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from ddenv.runs import processor
+from ddenv.runs.folder import SUFFIX, runs_folder
 from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
 
 # Endings of files that a command can open.
@@ -21,39 +22,28 @@ Command = Callable[..., Any]
 Option = Callable[[Command], Command]
 
 
-# Runs and bundled scenarios by their names, and files.
-
-
-def _files() -> list[str]:
-    with suppress(OSError):
-        return [path.name for path in Path().iterdir() if path.suffix.lower() in OPENED]
-    return []
-
-
-def _runs() -> list[str]:
-    from ddenv.runs.folder import SUFFIX, runs_folder
-
-    return [path.stem for path in runs_folder().glob(f"*{SUFFIX}")]
-
-
-def _scenarios() -> list[str]:
-    from ddenv.world.load import bundled_names
-
-    return bundled_names()
-
-
-def _offering(*sources: Callable[[], list[str]]) -> Complete:
-    """Offers names beside files of this folder; if none of them fits, the shell looks for a path by itself."""
+def _offering(*, runs: bool = False, scenarios: bool = False) -> Complete:
+    """Offers names of these, and files of this folder; if none of them fits, the shell looks for a path by itself."""
 
     def complete(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
-        known = {name for source in sources for name in source()}.union(_files() if begun else ())
+        known: set[str] = set()
+        if runs:
+            known.update(path.stem for path in runs_folder().glob(f"*{SUFFIX}"))
+        if scenarios:
+            from ddenv.world.load import bundled_names
+
+            known.update(bundled_names())
+        if begun:
+            with suppress(OSError):
+                known.update(path.name for path in Path().iterdir() if path.suffix.lower() in OPENED)
         found = sorted(name for name in known if name.startswith(begun))
         return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
 
     return complete
 
 
-runs, scenarios, runs_and_scenarios = _offering(_runs), _offering(_scenarios), _offering(_scenarios, _runs)
+runs, scenarios = _offering(runs=True), _offering(scenarios=True)
+runs_and_scenarios = _offering(runs=True, scenarios=True)
 run_argument = click.argument("run", shell_complete=runs)
 
 

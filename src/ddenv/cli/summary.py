@@ -109,7 +109,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     """The same for people."""
     before, after = len(state.elements), len(state.environment)
     if state.baseline is None:
-        return [f"run file: {path}"]
+        return [printable(f"run file: {path}")]
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
         what = "environment, not shown to be minimal"

@@ -31,8 +31,8 @@ def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
     from rich.text import Text
 
     lines = Text(" ".join(text.split())).wrap(Console(), max(LEAST, columns - width(first)))
-    starts = [first, *[" " * width(first)] * len(lines)]
-    return [start + line.plain for start, line in zip(starts, lines or [Text()], strict=False)]
+    below = " " * width(first)
+    return [f"{below if number else first}{line.plain.rstrip()}" for number, line in enumerate(lines or [Text()])]
 
 
 def say(text: str, first: str = "") -> None:

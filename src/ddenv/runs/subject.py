@@ -105,8 +105,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
 
     Raises UserError.
     """
-    reading = {option: given[option] for option in READING}
-    others = {option: value for option, value in given.items() if option not in READING}
+    others = dict(given)
+    reading = {option: others.pop(option) for option in READING}
     spawn, goal = given["spawn"], given["goal"]
     if Path(name).suffix.lower() not in WORLD_FILES:
         scenario = load_scenario(find_scenario(name))
@@ -119,7 +119,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         raise UserError(f"--world: only for a scenario; {name} is a world")
     else:
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
-    return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
+    read_as = reading_of(scenario.reading, **reading)
+    return with_options(scenario, reading=read_as, **others)
 
 
 def reading_of(

@@ -6,13 +6,15 @@ import threading
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
 from distributed import Client, Security, SSHCluster
 
 from ddenv.errors import UserError
-from ddenv.runs.clusters import hosts_of, is_scheduler_file
+from ddenv.runs.clusters import hosts_of
+from ddenv.world.access import is_file
 
 # The time between two looks at who is there, and between two attempts to connect, s.
 PERIOD = 0.5
@@ -68,7 +70,7 @@ class Link:
             # Dask makes the first one its scheduler.
             self._ssh = SSHCluster([hosts[0], *hosts])
             return Client(self._ssh, **how)
-        if is_scheduler_file(self._cluster):
+        if is_file(Path(self._cluster)):
             return Client(scheduler_file=self._cluster, **how)
         if self._cluster.startswith("tls:"):
             return Client(self._cluster, security=Security(require_encryption=True), **how)
