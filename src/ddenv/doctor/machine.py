@@ -25,7 +25,6 @@ from ddenv.text import count
 
 # By the names that packages are installed as, with the module that shows that they are there.
 NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}
-OPTIONAL = {"textual-serve": ("textual_serve", f"only 'ddenv serve' needs it: {how_to_install('serve')}")}
 SMALLEST = (80, 24)
 # Less free space or memory than this is worth a line, bytes.
 LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000
@@ -43,9 +42,9 @@ def installation() -> Iterator[Finding]:
         else:
             yield Finding("installation", name, "not installed", "wrong", f"pip install {name}")
     yield Finding("installation", "SQLite", sqlite3.sqlite_version)
-    for name, (module, why) in OPTIONAL.items():
-        there = importlib.util.find_spec(module) is not None
-        yield Finding("installation", name, _version(name) if there else f"not installed; {why}")
+    missing = f"not installed; only 'ddenv serve' needs it: {how_to_install('serve')}"
+    served = _version("textual-serve") if importlib.util.find_spec("textual_serve") is not None else missing
+    yield Finding("installation", "textual-serve", served)
 
 
 def _version(name: str) -> str:

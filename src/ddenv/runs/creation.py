@@ -44,8 +44,9 @@ def create_run(scenario: Scenario, path: Path, announce: Announce | None = None)
     """
     check_cluster(scenario.reduction.cluster)
     world, _ = load_parts(scenario, announce)
-    documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
-    _write(scenario, world, path, documents | {"world": world.text, "robot": read_bytes(scenario.robot.model)})
+    documents = {"world": world.text, "robot": read_bytes(scenario.robot.model)}
+    documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
+    _write(scenario, world, path, documents)
     return world
 
 
