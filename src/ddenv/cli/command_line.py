@@ -118,12 +118,6 @@ for command in (
     app.add_command(command)
 
 
-def _help_of(error: click.ClickException) -> str:
-    """The command that lists what would have been right."""
-    context = error.ctx if isinstance(error, click.UsageError) else None
-    return f"{'ddenv' if context is None else context.command_path} --help"
-
-
 def _said(error: click.ClickException) -> str:
     """What is wrong, with options that are really like a mistyped one: their dashes alone make short ones alike."""
     if isinstance(error, click.NoSuchOption) and error.possibilities:
@@ -160,7 +154,9 @@ def _told(error: Exception, all_of_it: bool) -> int:
     elif isinstance(error, click.exceptions.NoArgsIsHelpError):
         print(error.format_message(), file=sys.stderr)
     elif isinstance(error, click.ClickException):
-        print(printable(f"ddenv: {_said(error)}; see '{_help_of(error)}'"), file=sys.stderr)
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        command = "ddenv" if context is None else context.command_path
+        print(printable(f"ddenv: {_said(error)}; see '{command} --help'"), file=sys.stderr)
     elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
         return _cannot_print(error)
     elif all_of_it:

@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
-from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import SUFFIX, find_run
@@ -38,18 +37,13 @@ READING = ("model_path", "stand_in", "ignore")
 
 @dataclass(frozen=True)
 class Subject:
-    """What the robot is run in. Of a run, `run` is its file, and `position` finds its earlier states."""
+    """What the robot is run in. Of a run, `run` is its file, and `state` its last one."""
 
     scenario: Scenario
     world: World
     robot: Model
     run: Path | None = None
-    position: Position | None = None
-
-    @property
-    def state(self) -> RunState | None:
-        """The last state of a run."""
-        return None if self.position is None else self.position.end
+    state: RunState | None = None
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -230,8 +224,8 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
 
 
 def read_subject(file: RunFile) -> Subject:
-    """The scenario, world and robot of a run, and its states. Raises UserError."""
-    return Subject(*read_parts(file), file.path, position_in(file.events()))
+    """The scenario, world and robot of a run, and its state. Raises UserError."""
+    return Subject(*read_parts(file), file.path, fold(file.events()))
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
