@@ -70,7 +70,7 @@ def test_an_engine_makes_at_least_so_many_runs(run, monkeypatch, capsys):
     in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
     in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)
     # As often as the baseline, if not said otherwise.
-    assert started == [(run.path, 1, {"certify": 40}), (run.path, 1, {"certify": 4})]
+    assert started == [(run.path, 1, {"certify": 40, "cluster": None}), (run.path, 1, {"certify": 4, "cluster": None})]
 
 
 def test_what_cannot_be_certified_is_refused_in_one_line(run, monkeypatch, capsys):

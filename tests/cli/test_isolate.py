@@ -40,13 +40,13 @@ def test_what_is_known_is_said_without_a_test(run, started, monkeypatch, capsys)
     assert (found["gone"], found["shown"], len(found["instants"])) == (["crate_00"], True, 8)
     in_process(monkeypatch, capsys, "isolate", run.path, "--again", "--jobs", 1)
     in_process(monkeypatch, capsys, "isolate", run.path, "--runs", 50, "--jobs", 1)
-    assert started == [(run.path, 1, {"isolate": 0}), (run.path, 1, {"isolate": 50})]
+    assert started == [(run.path, 1, {"isolate": 0, "cluster": None}), (run.path, 1, {"isolate": 50, "cluster": None})]
 
 
 def test_one_that_was_stopped_goes_on(run, started, monkeypatch, capsys):
     fake_moments.isolating(run).write("engine_stopped", reason="stopped by the user")
     done = in_process(monkeypatch, capsys, "isolate", run.path, "--jobs", 1)
-    assert started == [(run.path, 1, {"isolate": 0})]
+    assert started == [(run.path, 1, {"isolate": 0, "cluster": None})]
     # No engine works here.
     assert (done.returncode, done.stderr) == (2, f"ddenv: {run.path}: stopped by the user\n")
 

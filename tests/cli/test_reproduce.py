@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddenv.cli import reproduce_command
+from ddenv.cli.test_command import CANNOT_SAY
 from ddenv.engine import single_test
 from tests.command import in_process
 
@@ -12,7 +12,7 @@ from tests.command import in_process
 )
 def test_whatever_is_wrong_it_says_that_it_cannot_say(monkeypatch, capsys, home, words):
     said = in_process(monkeypatch, capsys, "reproduce", *words)
-    assert said.returncode == reproduce_command.CANNOT_SAY
+    assert said.returncode == CANNOT_SAY
     assert said.stderr
     assert "Traceback" not in said.stderr
 
@@ -23,4 +23,4 @@ def test_a_crash_is_no_failure_of_the_robot(monkeypatch, capsys, home, error):
         raise error
 
     monkeypatch.setattr(single_test, "subject_in", crash)
-    assert in_process(monkeypatch, capsys, "reproduce", "run").returncode == reproduce_command.CANNOT_SAY
+    assert in_process(monkeypatch, capsys, "reproduce", "run").returncode == CANNOT_SAY

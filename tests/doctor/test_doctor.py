@@ -6,8 +6,7 @@ import sqlite3
 
 import pytest
 
-from ddenv.doctor import machine
-from ddenv.doctor.finding import is_well
+from ddenv.doctor import is_well, machine
 from ddenv.doctor.run_health import repair, run_health
 from ddenv.errors import UserError
 from ddenv.runfile.events import AcceptModeChanged, EngineStarted, Paused

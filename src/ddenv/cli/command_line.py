@@ -18,25 +18,15 @@ import click
 from click.shell_completion import CompletionItem
 
 from ddenv import __version__
-from ddenv.cli.certify_command import certify_command
-from ddenv.cli.completing import runs_and_scenarios
-from ddenv.cli.config_command import config_command
 from ddenv.cli.doctor_command import doctor_command
-from ddenv.cli.export_command import export_command
-from ddenv.cli.isolate_command import isolate_command
 from ddenv.cli.learn_command import learn_command
-from ddenv.cli.open_command import open_command
-from ddenv.cli.options import given_reading, reading_options
-from ddenv.cli.report_command import report_command
-from ddenv.cli.reproduce_command import CANNOT_SAY, reproduce_command
-from ddenv.cli.resume_command import resume_command
-from ddenv.cli.run_command import run_command
-from ddenv.cli.runs_command import runs_command
+from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
+from ddenv.cli.result_command import export_command, report_command, runs_command, why_command
+from ddenv.cli.run_command import certify_command, isolate_command, resume_command, run_command
 from ddenv.cli.schemas_command import schemas_command
-from ddenv.cli.serve_command import serve_command
 from ddenv.cli.study_command import study_command
-from ddenv.cli.test_command import test_command
-from ddenv.cli.why_command import why_command
+from ddenv.cli.test_command import CANNOT_SAY, reproduce_command, test_command
+from ddenv.cli.workbench_command import config_command, open_command, serve_command
 from ddenv.cli.world_command import world_group
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
@@ -128,12 +118,6 @@ for command in (
     app.add_command(command)
 
 
-def _help_of(error: click.ClickException) -> str:
-    """The command that lists what would have been right."""
-    context = error.ctx if isinstance(error, click.UsageError) else None
-    return f"{'ddenv' if context is None else context.command_path} --help"
-
-
 def _said(error: click.ClickException) -> str:
     """What is wrong, with options that are really like a mistyped one: their dashes alone make short ones alike."""
     if isinstance(error, click.NoSuchOption) and error.possibilities:
@@ -156,8 +140,7 @@ def main() -> None:
         code = 130
     except Exception as error:
         code = _told(error, answers)
-        if answers:
-            code = CANNOT_SAY
+        code = CANNOT_SAY if answers else code
     sys.exit(code)
 
 
@@ -171,7 +154,9 @@ def _told(error: Exception, all_of_it: bool) -> int:
     elif isinstance(error, click.exceptions.NoArgsIsHelpError):
         print(error.format_message(), file=sys.stderr)
     elif isinstance(error, click.ClickException):
-        print(printable(f"ddenv: {_said(error)}; see '{_help_of(error)}'"), file=sys.stderr)
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        command = "ddenv" if context is None else context.command_path
+        print(printable(f"ddenv: {_said(error)}; see '{command} --help'"), file=sys.stderr)
     elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
         return _cannot_print(error)
     elif all_of_it:

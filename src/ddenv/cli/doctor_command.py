@@ -10,10 +10,10 @@ from pathlib import Path
 
 import click
 
-from ddenv.cli.completing import runs
-from ddenv.cli.options import json_option
-from ddenv.cli.wrapping import terminal_columns, wrapped
-from ddenv.doctor.finding import Finding, is_well
+from ddenv.cli.options import json_option, runs
+from ddenv.cli.terminal import terminal_columns, wrapped
+from ddenv.cli.workbench_command import PORT
+from ddenv.doctor import Finding, is_well
 from ddenv.errors import UserError
 from ddenv.text import printable
 
@@ -34,11 +34,10 @@ def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
     if run is None and repair is not None:
         raise UserError("--repair: needs a run: ddenv doctor RUN --repair COPY")
     found = list(_found(run, repair))
-    columns = terminal_columns()
     if as_json:
         print(json.dumps({"well": is_well(found), "findings": [asdict(finding) for finding in found]}))
     else:
-        print("\n".join(map(printable, lines(found, columns))))
+        print("\n".join(map(printable, lines(found, terminal_columns()))))
     return 0 if is_well(found) else 1
 
 
@@ -52,7 +51,6 @@ def _found(run: str | None, copy: Path | None) -> Iterator[Finding]:
         yield from (repair(find_run(run), copy) if copy is not None else run_health(find_run(run)))
         yield from (finding for finding in (*installation(), *runs()) if finding.state == "wrong")
         return
-    from ddenv.cli.serve_command import PORT
     from ddenv.runs.programs import FIRST_PORT
 
     yield from (*installation(), *terminal(), *machine({"scene": FIRST_PORT, "serve": PORT}), *runs())

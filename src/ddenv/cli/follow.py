@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
@@ -23,52 +24,52 @@ from ddenv.words.news import headline, news
 POLL = 0.2
 
 
+@dataclass(eq=False)
 class Interrupted(Exception):
     """The user interrupted, and the engine was stopped; `state` is what it left."""
 
-    def __init__(self, state: RunState) -> None:
-        super().__init__()
-        self.state = state
+    state: RunState
 
 
 def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> tuple[int, RunState]:
     """Prints what happens and the result, as one JSON object if asked; returns the exit code and the last state."""
     try:
-        state = follow(path, engine, sys.stderr if as_json else sys.stdout)
+        state = follow(path, engine, as_json)
         code = 0 if state.certified else 1
     except Interrupted as interrupted:
         # It may have ended just then.
         state, code = interrupted.state, 0 if interrupted.state.certified else 130
-    print(
-        json.dumps(summary(state, path)) if as_json else "\n".join(map(printable, summary_lines(state, path))),
-        flush=True,
-    )
+    print(json.dumps(summary(state, path)) if as_json else "\n".join(summary_lines(state, path)), flush=True)
     if code == 130:
         print(printable(f"interrupted; continue with: ddenv resume {path}"), file=sys.stderr)
     return code, state
 
 
-def follow(path: Path, engine: subprocess.Popen[bytes], out: TextIO) -> RunState:
-    """Prints what happens until the engine ends; returns the last state. Raises UserError and Interrupted."""
+def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunState:
+    """Prints what happens until the engine ends, on stderr if stdout is for JSON; returns the last state.
+
+    Raises UserError and Interrupted.
+    """
     signal.signal(signal.SIGTERM, _interrupt)
-    view = _View(out)
+    view = _View(sys.stderr if as_json else sys.stdout)
+    interrupted = False
     with RunFile(path) as file:
         follower = Follower(file, fold(file.events()))
         before = follower.state.revision
         view.now(follower.state, None)
         try:
             while engine.poll() is None:
-                _update(file, follower, view)
+                view.update(file, follower)
                 time.sleep(POLL)
         except KeyboardInterrupt:
+            interrupted = True
             with contextlib.suppress(KeyboardInterrupt):
                 stop_engines([(file, engine)])
-            _update(file, follower, view)
-            view.close()
-            raise Interrupted(follower.state) from None
-        _update(file, follower, view)
+        view.update(file, follower)
     view.close()
     state = follower.state
+    if interrupted:
+        raise Interrupted(state)
     # An engine without any output did not start, unless there was nothing left to do.
     silent = state.revision == before and engine.returncode != 0
     if silent or not state.ended:
@@ -82,12 +83,6 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _update(file: RunFile, follower: Follower, view: _View) -> None:
-    for event, before, after in follower.new():
-        view.happened(event.kind, before, after)
-    view.now(follower.state, max((live.time for live in file.live()), default=None))
-
-
 class _View:
     """A line for each important event; on a terminal, also the latest state below them."""
 
@@ -95,9 +90,11 @@ class _View:
         self._out, self._terminal = out, out.isatty()
         self._begin = "\r\x1b[K" if self._terminal else ""
 
-    def happened(self, kind: str, before: RunState, after: RunState) -> None:
-        if line := news(kind, before, after):
-            print(f"{self._begin}{printable(line)}", file=self._out, flush=True)
+    def update(self, file: RunFile, follower: Follower) -> None:
+        for event, before, after in follower.new():
+            if line := news(event.kind, before, after):
+                print(f"{self._begin}{printable(line)}", file=self._out, flush=True)
+        self.now(follower.state, max((live.time for live in file.live()), default=None))
 
     def now(self, state: RunState, simulated: float | None) -> None:
         if self._terminal:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.terminal import say_written
 from ddenv.errors import UserError
-from ddenv.text import printable
+from ddenv.runs.folder import find_run
 
 
 @click.command("learn")
@@ -75,24 +76,21 @@ def _check(file: Path) -> int:
 
 def _new(file: Path, run: str | None) -> int:
     from ddenv.learn.shelf import write_template
-    from ddenv.runs.folder import find_run
 
     if run is None:
         raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
-    for path in write_template(file, find_run(run)):
-        print(printable(f"wrote {path}"))
+    say_written(write_template(file, find_run(run)))
     return 0
 
 
 def _race(names: list[str]) -> int:
     from ddenv.learn.race import RACERS, plays_of_runs
-    from ddenv.runs.folder import find_run
     from ddenv.workbench.launch import run_workbench
     from ddenv.workbench.shared.messages import ShowRace
 
     if not RACERS[0] <= len(names) <= RACERS[1]:
         raise UserError(f"--race: expected {RACERS[0]} to {RACERS[1]} runs, found {len(names)}")
-    runs = tuple(find_run(name) for name in names)
+    runs = tuple(map(find_run, names))
     # Read before the screen, so that runs that cannot race are one line in the terminal.
     plays_of_runs(runs)
     return run_workbench(first=ShowRace(runs))
@@ -100,7 +98,7 @@ def _race(names: list[str]) -> int:
 
 def _page(name: str | None, file: Path) -> int:
     from ddenv.learn.handout import handout
-    from ddenv.learn.shelf import open_lesson
+    from ddenv.learn.shelf import find_lesson, open_lesson
     from ddenv.page.html import html
     from ddenv.world.access import write_file
 
@@ -110,23 +108,16 @@ def _page(name: str | None, file: Path) -> int:
         raise UserError(f"--page: {file}: must end in .html")
     if file.exists():
         raise UserError(f"--page: {file}: exists already; choose another name")
-    write_file(file, html(handout(open_lesson(_lesson(name)))).encode())
-    print(printable(f"wrote {file}"))
-    return 0
-
-
-def _lesson(name: str) -> Path:
-    from ddenv.learn.shelf import find_lesson
-
-    file = find_lesson(name)
-    if file is None:
+    lesson = find_lesson(name)
+    if lesson is None:
         raise UserError(f"no lesson {name!r}; 'ddenv learn --list' shows them")
-    return file
+    write_file(file, html(handout(open_lesson(lesson))).encode())
+    say_written([file])
+    return 0
 
 
 def _open(name: str | None) -> int:
     from ddenv.learn.shelf import find_lesson, open_lesson
-    from ddenv.runs.folder import find_run
     from ddenv.workbench.launch import run_workbench
     from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 

@@ -1,18 +1,53 @@
-"""What several commands share: options, and announcing slow steps."""
+"""What several commands share: types of values, options, and what the shell completes after a tab."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ddenv.runs import processor
+from ddenv.runs.folder import SUFFIX, runs_folder
 from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
-from ddenv.text import printable
+
+# Endings of files that a command can open.
+OPENED = (".ddenv", ".yaml", ".yml", ".sdf", ".world", ".urdf")
+
+Complete = Callable[[click.Context, click.Parameter | None, str], list[CompletionItem]]
+Command = Callable[..., Any]
+Option = Callable[[Command], Command]
+
+
+def _offering(*, runs: bool = False, scenarios: bool = False) -> Complete:
+    """Offers names of these, and files of this folder; if none of them fits, the shell looks for a path by itself."""
+
+    def complete(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
+        known: set[str] = set()
+        if runs:
+            known.update(path.stem for path in runs_folder().glob(f"*{SUFFIX}"))
+        if scenarios:
+            from ddenv.world.load import bundled_names
+
+            known.update(bundled_names())
+        if begun:
+            with suppress(OSError):
+                known.update(path.name for path in Path().iterdir() if path.suffix.lower() in OPENED)
+        found = sorted(name for name in known if name.startswith(begun))
+        return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
+
+    return complete
+
+
+runs, scenarios = _offering(runs=True), _offering(scenarios=True)
+runs_and_scenarios = _offering(runs=True, scenarios=True)
+run_argument = click.argument("run", shell_complete=runs)
+
+
+# Types of values.
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click
@@ -23,17 +58,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, ...]:
         try:
-            numbers = tuple(float(word) for word in value.split(","))
+            numbers = tuple(map(float, value.split(",")))
         except ValueError:
             numbers = ()
         if any(not abs(number) <= FARTHEST for number in numbers):
             self.fail(f"no number may be beyond {FARTHEST:g}; found '{value}'", param, ctx)
         if not self.fewest <= len(numbers) <= self.most:
-            self.fail(
-                f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
-                param,
-                ctx,
-            )
+            self.fail(f"expected {self.name}, such as {','.join(['1.5'] * self.most)}; found '{value}'", param, ctx)
         return numbers
 
 
@@ -46,9 +77,8 @@ class Number(click.ParamType):  # type: ignore[type-arg]  # as above
         self._one, self._checked = one, checked
 
     def convert(self, value: Any, param: Any, ctx: Any) -> int | float:
-        whole = self._one.kind is int
         try:
-            number: int | float = int(value) if whole else float(value)
+            number: int | float = int(value) if self._one.kind is int else float(value)
         except ValueError:
             self.fail(f"expected {self._one.wanted}, found '{value}'", param, ctx)
         if not self._checked and not self._one.allows(number):
@@ -61,11 +91,10 @@ def whole(least: int, most: int | None = None) -> Number:
     return Number(Setting(None, "", least=least, most=most, kind=int))
 
 
-Command = Callable[..., Any]
-Option = Callable[[Command], Command]
+# Options.
 
 
-def _together(*options: Option) -> Option:
+def together(*options: Option) -> Option:
     def add(command: Command) -> Command:
         for option in reversed(options):
             command = option(command)
@@ -77,7 +106,7 @@ def _together(*options: Option) -> Option:
 def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) -> Option:
     """An option for each setting that has one, which replaces the scenario's value."""
     chosen = (one for one in OPTIONS if (not only or one.name in only) and one.name not in without)
-    return _together(*map(_option, chosen))
+    return together(*map(_option, chosen))
 
 
 def _option(one: Setting) -> Option:
@@ -112,7 +141,7 @@ trust_option = click.option(
 )
 
 # For commands that take a scenario.
-scenario_options = _together(
+scenario_options = together(
     click.option(
         "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
     ),
@@ -121,7 +150,7 @@ scenario_options = _together(
 )
 
 # For commands that read an SDF world with references to other files.
-reading_options = _together(
+reading_options = together(
     click.option("--model-path", type=Path, multiple=True, help="A folder of models, searched first; may be repeated."),
     click.option(
         "--stand-in",
@@ -146,25 +175,3 @@ def given_reading(reading: Mapping[str, Any]) -> Mapping[str, Any]:
 
         reading_of(**reading)
     return reading
-
-
-def announce(line: str) -> None:
-    """Announces a slow step on stderr, so that programs can read stdout."""
-    print(printable(line), file=sys.stderr, flush=True)
-
-
-@contextmanager
-def announced(line: str) -> Iterator[Callable[[str], None]]:
-    """Announces a slow step; on a terminal, with the time it has taken so far. Yields what replaces the line there."""
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        announce(line)
-        yield lambda _: None
-        return
-    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(printable(line), total=None)
-        yield lambda words: progress.update(task, description=printable(words))

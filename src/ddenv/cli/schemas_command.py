@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ddenv.cli.wrapping import terminal_columns, wrapped
+from ddenv.cli.terminal import terminal_columns, wrapped
 from ddenv.text import printable
 
 if TYPE_CHECKING:
     from ddenv.schemas import Kind
 
-KINDS: tuple[Kind, ...] = ("partitioning", "prioritization", "algorithm")
 TITLES: dict[Kind, str] = {
     "partitioning": "partitionings: how the environment is split",
     "prioritization": "prioritizations: in which order the parts are tried",
@@ -25,7 +24,7 @@ def report() -> dict[str, dict[str, str]]:
     """The object that `--json` prints: the explanations of each kind by name."""
     from ddenv.schemas import explanation, names
 
-    return {f"{kind}s": {name: explanation(kind, name) for name in names(kind)} for kind in KINDS}
+    return {f"{kind}s": {name: explanation(kind, name) for name in names(kind)} for kind in TITLES}
 
 
 def lines(columns: int | None = None) -> list[str]:
@@ -33,16 +32,12 @@ def lines(columns: int | None = None) -> list[str]:
     from ddenv.schemas import explanation, names
 
     said: list[str] = []
-    for kind in KINDS:
-        said += ["", *wrapped(TITLES[kind], columns)] if said else wrapped(TITLES[kind], columns)
+    for kind, title in TITLES.items():
+        said += ["", *wrapped(title, columns)]
         for name in names(kind):
-            said += ["", *_paragraph(printable(name), printable(explanation(kind, name)), columns)]
-    return said
-
-
-def _paragraph(name: str, words: str, columns: int | None) -> list[str]:
-    """The name, and below it the words."""
-    return [*wrapped(name, columns, "  "), *wrapped(words or "(no explanation)", columns, "    ")]
+            words = printable(explanation(kind, name)) or "(no explanation)"
+            said += ["", *wrapped(printable(name), columns, "  "), *wrapped(words, columns, "    ")]
+    return said[1:]
 
 
 @click.command("schemas")

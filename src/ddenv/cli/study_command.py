@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from ddenv.cli.options import jobs_option, setting_options, trust_option, whole
+from ddenv.cli.terminal import asking
 
 
 @click.command("study")
@@ -61,11 +62,11 @@ def study_command(
     It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.
     With --as-printed it follows the paper's algorithm to the letter, which needs many more tests.
     """
-    from ddenv.cli.trusting import allow_named
+    from ddenv.runs.trust import check_named
     from ddenv.study.conduct import conduct
     from ddenv.study.plan import make_plan, scenario_names
 
     plan = make_plan(scenarios, pairs, algorithms, seeds, **options)
     for scenario, name in zip(plan.scenarios, scenario_names(scenarios), strict=True):
-        allow_named(scenario, name, trust)
+        check_named(scenario, name, asking(trust))
     return conduct(plan, folder, jobs, sys.stdout)

@@ -22,7 +22,7 @@ from ddenv.evidence.claims import (
 )
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.took_part import simulated
-from ddenv.runfile.progress import Claim, Node
+from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
@@ -109,7 +109,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     """The same for people."""
     before, after = len(state.elements), len(state.environment)
     if state.baseline is None:
-        return [f"run file: {path}"]
+        return [printable(f"run file: {path}")]
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
         what = "environment, not shown to be minimal"
@@ -150,16 +150,12 @@ def _certificate_lines(state: RunState) -> list[str]:
         return [f"{so_far[0]}; {missing(state)}"]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
-    lines += [_removal(claim) for claim in removals[:MOST_NAMES]]
-    if more := len(removals) - MOST_NAMES:
-        lines += [f"  and {count(more, 'more model')}"] if more > 0 else []
+    lines += [f"  without {claim.without}: {rate(claim)}: {short(claim)}" for claim in removals[:MOST_NAMES]]
+    if (more := len(removals) - MOST_NAMES) > 0:
+        lines.append(f"  and {count(more, 'more model')}")
     if (whole := _whole_world(state)) is not None:
         lines.append(f"  the whole world: {rate(whole)}")
     return [*lines, promise(state, found)] if state.certified else lines
-
-
-def _removal(claim: Claim) -> str:
-    return f"  without {claim.without}: {rate(claim)}: {short(claim)}"
 
 
 def broken(state: RunState) -> list[str]:

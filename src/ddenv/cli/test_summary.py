@@ -78,13 +78,11 @@ def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str)
     `fails` says whether they show f at the certificate's rate, or at less than half of it; None if they do not decide. `said` has
     the same in words. An environment without a run that ended is left out.
     """
-    return [_elsewhere(row, results, here, simulator) for row in summary(results) if row["runs"]]
-
-
-def _elsewhere(
-    row: Mapping[str, Any], results: Sequence[Mapping[str, Any]], here: Claim, simulator: str
-) -> dict[str, Any]:
-    ended = [each for each in results if each["without"] == row["without"] and each["outcome"] not in BROKEN]
-    fails = shows_at((each["outcome"] == "similar" for each in ended), here.low)
-    there = replace(here, **{key: row[key] for key in ("without", "shown", "runs", "low", "high")})
-    return {"without": row["without"], "fails": fails, "said": in_another_simulator(simulator, fails, there, here)}
+    found = []
+    for row in (each for each in summary(results) if each["runs"]):
+        ended = [each for each in results if each["without"] == row["without"] and each["outcome"] not in BROKEN]
+        fails = shows_at((each["outcome"] == "similar" for each in ended), here.low)
+        there = replace(here, **{key: row[key] for key in ("without", "shown", "runs", "low", "high")})
+        said = in_another_simulator(simulator, fails, there, here)
+        found.append({"without": row["without"], "fails": fails, "said": said})
+    return found

@@ -2,37 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ddenv.cli.wrapping import cut, wrapped
+from rich.text import Text
+
+from ddenv.cli.terminal import wrapped
 from ddenv.text import count, first_of, padded, printable, shortened, width
 from ddenv.world.extent import center, model_bounds
-from ddenv.world.model import (
-    Box,
-    Capsule,
-    Cylinder,
-    Ellipsoid,
-    Mesh,
-    Model,
-    Note,
-    Plane,
-    Shape,
-    Sphere,
-    World,
-    is_ground,
-)
+from ddenv.world.model import Mesh, Model, Note, World, is_ground
 from ddenv.world.placement import inside, note_inside
 
-NAMES: dict[type, str] = {
-    Box: "box",
-    Capsule: "capsule",
-    Cylinder: "cylinder",
-    Ellipsoid: "ellipsoid",
-    Mesh: "hull",
-    Plane: "plane",
-    Sphere: "sphere",
-}
 LONGEST_NAME, SHORTEST_NAME = 34, 10
 GAP = "  "
 # A row has the notes of a model twice: with details, and as numbers only.
@@ -121,7 +102,10 @@ def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:
     if shown is None and columns is not None:
         widths[0] = max(SHORTEST_NAME, widths[0] - (wide[-1] - columns))
     shown = shown or CHOICES[-1]
-    return [cut(GAP.join(_cell(row[i], widths[i], i) for i in shown).rstrip(), columns) for row in rows]
+    lines = [Text(GAP.join(_cell(row[i], widths[i], i) for i in shown).rstrip()) for row in rows]
+    for line in lines:
+        line.truncate(line.cell_len if columns is None else columns, overflow="ellipsis")
+    return [line.plain for line in lines]
 
 
 def _title(world: World) -> str:
@@ -156,7 +140,7 @@ def _row(model: Model, notes: Mapping[str, str]) -> tuple[str, ...]:
         shortened(model.name, LONGEST_NAME),
         kind(model),
         str(len(model.links)),
-        ", ".join(f"{number} {shape}" for shape, number in _shapes(model)) or "none",
+        ", ".join(f"{number} {shape}" for shape, number in _shapes(model).items()) or "none",
         size,
         ", ".join(f"{part:.2f}" for part in center(model)),
         f"{model.links[0].pose.yaw():.2f}",
@@ -165,10 +149,10 @@ def _row(model: Model, notes: Mapping[str, str]) -> tuple[str, ...]:
     )
 
 
-def _shapes(model: Model) -> list[tuple[str, int]]:
-    shapes: list[Shape] = [collision.shape for collision in model.collisions]
-    found = [NAMES[type(shape)] for shape in shapes]
-    return [(name, found.count(name)) for name in dict.fromkeys(found)]
+def _shapes(model: Model) -> Counter[str]:
+    """How many shapes of each kind; a mesh is simulated as its hull."""
+    shapes = [collision.shape for collision in model.collisions]
+    return Counter("hull" if isinstance(shape, Mesh) else type(shape).__name__.lower() for shape in shapes)
 
 
 def _cell(text: str, columns: int, which: int) -> str:

@@ -11,19 +11,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.completing import scenarios
-from ddenv.cli.options import Numbers, announce, announced, reading_options
+from ddenv.cli.options import Numbers, reading_options, scenarios, together
+from ddenv.cli.terminal import announce, announced, say_written, terminal_columns
 from ddenv.errors import UserError
-from ddenv.text import printable
+from ddenv.runs.folder import find_run
+from ddenv.text import count, first_of, printable
 
 if TYPE_CHECKING:
-    from ddenv.runfile.state import RunState
     from ddenv.world.model import World
     from ddenv.world.scenario import Reading
 
 
 # A line names so many models.
 MOST_NAMES = 5
+
+# A world, as it is read.
+world_argument = together(
+    click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
+    reading_options,
+)
 
 
 @click.group("world")
@@ -32,22 +38,19 @@ def world_group() -> None:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def check(file: Path, as_json: bool, **reading: Any) -> int:
     """Shows how FILE is read: each model, what was replaced or ignored, and why."""
     from ddenv.cli.world_check import lines, report
-    from ddenv.cli.wrapping import terminal_columns
 
-    world = _read(file, reading)
+    world, _ = _read(file, reading)
     print(json.dumps(report(world)) if as_json else "\n".join(lines(world, terminal_columns())))
     return 0
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
@@ -67,19 +70,19 @@ def show(
     from ddenv.world.access import write_file
 
     if took_part or passes:
-        option, drawn = ("--took-part", _took_part) if took_part else ("--passes", _passing)
         if spawn is not None or goal is not None or svg is not None or (took_part and passes):
+            option = "--took-part" if took_part else "--passes"
             raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run do not go with it")
-        world, dim, below = drawn(str(file))
+        world, dim, below = _of_run(str(file), passes)
         print("\n".join([_map(world, dim=dim), *below]))
         return 0
-    world = _read(file, reading)
+    world, _ = _read(file, reading)
     start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
     if svg is not None:
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
-        print(printable(f"wrote {svg}"))
-        return 0
-    print(_map(world, spawn=start, goal=goal))
+        say_written([svg])
+    else:
+        print(_map(world, spawn=start, goal=goal))
     return 0
 
 
@@ -91,51 +94,35 @@ def _map(world: World, **marks: Any) -> str:
     return terminal_map(world, columns, rows - 1, color=color, **marks)
 
 
-def _took_part(run: str) -> tuple[World, frozenset[str], list[str]]:
-    """The world of a run, what did not take part in its runs of the whole world, and lines: what did, the most frequent first.
-
-    Raises UserError where that is unknown.
+def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
+    """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what took no part in the
+    runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
     """
     from ddenv.evidence.took_part import in_whole_world
-    from ddenv.text import count
-
-    path, world, state = _of_run(run)
-    times, baseline = in_whole_world(state), state.baseline
-    if not times or baseline is None:
-        raise UserError(f"{path}: it is not recorded what took part in its runs of the whole world; make a new run")
-    head = f"{count(len(times), 'model')} of {len(state.elements)} took part in the runs of the whole world:"
-    lines = [f"  {printable(name)}: {number} of {count(baseline.runs, 'run')}" for name, number in times.most_common()]
-    return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
-
-
-def _passing(run: str) -> tuple[World, frozenset[str], list[str]]:
-    """The world of a run, what has to go so that it passes, and the same in lines.
-
-    Raises UserError where no world that passes is known.
-    """
-    from ddenv.runs.nearest import removed_in_passing
-    from ddenv.text import count
-
-    path, world, state = _of_run(run)
-    gone = removed_in_passing(state, path)
-    head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"
-    return world, frozenset(gone), [head, *(f"  {printable(name)}" for name in gone)]
-
-
-def _of_run(name: str) -> tuple[Path, World, RunState]:
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
+    from ddenv.runs.nearest import removed_in_passing
     from ddenv.runs.subject import read_parts
 
     path = find_run(name)
     with RunFile(path) as run:
-        return path, read_parts(run)[1], fold(run.events())
+        world, state = read_parts(run)[1], fold(run.events())
+    if passes:
+        gone = removed_in_passing(state, path)
+        head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"
+        return world, frozenset(gone), [head, *(f"  {printable(model)}" for model in gone)]
+    times, baseline = in_whole_world(state), state.baseline
+    if not times or baseline is None:
+        raise UserError(f"{path}: it is not recorded what took part in its runs of the whole world; make a new run")
+    head = f"{count(len(times), 'model')} of {len(state.elements)} took part in the runs of the whole world:"
+    lines = [
+        f"  {printable(model)}: {number} of {count(baseline.runs, 'run')}" for model, number in times.most_common()
+    ]
+    return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option(
     "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
 )
@@ -143,18 +130,16 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
     """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
     from ddenv.world.write import write_converted
 
-    for path in write_converted(_read(file, reading), output):
-        print(printable(f"wrote {path}"))
+    say_written(write_converted(_read(file, reading)[0], output))
     return 0
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
-@reading_options
+@world_argument
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:
     """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
-    world, read_as = _read_as(file, reading)
+    world, read_as = _read(file, reading)
     print("\n".join(map(printable, _settle(world, read_as, output))))
     return 0
 
@@ -167,7 +152,6 @@ def _settle(world: World, reading: Reading, output: Path) -> list[str]:
     from ddenv.robot.settled import moved, notes_on
     from ddenv.robot.simulation.template import Variants
     from ddenv.runs.subject import scenario_for_world
-    from ddenv.text import count, first_of
     from ddenv.world.access import write_file
     from ddenv.world.placement import note_inside
     from ddenv.world.sdf.moved import with_places
@@ -197,13 +181,8 @@ def _settle(world: World, reading: Reading, output: Path) -> list[str]:
     return lines
 
 
-def _read(file: Path, reading: dict[str, Any]) -> World:
-    """The world of an SDF file, or of a scenario. Raises UserError."""
-    return _read_as(file, reading)[0]
-
-
-def _read_as(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
-    """The same, and how it was read."""
+def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
+    """The world of an SDF file, or of a scenario, and how it was read. Raises UserError."""
     from ddenv.runs.subject import named_file, reading_of
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN

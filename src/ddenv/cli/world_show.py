@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product, zip_longest
 
 import numpy as np
 
@@ -65,20 +66,19 @@ def terminal_map(
     entries = [entry for entry in _entries(models) if entry[1] not in dim]
     layout = _layout(high - low, columns, rows, entries)
     view = _view(low, high, layout)
+    axes = _axes(view)
     canvas = picture(models, view, color=color, dim=dim)
-    _grid(canvas, view)
+    _grid(canvas, *axes)
     _marks(canvas, view, spawn, goal, color)
-    drawn = list(_framed(canvas, view, color))
+    drawn = list(_framed(canvas, view, *axes, color))
     left = columns - AXIS - view.columns - len(GAP) if layout.beside else columns
     legend = _legend(entries, left, layout.legend_lines)
     title = shortened(_title(world, models, spawn, goal), columns)
     if not layout.beside:
         return "\n".join([title, *drawn, *legend])
     empty = " " * (view.columns + AXIS)
-    height = max(len(drawn), len(legend))
-    drawn += [empty] * (height - len(drawn))
-    legend += [""] * (height - len(legend))
-    return "\n".join([title, *(f"{line}{GAP}{text}".rstrip() for line, text in zip(drawn, legend, strict=True))])
+    both = zip_longest(drawn, legend)
+    return "\n".join([title, *(f"{line or empty}{GAP}{text or ''}".rstrip() for line, text in both)])
 
 
 def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Point | None) -> str:
@@ -118,24 +118,25 @@ def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
     if not entries:
         return []
     widths = _widths(entries, columns)
-    wide = sum(widths) + 3 * len(GAP)
     lines = most - 1
-    blocks = max(1, (columns + 2 * len(GAP)) // (wide + 2 * len(GAP)))
-    room = lines * blocks
+    room = lines * _blocks(widths, columns)
     shown = entries if len(entries) <= room else entries[: room - 1]
     cells = [_cell(entry, widths) for entry in shown]
     if len(shown) < len(entries):
-        cells.append(padded(_more(len(entries) - len(shown), columns), wide))
+        words = f"... and {len(entries) - len(shown)} more"
+        remedy = f"{words} (--svg FILE names them)"
+        cells.append(padded(remedy if len(remedy) <= columns else words, _wide(widths)))
     stacks = [[_cell(HEADER, widths), *cells[start : start + lines]] for start in range(0, len(cells), lines)]
-    height = max(map(len, stacks))
-    rows = zip(*([*stack, *[""] * (height - len(stack))] for stack in stacks), strict=True)
-    return [shortened((2 * GAP).join(row).rstrip(), columns) for row in rows]
+    return [shortened((2 * GAP).join(row).rstrip(), columns) for row in zip_longest(*stacks, fillvalue="")]
 
 
-def _more(number: int, columns: int) -> str:
-    words = f"... and {number} more"
-    remedy = f"{words} (--svg FILE names them)"
-    return remedy if width(remedy) <= columns else words
+def _wide(widths: Sequence[int]) -> int:
+    return sum(widths) + 3 * len(GAP)
+
+
+def _blocks(widths: Sequence[int], columns: int) -> int:
+    """How many legends fit side by side."""
+    return max(1, (columns + 2 * len(GAP)) // (_wide(widths) + 2 * len(GAP)))
 
 
 def _cell(entry: Entry, widths: Sequence[int]) -> str:
@@ -150,10 +151,8 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
 def _layout(spans: np.ndarray, columns: int, rows: int, entries: Sequence[Entry]) -> _Layout:
     """The layout with the larger map; `spans` is what it shows, m."""
     widths = _widths(entries, columns // 2)
-    wide = sum(widths) + 3 * len(GAP)
-    beside = _Layout(columns - AXIS - len(GAP) - wide, rows - AROUND, rows - 1, True)
-    blocks = max(1, (columns + 2 * len(GAP)) // (wide + 2 * len(GAP)))
-    lines = min(1 + math.ceil(len(entries) / blocks), max(3, rows // 3)) if entries else 0
+    beside = _Layout(columns - AXIS - len(GAP) - _wide(widths), rows - AROUND, rows - 1, True)
+    lines = min(1 + math.ceil(len(entries) / _blocks(widths, columns)), max(3, rows // 3)) if entries else 0
     below = _Layout(columns - AXIS, rows - AROUND - lines, lines, False)
     if not entries or beside.columns < 2 * NUMBERS or _scale(spans, below) < _scale(spans, beside):
         return below
@@ -177,36 +176,23 @@ def _view(low: np.ndarray, high: np.ndarray, layout: _Layout) -> View:
 # Axes and marks.
 
 
-def _x_ticks(view: View) -> tuple[list[float], float]:
-    span = view.columns * view.scale
-    step = tick_step(span, max(1, view.columns // 8))
-    return ticks(view.x - span / 2, view.x + span / 2, step), step
-
-
-def _y_ticks(view: View) -> tuple[list[float], float]:
-    span = 2 * view.rows * view.scale
-    step = tick_step(span, max(1, view.rows // 4))
-    return ticks(view.y - span / 2, view.y + span / 2, step), step
-
-
-def _places(view: View) -> tuple[dict[int, str], dict[int, str]]:
+def _axes(view: View) -> tuple[dict[int, str], dict[int, str]]:
     """The numbers along x by column, and along y by row."""
-    (xs, x_step), (ys, y_step) = _x_ticks(view), _y_ticks(view)
-    across = {view.cell(x, view.y): tick_text(x, x_step) for x in xs}
-    down = {view.cell(view.x, y): tick_text(y, y_step) for y in ys}
+    wide, high = view.columns * view.scale / 2, view.rows * view.scale
+    x_step, y_step = tick_step(2 * wide, max(1, view.columns // 8)), tick_step(2 * high, max(1, view.rows // 4))
+    across = {view.cell(x, view.y): tick_text(x, x_step) for x in ticks(view.x - wide, view.x + wide, x_step)}
+    down = {view.cell(view.x, y): tick_text(y, y_step) for y in ticks(view.y - high, view.y + high, y_step)}
     return {cell[1]: text for cell, text in across.items() if cell}, {
         cell[0]: text for cell, text in down.items() if cell
     }
 
 
-def _grid(canvas: Canvas, view: View) -> None:
+def _grid(canvas: Canvas, across: Iterable[int], down: Iterable[int]) -> None:
     """A dot on free ground where the lines of two numbers cross."""
-    across, down = _places(view)
-    for row in down:
-        for column in across:
-            if canvas.chars[row, column] == ord(" "):
-                canvas.chars[row, column] = ord("·")
-                canvas.fore[row, column] = FAINT
+    for row, column in product(down, across):
+        if canvas.chars[row, column] == ord(" "):
+            canvas.chars[row, column] = ord("·")
+            canvas.fore[row, column] = FAINT
 
 
 def _marks(canvas: Canvas, view: View, spawn: Pose | None, goal: Point | None, color: bool) -> None:
@@ -216,9 +202,10 @@ def _marks(canvas: Canvas, view: View, spawn: Pose | None, goal: Point | None, c
         canvas.put(view.cell(*point[:2]), sign, WHITE if color else PLAIN, back if color else None)
 
 
-def _framed(canvas: Canvas, view: View, color: bool) -> Iterator[str]:
+def _framed(
+    canvas: Canvas, view: View, across: Mapping[int, str], down: Mapping[int, str], color: bool
+) -> Iterator[str]:
     """The lines of the picture with its frame; all are equally wide."""
-    across, down = _places(view)
     yield f"{'y, m':>{NUMBERS}}┌{'─' * view.columns}┐"
     for row in range(view.rows):
         number, corner = (down[row], "┤") if row in down else ("", "│")
@@ -228,7 +215,7 @@ def _framed(canvas: Canvas, view: View, color: bool) -> Iterator[str]:
     yield _under(across, view.columns)
 
 
-def _under(across: dict[int, str], columns: int) -> str:
+def _under(across: Mapping[int, str], columns: int) -> str:
     """The numbers along x, each below its place."""
     full = columns + AXIS
     line = [" "] * full
@@ -242,10 +229,9 @@ def _under(across: dict[int, str], columns: int) -> str:
 
 def _escaped(run: Run) -> str:
     """A run in its colours; the terminal's own need no code."""
-    codes = [_code(38, run.fore), _code(48, run.back), "1" if run.bold else ""]
-    chosen = ";".join(filter(None, codes))
-    return f"\x1b[{chosen}m{run.text}\x1b[0m" if chosen else run.text
-
-
-def _code(ground: int, color: int) -> str:
-    return "" if color == PLAIN else f"{ground};2;{color >> 16};{color >> 8 & 255};{color & 255}"
+    grounds = ((38, run.fore), (48, run.back))
+    codes = [
+        f"{ground};2;{color >> 16};{color >> 8 & 255};{color & 255}" for ground, color in grounds if color != PLAIN
+    ]
+    codes += ["1"] if run.bold else []
+    return f"\x1b[{';'.join(codes)}m{run.text}\x1b[0m" if codes else run.text

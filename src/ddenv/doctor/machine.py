@@ -17,7 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ddenv import __version__
-from ddenv.doctor.finding import Finding
+from ddenv.doctor import Finding
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX, runs_folder
 from ddenv.runs.programs import how_to_install
@@ -25,7 +25,6 @@ from ddenv.text import count
 
 # By the names that packages are installed as, with the module that shows that they are there.
 NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}
-OPTIONAL = {"textual-serve": ("textual_serve", f"only 'ddenv serve' needs it: {how_to_install('serve')}")}
 SMALLEST = (80, 24)
 # Less free space or memory than this is worth a line, bytes.
 LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000
@@ -43,9 +42,9 @@ def installation() -> Iterator[Finding]:
         else:
             yield Finding("installation", name, "not installed", "wrong", f"pip install {name}")
     yield Finding("installation", "SQLite", sqlite3.sqlite_version)
-    for name, (module, why) in OPTIONAL.items():
-        there = importlib.util.find_spec(module) is not None
-        yield Finding("installation", name, _version(name) if there else f"not installed; {why}")
+    missing = f"not installed; only 'ddenv serve' needs it: {how_to_install('serve')}"
+    served = _version("textual-serve") if importlib.util.find_spec("textual_serve") is not None else missing
+    yield Finding("installation", "textual-serve", served)
 
 
 def _version(name: str) -> str:
@@ -68,11 +67,8 @@ def terminal() -> Iterator[Finding]:
     encoding = locale.getpreferredencoding(False)
     told = encoding.lower().replace("-", "") == "utf8"
     yield Finding("terminal", "letters", encoding, "ok" if told else "note", "" if told else "export LANG=C.UTF-8")
-    ways = [
-        words
-        for name, words in (("SSH_CONNECTION", "ssh"), ("TMUX", "tmux"), ("STY", "screen"))
-        if os.environ.get(name)
-    ]
+    known = {"SSH_CONNECTION": "ssh", "TMUX": "tmux", "STY": "screen"}
+    ways = [words for name, words in known.items() if os.environ.get(name)]
     yield Finding("terminal", "by way of", ", ".join(ways) or "this machine's own")
 
 
@@ -120,8 +116,7 @@ def _is_free(port: int) -> bool:
 def runs() -> Iterator[Finding]:
     """Where runs are kept."""
     folder = runs_folder()
-    there = len(list(folder.glob(f"*{SUFFIX}"))) if folder.is_dir() else 0
-    yield Finding("runs", "folder", f"{folder}, {count(there, 'run')}")
+    yield Finding("runs", "folder", f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
     yield _space("room", nearest, "runs")
 
@@ -134,12 +129,8 @@ def _space(what: str, folder: Path, group: str) -> Finding:
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(b"room")
     except OSError as error:
-        return Finding(
-            group,
-            what,
-            f"{folder} cannot be written: {error.strerror}",
-            "wrong",
-            "another folder, in DDENV_HOME or TMPDIR",
-        )
-    little = free < LITTLE_SPACE
-    return Finding(group, what, says, "note" if little else "ok", "a run needs up to some hundred MB" if little else "")
+        says, advice = f"{folder} cannot be written: {error.strerror}", "another folder, in DDENV_HOME or TMPDIR"
+        return Finding(group, what, says, "wrong", advice)
+    if free < LITTLE_SPACE:
+        return Finding(group, what, says, "note", "a run needs up to some hundred MB")
+    return Finding(group, what, says)

@@ -6,10 +6,11 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from ddenv import __version__
-from ddenv.doctor.finding import Finding
+from ddenv.doctor import Finding
 from ddenv.errors import UserError
 from ddenv.runfile.integrity import Whole, faults, rescue, whole
 from ddenv.runfile.lock import engine_is_alive, mode_beside
@@ -18,7 +19,7 @@ from ddenv.runs.programs import last_words
 from ddenv.runs.subject import read_parts
 from ddenv.text import count
 
-GROUP = "run"
+_finding = partial(Finding, "run")
 
 
 def run_health(path: Path) -> list[Finding]:
@@ -31,7 +32,7 @@ def run_health(path: Path) -> list[Finding]:
     except UserError as error:
         if not path.is_file():
             raise
-        return [*found, Finding(GROUP, "content", _without(str(error)), "wrong", _repair(path))]
+        return [*found, _finding("content", _without(str(error)), "wrong", _repair(path))]
 
 
 def repair(path: Path, copy: Path) -> list[Finding]:
@@ -50,12 +51,10 @@ def repair(path: Path, copy: Path) -> list[Finding]:
 @contextmanager
 def _opened(path: Path, with_log: bool = True) -> Iterator[RunFile]:
     """The run to be read: a copy of it, if a log of an engine that is gone belongs to it."""
-    log = path.with_name(f"{path.name}-wal")
-    if engine_is_alive(path):
-        with RunFile(path) as file:
-            yield file
-    elif not with_log or not log.exists() or not log.stat().st_size:
-        with RunFile(path, untouched=True) as file:
+    log = _log_of(path) if with_log else None
+    alive = engine_is_alive(path)
+    if alive or log is None:
+        with RunFile(path, untouched=not alive) as file:
             yield file
     else:
         with tempfile.TemporaryDirectory(prefix="ddenv-doctor-") as folder:
@@ -68,8 +67,7 @@ def _opened(path: Path, with_log: bool = True) -> Iterator[RunFile]:
 @contextmanager
 def _most(path: Path) -> Iterator[RunFile]:
     """The run with its log or without it: the log of another file damages it."""
-    logged = path.with_name(f"{path.name}-wal").exists() and not engine_is_alive(path)
-    if not logged:
+    if _log_of(path) is None or engine_is_alive(path):
         with _opened(path) as file:
             yield file
         return
@@ -92,45 +90,42 @@ def _file(path: Path) -> Finding:
         raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
     says = f"{path}, {path.stat().st_size / 1e6:.1f} MB"
     if mode_beside(path) & 0o022:
-        return Finding(GROUP, "file", f"{says}; others can write it", "note", f"chmod go-w {path}")
-    return Finding(
-        GROUP, "file", f"{says}; {'others can read it' if mode_beside(path) & 0o044 else 'only you can read it'}"
-    )
+        return _finding("file", f"{says}; others can write it", "note", f"chmod go-w {path}")
+    return _finding("file", f"{says}; {'others' if mode_beside(path) & 0o044 else 'only you'} can read it")
 
 
 def _log(path: Path, alive: bool) -> Finding:
-    log = path.with_name(f"{path.name}-wal")
-    size = log.stat().st_size if log.exists() else 0
-    if not size:
-        return Finding(GROUP, "log", "none: the run is one file")
-    says = f"{log.name}, {size / 1e6:.1f} MB"
+    log = _log_of(path)
+    if log is None:
+        return _finding("log", "none: the run is one file")
+    says = f"{log.name}, {log.stat().st_size / 1e6:.1f} MB"
     if alive:
-        return Finding(GROUP, "log", f"{says}: a copy of the run needs it", "ok", "")
-    return Finding(
-        GROUP,
-        "log",
-        f"{says}: left by a killed engine, and part of the run",
-        "note",
-        "keep it beside the run; opening the run merges it",
-    )
+        return _finding("log", f"{says}: a copy of the run needs it")
+    keep = "keep it beside the run; opening the run merges it"
+    return _finding("log", f"{says}: left by a killed engine, and part of the run", "note", keep)
+
+
+def _log_of(path: Path) -> Path | None:
+    """SQLite's log beside a run; None if there is none, or nothing in it."""
+    log = path.with_name(f"{path.name}-wal")
+    return log if log.exists() and log.stat().st_size else None
 
 
 def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
     found = faults(file)
-    yield Finding(GROUP, "SQLite", "; ".join(found) or "sound", *(("wrong", _repair(path)) if found else ()))
+    yield _finding("SQLite", "; ".join(found) or "sound", *(("wrong", _repair(path)) if found else ()))
     read = whole(file)
     words = f"{count(read.events, 'event')}, {count(len(read.state.finished_tests), 'test')}"
     if read.trouble:
-        yield Finding(GROUP, "events", f"{words} are whole; then: {read.trouble}", "wrong", _repair(path))
+        yield _finding("events", f"{words} are whole; then: {read.trouble}", "wrong", _repair(path))
     else:
-        yield Finding(GROUP, "events", words)
+        yield _finding("events", words)
     trouble = _parts(file)
-    yield Finding(
-        GROUP, "world", trouble or "can be read, with the scenario and the robot", "wrong" if trouble else "ok"
-    )
+    says = trouble or "can be read, with the scenario and the robot"
+    yield _finding("world", says, "wrong" if trouble else "ok")
     if read.bare:
         says = f"{read.bare} of {count(len(read.state.finished_tests), 'test')} have none, and cannot be shown"
-        yield Finding(GROUP, "trajectories", says, "note")
+        yield _finding("trajectories", says, "note")
     yield from _made_with(read)
     yield _engine(read, path, alive)
 
@@ -147,30 +142,27 @@ def _parts(file: RunFile) -> str:
 def _made_with(read: Whole) -> Iterator[Finding]:
     now = read.state.physics.now
     if not now:
-        yield Finding(GROUP, "made with", "nothing yet")
+        yield _finding("made with", "nothing yet")
         return
     other = read.state.engine_version not in ("", __version__)
     advice = f"this is ddenv {__version__}: 'ddenv resume' first compares the bits" if other else ""
-    yield Finding(GROUP, "made with", now, "note" if other else "ok", advice)
+    yield _finding("made with", now, "note" if other else "ok", advice)
     for each in read.state.physics.mixed:
-        yield Finding(GROUP, "mixed", each, "note")
+        yield _finding("mixed", each, "note")
 
 
 def _engine(read: Whole, path: Path, alive: bool) -> Finding:
     state = read.state
+    if alive and state.needs_room:
+        return _finding("engine", "waits for room on the disk", "note")
     if alive:
-        return Finding(
-            GROUP,
-            "engine",
-            "waits for room on the disk" if state.needs_room else "at work",
-            "note" if state.needs_room else "ok",
-        )
+        return _finding("engine", "at work")
     if state.ended:
-        return Finding(GROUP, "engine", f"{state.status}: {state.reason}")
+        return _finding("engine", f"{state.status}: {state.reason}")
     if state.status == "created":
-        return Finding(GROUP, "engine", "none has worked on it yet")
+        return _finding("engine", "none has worked on it yet")
     says = _without(last_words(path)).partition("; go on with")[0]
-    return Finding(GROUP, "engine", f"none is at work: {says}", "note", f"ddenv resume {path}")
+    return _finding("engine", f"none is at work: {says}", "note", f"ddenv resume {path}")
 
 
 def _repair(path: Path) -> str:

@@ -235,5 +235,5 @@ class Sight:
             first_sensed=dict(run.first_sensed),
             touched=frozenset(name for name, _ in run.first_touched),
             miss_chance=known_failure(state).miss_chance,
-            _memory={},
+            _nearest={},
         )

@@ -82,9 +82,9 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[st
 
 def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
     """The models and the seed of a test of the run."""
-    if subject.position is None:
+    state = subject.state
+    if state is None:
         raise UserError("--test: needs a run; a scenario has no tests yet")
-    state = subject.position.end
     if not 0 < number <= len(state.tests):
         raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(state.tests)}")
     test = state.tests[number - 1]

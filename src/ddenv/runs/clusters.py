@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.runs.programs import how_to_install
+from ddenv.world.access import is_file
 from ddenv.world.scenario import Scenario
 
 HERE = "here"
@@ -20,7 +21,7 @@ def check_cluster(cluster: str) -> None:
     """Raises UserError for what is neither `here` nor a cluster that can be asked, and where Dask is not installed."""
     if cluster == HERE:
         return
-    if not (SCHEDULER.fullmatch(cluster) or hosts_of(cluster) or is_scheduler_file(cluster)):
+    if not (SCHEDULER.fullmatch(cluster) or hosts_of(cluster) or is_file(Path(cluster))):
         raise UserError(
             f"options: reduction.cluster: expected here, tcp://HOST:PORT, tls://HOST:PORT, ssh:HOST1,HOST2 or the path of a "
             f"scheduler file that is there, found '{cluster}'"
@@ -38,12 +39,3 @@ def hosts_of(cluster: str) -> list[str]:
     """The hosts of `ssh:HOST1,HOST2`; none for any other cluster."""
     hosts = cluster.removeprefix(SSH).split(",") if cluster.startswith(SSH) else []
     return hosts if all(re.fullmatch(r"\w[\w.-]*", host) for host in hosts) else []
-
-
-def is_scheduler_file(cluster: str) -> bool:
-    """Whether it is the path of a file that is there."""
-    try:
-        return Path(cluster).is_file()
-    except (OSError, ValueError):
-        # Text can be too long for a path.
-        return False

@@ -1,16 +1,40 @@
-"""Creates run files: from a scenario, or like another run."""
+"""Creates run files: of what a user named, of a scenario, or like another run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from ddenv.runfile.events import Created
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.clusters import check_cluster
-from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts
+from ddenv.runs.folder import run_path
+from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts, scenario_named
+from ddenv.runs.trust import check_named, trust_cluster
 from ddenv.world.access import read_bytes
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
+
+
+def create_named(
+    subject: str,
+    given: Mapping[str, Any],
+    asks: Callable[[str], bool],
+    name: str | None,
+    output: Path | None,
+    announce: Announce | None = None,
+) -> tuple[Path, World]:
+    """Writes a new run of the scenario or the world `subject`, with the options `given`; returns its file and its world.
+
+    `asks` whether what it starts is trusted. `name` and `output` as for `run_path`. Raises UserError, with nothing written.
+    """
+    scenario = scenario_named(subject, given, announce)
+    if given["cluster"]:
+        trust_cluster(scenario)
+    check_named(scenario, subject, asks)
+    path = run_path(scenario.name, name, output)
+    return path, create_run(scenario, path, announce)
 
 
 def create_run(scenario: Scenario, path: Path, announce: Announce | None = None) -> World:
@@ -20,8 +44,9 @@ def create_run(scenario: Scenario, path: Path, announce: Announce | None = None)
     """
     check_cluster(scenario.reduction.cluster)
     world, _ = load_parts(scenario, announce)
-    documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
-    _write(scenario, world, path, documents | {"world": world.text, "robot": read_bytes(scenario.robot.model)})
+    documents = {"world": world.text, "robot": read_bytes(scenario.robot.model)}
+    documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
+    _write(scenario, world, path, documents)
     return world
 
 
@@ -33,8 +58,8 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
     check_cluster(scenario.reduction.cluster)
     with RunFile(run) as file:
         _, world, robot = read_parts(file)
-        documents = {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
-        documents |= {name: file.document(name) for name in ("world", "robot")}
+        documents = {name: file.document(name) for name in ("world", "robot")}
+        documents |= {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
     check_parts(scenario, world, robot)
     _write(scenario, world, path, documents)
 

@@ -39,8 +39,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
         state = fold(file.events())
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
-    gone = removed_in_passing(state, run) if passes else set(state.elements).difference(state.environment)
-    removed = frozenset(gone)
+    removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
     try:
         text = without(world, removed)
     except ValueError as error:
@@ -51,7 +50,8 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     needs = list(dict.fromkeys(uri for uri, base in asked.asked if base == scenario.world.parent))
     if scenario_file is None:
         return Exported([sdf], needs)
-    model = scenario_file.with_suffix(f".robot{_suffix(scenario.robot.model)}")
+    is_urdf = scenario.robot.model.suffix.lower() == ".urdf"
+    model = scenario_file.with_suffix(".robot.urdf" if is_urdf else ".robot.sdf")
     write_file(model, robot)
     data = scenario.model_dump(mode="json")
     folder = scenario_file.parent.resolve()
@@ -75,10 +75,6 @@ def _name(path: Path, folder: Path) -> str:
     """`path` as written in a scenario in `folder`: relative if it lies in that folder, so that the folder can be moved."""
     path = path.resolve()
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
-
-
-def _suffix(robot: Path) -> str:
-    return ".urdf" if robot.suffix.lower() == ".urdf" else ".sdf"
 
 
 def _packages(file: Path, robot: bytes) -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -50,32 +51,27 @@ def dropped_run(text: str) -> Path | None:
     return None
 
 
-def free_run_path(scenario_name: str) -> Path:
-    """The first free name-1, name-2, ... in the runs folder."""
-    return _free(runs_folder(), scenario_name)
-
-
-def _free(folder: Path, scenario_name: str) -> Path:
+def free_run_path(scenario_name: str, folder: Path | None = None) -> Path:
+    """The first free name-1, name-2, ... in a folder, by default the runs folder."""
+    folder = folder or runs_folder()
     stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in scenario_name)
     # 80 letters of four bytes each are too long for file systems.
     stem = stem.encode()[:LONGEST_STEM].decode(errors="ignore")
-    number = 1
-    while (path := folder / f"{stem}-{number}{SUFFIX}").exists():
-        number += 1
-    return path
+    paths = (folder / f"{stem}-{number}{SUFFIX}" for number in count(1))
+    return next(path for path in paths if not path.exists())
 
 
 def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
     if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
         raise UserError(f"--name: '{name}' is not a valid file name; use letters, digits, - and _")
-    name = None if name is None else name.removesuffix(SUFFIX)
-    if output is None or output.suffix in (".sdf", ".world"):
-        if output is not None and not output.parent.is_dir():
+    if output is not None and output.suffix in (".sdf", ".world"):
+        if not output.parent.is_dir():
             raise UserError(f"--output: there is no folder {output.parent}")
-        return free_run_path(scenario_name) if name is None else runs_folder() / f"{name}{SUFFIX}"
-    if output.is_dir():
-        return _free(output, scenario_name) if name is None else output / f"{name}{SUFFIX}"
-    if output.suffix != SUFFIX:
-        raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
-    return output
+        output = None
+    if output is not None and not output.is_dir():
+        if output.suffix != SUFFIX:
+            raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
+        return output
+    folder = output or runs_folder()
+    return free_run_path(scenario_name, folder) if name is None else folder / f"{name.removesuffix(SUFFIX)}{SUFFIX}"

@@ -6,13 +6,11 @@
 from __future__ import annotations
 
 import math
-from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_nearest, of_passing
-from ddenv.runfile.progress import Isolation
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_unknown, where_they_part
@@ -54,9 +52,13 @@ class Nearest:
     def sentences(self) -> str:
         """All of it in a few sentences."""
         said = f"{self.words[:1].upper()}{self.words[1:]}."
-        if self.parting is None:
+        if (parting := self.parting) is None:
             return f"{said} {parting_unknown(self.lacks)}".rstrip()
-        return f"{said} {where_they_part(self.parting)}{_met(self.parting, self.first)}"
+        said += f" {where_they_part(parting)}"
+        if parting.met is None:
+            return said
+        did, first = "touches" if parting.touched else "senses", first_of((self.first,), 1)
+        return f"{said} Of what has to go, {first} takes part first: the robot {did} it after {parting.met:.1f} s."
 
 
 def nearest(file: RunFile, state: RunState) -> Nearest | None:
@@ -68,19 +70,12 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     if one.found is None:
         return Nearest((), words, shown)
     gone = state.removals[one.found - 1].models
-    pair = _pair(state, one, one.found)
-    if pair is None:
-        return Nearest(gone, words, shown)
-    failing, passing = pair
-    try:
-        first, second = file.trajectory(failing.id), file.trajectory(passing.id)
-    except UserError as error:
-        return Nearest(gone, words, shown, lacks=str(error))
-    parting, earliest = parting_of(failing, passing, first, second, gone=gone)
-    return Nearest(gone, words, shown, parting, earliest, tuple(_side_by_side(first, second, parting.equal)))
+    parting, first, lacks = parting_of(file, _pair(state, one.found), gone)
+    instants = () if parting is None else tuple(_side_by_side(file, parting))
+    return Nearest(gone, words, shown, parting, first, instants, lacks)
 
 
-def _pair(state: RunState, one: Isolation, found: int) -> tuple[Test, Test] | None:
+def _pair(state: RunState, found: int) -> tuple[Test, Test] | None:
     """A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not."""
     passing = {test.run: test for test in state.tests if test.removal == found and test.outcome == GOAL}
     whole = [test for test in state.tests if test.run in passing and test.environment == 0]
@@ -89,25 +84,17 @@ def _pair(state: RunState, one: Isolation, found: int) -> tuple[Test, Test] | No
     return None if chosen is None else (chosen, passing[chosen.run])
 
 
-def _met(parting: Parting, first: str) -> str:
-    if parting.met is None:
-        return ""
-    did = "touches" if parting.touched else "senses"
-    return (
-        f" Of what has to go, {first_of((first,), 1)} takes part first: the robot {did} it after {parting.met:.1f} s."
-    )
-
-
-def _side_by_side(first: array[float], second: array[float], since: float) -> Iterable[Instant]:
-    """`INSTANTS` of two trajectories, evenly from `since`, s, to the end of the shorter one."""
+def _side_by_side(file: RunFile, parting: Parting) -> Iterable[Instant]:
+    """`INSTANTS` of both runs, evenly from where they part to the end of the shorter one."""
+    first, second = file.trajectory(parting.with_test), file.trajectory(parting.without_test)
     rows = min(len(first), len(second)) // COLUMNS
-    start = next((row for row in range(rows) if first[row * COLUMNS] >= since), None)
+    start = next((row for row in range(rows) if first[row * COLUMNS] >= parting.equal), None)
     if start is None:
         return
     for row in sorted({start + (rows - 1 - start) * number // (INSTANTS - 1) for number in range(INSTANTS)}):
         seconds, x, y = first[row * COLUMNS : row * COLUMNS + 3]
-        other_x, other_y = second[row * COLUMNS + 1 : row * COLUMNS + 3]
-        yield Instant(seconds, (x, y), (other_x, other_y), math.dist((x, y), (other_x, other_y)))
+        other = second[row * COLUMNS + 1], second[row * COLUMNS + 2]
+        yield Instant(seconds, (x, y), other, math.dist((x, y), other))
 
 
 def removed_in_passing(state: RunState, where: object) -> tuple[str, ...]:

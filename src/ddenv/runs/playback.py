@@ -5,7 +5,6 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -83,7 +82,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
 def _motions(file: RunFile, number: int, lacks: list[str]) -> Iterator[tuple[str, array[float]]]:
     """The motions that can be played; of the others it is said that they are damaged."""
     for name, samples in _stored(file, number, lacks).items():
-        if _makes_sense(samples):
+        if _makes_sense(_table(samples)):
             yield name, samples
         else:
             lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
@@ -98,21 +97,15 @@ def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[flo
     try:
         robot = file.motion(number)
     except UserError:
-        return {}
+        robot = None
     return {} if robot is None else {ROBOT: robot}
 
 
-def _makes_sense(samples: array[float]) -> bool:
-    """Whether these are rows of finite places, whose times grow."""
-    times = samples[::COLUMNS]
-    in_order = all(one <= other for one, other in pairwise(times))
-    return (
-        bool(times)
-        and in_order
-        and times[0] >= 0
-        and times[-1] <= LONGEST
-        and all(-FARTHEST <= value <= FARTHEST for value in samples)
-    )
+def _makes_sense(rows: np.ndarray) -> bool:
+    """Whether these are finite places, whose times grow. (No number compares with NaN.)"""
+    times = rows[:, 0]
+    in_time = times.size and times[0] >= 0 and times[-1] <= LONGEST and (times[:-1] <= times[1:]).all()
+    return bool(in_time and (np.abs(rows) <= FARTHEST).all())
 
 
 def _table(samples: array[float]) -> np.ndarray:

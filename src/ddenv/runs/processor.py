@@ -26,13 +26,8 @@ def usable_cores(root: Path = Path("/")) -> int:
     container; a part of a core counts as one. `root` is the folder of the system's files.
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    shares = (
-        _share(_text(group / "cpu.cfs_quota_us"), _text(group / "cpu.cfs_period_us"))
-        if old
-        else _share(*_text(group / "cpu.max").split()[:2])
-        for group, old in _groups(root, "cpu")
-    )
-    return max(1, math.ceil(min([cores, *shares])))
+    limits = _groups(root, "cpu", ("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us"))
+    return max(1, math.ceil(min([cores, *(_share(*" ".join(limit).split()[:2]) for limit in limits)])))
 
 
 def usable_memory(root: Path = Path("/")) -> float:
@@ -55,29 +50,26 @@ def _meminfo(root: Path, key: str) -> float:
 
 def _memory_groups(root: Path) -> Iterator[tuple[float, float]]:
     """The limit of each control group of this process, and what it uses, bytes."""
-    for group, old in _groups(root, "memory"):
-        limit, used = ("memory.limit_in_bytes", "memory.usage_in_bytes") if old else ("memory.max", "memory.current")
-        in_use = _text(group / used)
-        yield _bytes(_text(group / limit)), float(in_use) if in_use.isdecimal() else 0.0
+    old = ("memory.limit_in_bytes", "memory.usage_in_bytes")
+    for limit, used in _groups(root, "memory", ("memory.max", "memory.current"), old):
+        yield _bytes(limit), float(used) if used.isdecimal() else 0.0
 
 
-def _groups(root: Path, controller: str) -> Iterator[tuple[Path, bool]]:
-    """The folders of this process's control groups that may limit `controller`, and whether they are of version 1."""
+def _groups(root: Path, controller: str, new: tuple[str, ...], old: tuple[str, ...]) -> Iterator[list[str]]:
+    """What the files `new`, or in version 1 `old`, say of each control group that may limit this process: its own and those
+    around it. In a container their paths may be those of the host: then the limits are at the top.
+    """
     groups = root / "sys/fs/cgroup"
     for line in _text(root / "proc/self/cgroup").splitlines():
         _, _, rest = line.partition(":")
         controllers, _, path = rest.partition(":")
-        if not controllers:
-            yield from ((each, False) for each in _around(groups, path))
-        elif controller in controllers.split(","):
-            for top in (groups / controllers, groups / controller):
-                yield from ((each, True) for each in _around(top, path))
-
-
-def _around(top: Path, path: str) -> Iterator[Path]:
-    """The folder of a group and those of the groups around it. In a container its path may be that of the host: `top` is there."""
-    folder = Path(path.lstrip("/"))
-    return (top / each for each in (folder, *folder.parents) if ".." not in each.parts)
+        if controllers and controller not in controllers.split(","):
+            continue
+        folder = Path(path.lstrip("/"))
+        for top in (groups / controllers, groups / controller) if controllers else (groups,):
+            for each in (folder, *folder.parents):
+                if ".." not in each.parts:
+                    yield [_text(top / each / name) for name in (old if controllers else new)]
 
 
 def _share(quota: str = "", period: str = "") -> float:

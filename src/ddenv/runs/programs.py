@@ -34,12 +34,14 @@ def log_of(run: Path) -> Path:
 def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes]:
     """Starts the engine on a run in its own session, so that it outlives this terminal.
 
-    Its output goes to a log beside the run file. `options` become `--name=value` on its command line. Raises UserError.
+    Its output goes to a log beside the run file. `options` that are not None become `--name=value` on its command line.
+    Raises UserError.
     """
     with RunFile(run) as file:
         words = [sys.executable, "-m", "ddenv.engine", "--jobs", str(jobs), "--after", str(file.last_command())]
     # After `--`, a name that begins with a dash is no option.
-    words += [*(f"--{name.replace('_', '-')}={value}" for name, value in options.items()), "--", str(run)]
+    given = {name: value for name, value in options.items() if value is not None}
+    words += [*(f"--{name.replace('_', '-')}={value}" for name, value in given.items()), "--", str(run)]
     try:
         log = _log(log_of(run), run)
     except OSError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -40,8 +40,7 @@ class End:
     """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
 
     None of them ended farther than `reach`, m, from there, and they ended so far `above` f's end, m (median; negative: below it).
-    `kind` is `F`, `GOAL`, or the `failure` of a run that ended
-    otherwise.
+    `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
     """
 
     kind: str
@@ -87,17 +86,15 @@ class Reason:
 
 
 def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
-    """A reason for each model that the current certificate left out.
-
-    Raises UserError where there is none.
-    """
+    """A reason for each model that the current certificate left out. Raises UserError where there is none."""
     certificate = current(state)
     if certificate is None:
         raise UserError(
             f"{file.path}: no certificate is finished for what is left, and only its fresh runs show why the robot fails; "
             f"make one first: ddenv certify {file.path}"
         )
-    tests = [test for test in _fresh(state, certificate) if test.is_finished and test.outcome not in BROKEN]
+    own = (test for test in state.confirm_tests if test.node == certificate.node and test.run >= certificate.first_run)
+    tests = [test for test in own if test.is_finished and test.outcome not in BROKEN]
     left = {test.run: test for test in tests if test.without is None and test.outcome == F}
     names = [claim.without for claim in certificate.claims if claim.without is not None]
     return tuple(_reason(file, state, certificate, name, tests, left) for name in names)
@@ -110,11 +107,6 @@ def no_reasons(certificate: Certificate) -> str:
     return f"What the robot does without each model is not known, because none was left out: {verdict_on(certificate)}."
 
 
-def _fresh(state: RunState, certificate: Certificate) -> Iterator[Test]:
-    own = (test for test in state.confirm_tests if test.node == certificate.node)
-    return (test for test in own if test.run >= certificate.first_run)
-
-
 def _reason(
     file: RunFile, state: RunState, certificate: Certificate, name: str, tests: Sequence[Test], left: dict[int, Test]
 ) -> Reason:
@@ -124,12 +116,8 @@ def _reason(
     # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
     shown = next((end.kind for end in ends if end.kind != F), None)
     pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
-    pair = next(pairs, None)
-    try:
-        ways = [file.trajectory(test.id) for test in pair or ()]
-        return Reason(name, gone, len(mine), ends, None if pair is None else parting_of(*pair, *ways, gone=gone)[0])
-    except UserError as error:
-        return Reason(name, gone, len(mine), ends, None, str(error))
+    parting, _, lacks = parting_of(file, next(pairs, None), gone)
+    return Reason(name, gone, len(mine), ends, parting, lacks)
 
 
 def _kind(test: Test) -> str:
@@ -141,36 +129,38 @@ def _ends(tests: Sequence[Test], height: float) -> tuple[End, ...]:
     kinds: dict[str, list[Test]] = {}
     for test in tests:
         kinds.setdefault(_kind(test), []).append(test)
-    ends = [
-        End(kind, len(them), median(test.simulated_seconds for test in them), *_middle(them, height))
-        for kind, them in kinds.items()
-    ]
-    return tuple(sorted(ends, key=lambda end: -end.number))
+    return tuple(sorted((_end(kind, them, height) for kind, them in kinds.items()), key=lambda end: -end.number))
 
 
-def _middle(tests: Sequence[Test], height: float) -> tuple[tuple[float, float], float, float]:
+def _end(kind: str, tests: Sequence[Test], height: float) -> End:
     places = [test.end_pose for test in tests if test.end_pose is not None] or [(math.nan, math.nan, math.nan)]
     x, y, z = (median(place[axis] for place in places) for axis in range(3))
+    above = 0.0 if math.isnan(z - height) else z - height
     reach = max(math.dist((x, y), place[:2]) for place in places)
-    return (x, y), 0.0 if math.isnan(z - height) else z - height, reach
+    return End(kind, len(tests), median(test.simulated_seconds for test in tests), (x, y), above, reach)
 
 
-def parting_of(
-    with_it: Test, without: Test, first: array[float], second: array[float], *, gone: Sequence[str]
-) -> tuple[Parting, str]:
-    """Where two tests part, with the trajectories `first` and `second`; and which of `gone` took part first, "" if none did."""
-    equal, apart, place = parted(first, second)
+def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]) -> tuple[Parting | None, str, str]:
+    """Where two tests part, one with the models `gone` and one without them; which of these took part first, "" if none did; and
+    what the run file lacks to say so. None where there is no such `pair`.
+    """
+    if pair is None:
+        return None, "", ""
+    with_it, without = pair
+    try:
+        equal, apart, place = parted(file.trajectory(with_it.id), file.trajectory(without.id))
+    except UserError as error:
+        return None, "", str(error)
     touched = {model: at for model, at in with_it.first_touched if model in gone}
     met = touched or {model: at for model, at in with_it.first_sensed if model in gone}
-    earliest = min(met, key=met.__getitem__, default="")
-    seed = with_it.seed
-    return Parting(with_it.id, without.id, seed, equal, apart, place, met.get(earliest), bool(touched)), earliest
+    first = min(met, key=met.__getitem__, default="")
+    parting = Parting(with_it.id, without.id, with_it.seed, equal, apart, place, met.get(first), bool(touched))
+    return parting, first, ""
 
 
 def parted(first: array[float], second: array[float]) -> tuple[float, float | None, tuple[float, float] | None]:
     """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second is `APART` from the first."""
-    equal = 0.0
-    same = True
+    equal, same = 0.0, True
     for row in range(0, min(len(first), len(second)), COLUMNS):
         one, other = first[row : row + COLUMNS], second[row : row + COLUMNS]
         same = same and one == other
@@ -183,15 +173,14 @@ def parted(first: array[float], second: array[float]) -> tuple[float, float | No
 
 def sentence(reason: Reason) -> str:
     """What happens without the models, in one sentence, from the runs that show it."""
-    without = f"Without {reason.without}" + (
-        f" and what rests on it ({count(len(reason.gone) - 1, 'model')})" if len(reason.gone) > 1 else ""
-    )
+    others = f" and what rests on it ({count(len(reason.gone) - 1, 'model')})" if len(reason.gone) > 1 else ""
+    without = f"Without {reason.without}{others}"
     if not reason.ends:
         return f"{without}: no fresh run came to an end."
-    most, *others = reason.ends
+    most, *rarer = reason.ends
     low, high = wilson_interval(most.number, reason.runs)
     share = f"{most.number} of {count(reason.runs, 'fresh run')}, {percent(low)} to {percent(high)}"
-    more = "".join(f"; it {_does(end)} in {end.number}" for end in others)
+    more = "".join(f"; it {_does(end)} in {end.number}" for end in rarer)
     return f"{without} the robot {_does(most)} ({share}){more}."
 
 
@@ -200,9 +189,8 @@ def _does(end: End) -> str:
         return f"reaches its goal after {end.seconds:.0f} s"
     if end.kind == F:
         return "still fails as in f"
-    level = (
-        "" if abs(end.above) < LEVEL else f", {abs(end.above):.1f} m {'higher' if end.above > 0 else 'lower'} than in f"
-    )
+    height = f", {abs(end.above):.1f} m {'higher' if end.above > 0 else 'lower'} than in f"
+    level = "" if abs(end.above) < LEVEL else height
     # Rounded up: no run ends farther away than is said.
     near = "near" if end.reach <= NEAR else f"at most {math.ceil(10 * end.reach) / 10:.1f} m from"
     return f"{DOES.get(end.kind, 'fails elsewhere')}, {near} {_point(end.place)}{level}"
@@ -218,13 +206,10 @@ def parting_sentence(reason: Reason) -> str:
     one = reason.parting
     if one is None:
         return parting_unknown(reason.lacks)
-    it = "it" if len(reason.gone) == 1 else "one of them"
-    met = (
-        ""
-        if one.met is None
-        else (f" With {it} there, the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s.")
-    )
-    return f"{where_they_part(one)}{met}"
+    if one.met is None:
+        return where_they_part(one)
+    it, met = "it" if len(reason.gone) == 1 else "one of them", "touches" if one.touched else "senses"
+    return f"{where_they_part(one)} With {it} there, the robot {met} {it} after {one.met:.1f} s."
 
 
 def parting_unknown(lacks: str) -> str:

@@ -7,13 +7,14 @@ import os
 from pathlib import Path
 from typing import Any
 
+import platformdirs
+
 from ddenv.errors import UserError
+from ddenv.world.access import write_file
 
 
 def state_file(name: str) -> Path:
     """The path of what is remembered: in `$DDENV_HOME`, or in the user's state folder."""
-    import platformdirs
-
     home = os.environ.get("DDENV_HOME")
     folder = Path(home) if home else Path(platformdirs.user_state_dir("ddenv", appauthor=False))
     return folder / name
@@ -21,8 +22,6 @@ def state_file(name: str) -> Path:
 
 def write_state(name: str, content: object) -> None:
     """Remembers `content` as JSON, for this user alone, if it can be written."""
-    from ddenv.world.access import write_file
-
     place = state_file(name)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
-from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import SUFFIX, find_run
@@ -38,18 +37,13 @@ READING = ("model_path", "stand_in", "ignore")
 
 @dataclass(frozen=True)
 class Subject:
-    """What the robot is run in. Of a run, `run` is its file, and `position` finds its earlier states."""
+    """What the robot is run in. Of a run, `run` is its file, and `state` its last one."""
 
     scenario: Scenario
     world: World
     robot: Model
     run: Path | None = None
-    position: Position | None = None
-
-    @property
-    def state(self) -> RunState | None:
-        """The last state of a run."""
-        return None if self.position is None else self.position.end
+    state: RunState | None = None
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -105,8 +99,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
 
     Raises UserError.
     """
-    reading = {option: given[option] for option in READING}
-    others = {option: value for option, value in given.items() if option not in READING}
+    others = dict(given)
+    reading = {option: others.pop(option) for option in READING}
     spawn, goal = given["spawn"], given["goal"]
     if Path(name).suffix.lower() not in WORLD_FILES:
         scenario = load_scenario(find_scenario(name))
@@ -119,7 +113,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         raise UserError(f"--world: only for a scenario; {name} is a world")
     else:
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
-    return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
+    read_as = reading_of(scenario.reading, **reading)
+    return with_options(scenario, reading=read_as, **others)
 
 
 def reading_of(
@@ -229,8 +224,8 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
 
 
 def read_subject(file: RunFile) -> Subject:
-    """The scenario, world and robot of a run, and its states. Raises UserError."""
-    return Subject(*read_parts(file), file.path, position_in(file.events()))
+    """The scenario, world and robot of a run, and its state. Raises UserError."""
+    return Subject(*read_parts(file), file.path, fold(file.events()))
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from ddenv.evidence.certificate_cost import certificate_tests
-from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made
-from ddenv.runfile.progress import Certificate
+from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.settings import Reduction
@@ -68,8 +67,11 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     if state.isolating is not None:
         return None
     if state.confirming:
-        now = state.certificate
-        return None if now is None else _of_certificate(state, now)
+        now = in_the_making(state)
+        if now is None:
+            return None
+        (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
+        return low - done, likely - done, high - done
     forecast, baseline = state.forecast, state.baseline
     if forecast is None or baseline is None:
         return None
@@ -82,13 +84,6 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     search = (max(0, each - done) for each in forecast.tests)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
-
-
-def _of_certificate(state: RunState, now: Certificate) -> tuple[int, int, int] | None:
-    if now.claims:
-        return None
-    (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
-    return low - done, likely - done, high - done
 
 
 def _seconds_of_a_test(state: RunState) -> float | None:
@@ -152,11 +147,11 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
     runs = runs if asked.accept_rate == "first" else min(runs, FEWEST_MISSES)
     slices = slices and asked.slice
     searched = [min(models, most) if slices else models for most in TOOK_PART]
-    each = (rough_tests(some, asked.algorithm, runs, asked.growth == "paper") for some in searched)
-    low, likely, high = (found[place] for place, found in enumerate(each))
+    few, usual, many = (rough_tests(each, asked.algorithm, runs, asked.growth == "paper") for each in searched)
     # Assumed without a word of earlier runs, the rate is taken as it is.
     seen = asked.baseline_runs
     if rate is None:
         rate, seen = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1), 0
     certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
-    return Rough(asked.baseline_runs, (low, likely, high), certificate, SHARE if slices else (1.0, 1.0, 1.0))
+    search = few[0], usual[1], many[2]
+    return Rough(asked.baseline_runs, search, certificate, SHARE if slices else (1.0, 1.0, 1.0))

@@ -12,7 +12,7 @@ import json
 import os
 import shlex
 import stat
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -21,8 +21,11 @@ from typing import Any
 import yaml
 
 from ddenv.errors import UserError
-from ddenv.runs.clusters import HERE
+from ddenv.runfile.store import RunFile
+from ddenv.runs.clusters import HERE, check_cluster, made_here
 from ddenv.runs.remembered import read_state, write_state
+from ddenv.runs.subject import read_scenario
+from ddenv.world.access import is_file
 from ddenv.world.command import start_folder
 from ddenv.world.scenario import Scenario
 
@@ -43,29 +46,30 @@ class Program:
 
 def program_of(scenario: Scenario) -> Program | None:
     """The program that tests of `scenario` start; None if they start only what ddenv brings."""
-    own, cluster = _own_program(scenario), _cluster_of(scenario)
-    if own is None or cluster is None:
-        return own or cluster
-    return Program(f"{own.words}, and {cluster.words}", own.digests + cluster.digests)
+    found = [*_own_program(scenario), *_cluster_of(scenario)]
+    if not found:
+        return None
+    return Program(", and ".join(each.words for each in found), sum((each.digests for each in found), ()))
 
 
-def _cluster_of(scenario: Scenario) -> Program | None:
+def _cluster_of(scenario: Scenario) -> list[Program]:
+    """The cluster of its tests, if they are not made here."""
     cluster = scenario.reduction.cluster
     if cluster == HERE:
-        return None
-    return _program(f"its tests on the cluster {cluster}; whoever controls that can start any program here", [])
+        return []
+    return [_program(f"its tests on the cluster {cluster}; whoever controls that can start any program here", [])]
 
 
-def _own_program(scenario: Scenario) -> Program | None:
+def _own_program(scenario: Scenario) -> list[Program]:
+    """Its simulator or its controller, if it brings one."""
     if scenario.oracle is not None:
         command, folder = scenario.oracle.command, start_folder(scenario).absolute()
-        return _program(f"the command '{command}' in {folder}", _named(folder, command))
+        return [_program(f"the command '{command}' in {folder}", _named(folder, command))]
     folder, use = scenario.folder.absolute(), scenario.controller.use
     if ":" not in use:
-        return None
-    return _program(
-        f"the controller {use}, searched in {folder} first", _modules(folder, use.partition(":")[0].partition(".")[0])
-    )
+        return []
+    files = _modules(folder, use.partition(":")[0].partition(".")[0])
+    return [_program(f"the controller {use}, searched in {folder} first", files)]
 
 
 def _program(words: str, files: Iterable[Path]) -> Program:
@@ -79,22 +83,14 @@ def _named(folder: Path, command: str) -> list[Path]:
         words = shlex.split(command)
     except ValueError:
         return []
-    return [folder / word for word in words if _is_file(folder / word)]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        # A word can be too long for a file name, or hold a NUL byte.
-        return False
+    return [folder / word for word in words if is_file(folder / word)]
 
 
 def _modules(folder: Path, module: str) -> list[Path]:
     """The files of a module in `folder`, in every form that Python looks for; an installed one is the user's own choice."""
     found = [*folder.glob(f"{module}.*"), *(folder / module).rglob("*")]
     # Python itself writes into this folder.
-    return sorted(path for path in found if "__pycache__" not in path.parts and _is_file(path))
+    return sorted(path for path in found if "__pycache__" not in path.parts and is_file(path))
 
 
 def _content(path: Path) -> str:
@@ -148,12 +144,35 @@ def scenario_text(data: Mapping[str, Any], scenario: Scenario) -> bytes:
 
 def trust_cluster(scenario: Scenario) -> None:
     """Trusts the cluster of `scenario`, which the user has typed."""
-    cluster = _cluster_of(scenario)
-    if cluster is not None:
+    for cluster in _cluster_of(scenario):
         trust(cluster)
 
 
-def check_trusted(scenario: Scenario, where: Path | str) -> None:
-    """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted."""
-    if program := untrusted(scenario):
+def check_trusted(scenario: Scenario, where: Path | str, asks: Callable[[str], bool] = lambda _: False) -> None:
+    """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted.
+
+    `asks` puts a question to the user; a yes is remembered.
+    """
+    program = untrusted(scenario)
+    if program and asks(f"{where} starts {program.words}. Do you trust it?"):
+        trust(program)
+        program = untrusted(scenario)
+    if program:
         raise UserError(f"{where}: would start {program.words}; if you trust it, give --trust")
+
+
+def check_named(scenario: Scenario, name: str, asks: Callable[[str], bool]) -> None:
+    """The same for what the user named: a file of the user's own is trusted."""
+    trust_own(scenario, Path(name))
+    check_trusted(scenario, name, asks)
+
+
+def trusted_scenario(file: RunFile, asks: Callable[[str], bool], cluster: str | None = None) -> Scenario:
+    """The scenario of a run, after the same check; the user has typed another `cluster`, if any.
+
+    Raises UserError for a damaged file, too.
+    """
+    scenario = read_scenario(file)
+    check_cluster(cluster or scenario.reduction.cluster)
+    check_trusted(made_here(scenario) if cluster else scenario, file.path, asks)
+    return scenario

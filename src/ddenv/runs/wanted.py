@@ -26,12 +26,10 @@ def written(wanted: Wanted) -> str:
 def read(line: str) -> Wanted | None:
     """What a line of standard input asks for; None if it is no such line."""
     try:
-        values = json.loads(line)
-    except ValueError:
+        wanted = Wanted(**json.loads(line))
+    except (ValueError, TypeError):
         return None
-    if not isinstance(values, dict) or not values.keys() <= set(Wanted.__slots__):
-        return None
-    return Wanted(**values) if all(value is None or type(value) is int for value in values.values()) else None
+    return wanted if all(value is None or type(value) is int for value in asdict(wanted).values()) else None
 
 
 def row_of(state: RunState, wanted: Wanted) -> Candidate | Trial | None:

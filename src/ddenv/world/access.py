@@ -65,6 +65,14 @@ def is_folder(path: Path) -> bool:
         return False
 
 
+def is_file(path: Path) -> bool:
+    """Whether `path` is an accessible file. Any text is taken for a path: one that is too long, or holds a NUL byte, is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def without_tilde(name: str) -> Path:
     """`name` with a leading `~` expanded, if the home folder is known."""
     try:

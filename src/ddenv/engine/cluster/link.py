@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from distributed import Client, Security, SSHCluster
 
 from ddenv.errors import UserError
-from ddenv.runs.clusters import hosts_of, is_scheduler_file
+from ddenv.runs.clusters import hosts_of
+from ddenv.world.access import is_file
 
 # The time between two looks at who is there, and between two attempts to connect, s.
 PERIOD = 0.5
@@ -55,7 +57,7 @@ class Link:
             # Dask makes the first one its scheduler.
             self._ssh = SSHCluster([hosts[0], *hosts])
             return Client(self._ssh, **how)
-        if is_scheduler_file(self._cluster):
+        if is_file(Path(self._cluster)):
             return Client(scheduler_file=self._cluster, **how)
         if self._cluster.startswith("tls:"):
             return Client(self._cluster, security=Security(require_encryption=True), **how)

@@ -1,0 +1,77 @@
+"""What a terminal shows: lines as wide as it is, slow steps, what was written, and questions."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+
+import click
+
+from ddenv.text import printable, width
+
+# The minimum width for readable text, columns.
+LEAST = 8
+
+
+def terminal_columns() -> int | None:
+    """How wide the terminal is, columns; None where the output goes elsewhere."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
+    """`first` and `text` in lines of at most `columns`, broken between words; the lines below hang under the text.
+
+    A word that is wider than a line, such as a path, comes in pieces. In one line if `columns` is None.
+    """
+    if columns is None:
+        return [first + text]
+    from rich.console import Console
+    from rich.text import Text
+
+    lines = Text(" ".join(text.split())).wrap(Console(), max(LEAST, columns - width(first)))
+    below = " " * width(first)
+    return [f"{below if number else first}{line.plain.rstrip()}" for number, line in enumerate(lines or [Text()])]
+
+
+def say(text: str, first: str = "") -> None:
+    """Prints `text` in lines as wide as the terminal."""
+    print("\n".join(wrapped(printable(text), terminal_columns(), first)))
+
+
+def say_written(files: Iterable[object]) -> None:
+    for file in files:
+        print(printable(f"wrote {file}"))
+
+
+def announce(line: str) -> None:
+    """Announces a slow step on stderr, so that programs can read stdout."""
+    print(printable(line), file=sys.stderr, flush=True)
+
+
+@contextmanager
+def announced(line: str) -> Iterator[Callable[[str], None]]:
+    """Announces a slow step; on a terminal, with the time it has taken so far. Yields what replaces the line there."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        announce(line)
+        yield lambda _: None
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(printable(line), total=None)
+        yield lambda words: progress.update(task, description=printable(words))
+
+
+def asking(trust: bool) -> Callable[[str], bool]:
+    """Answers whether a program is trusted: yes with `trust`, else what the user says on a terminal, and no without one."""
+
+    def answer(question: str) -> bool:
+        asks = sys.stdin.isatty() and sys.stderr.isatty()
+        return trust or (asks and click.confirm(printable(question), err=True))
+
+    return answer

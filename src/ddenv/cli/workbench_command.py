@@ -1,0 +1,93 @@
+"""Commands that open the workbench, here or in a browser: `ddenv open` and `serve`; and `config`, its keys and theme."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ddenv.cli.options import given_reading, reading_options, runs, runs_and_scenarios, whole
+from ddenv.errors import UserError
+
+PORT = 8000
+
+
+@click.command("open")
+@click.argument("run", metavar="RUN_OR_FILE", type=click.Path(), shell_complete=runs_and_scenarios)
+@reading_options
+@click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
+@click.option("--lines", is_flag=True, help="Plain lines that are never drawn again, for screen readers: type help.")
+def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
+    """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF world.
+
+    'ddenv RUN_OR_FILE' does the same.
+    """
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.subject import named
+    from ddenv.workbench.launch import run_workbench
+    from ddenv.world.access import is_folder
+
+    kind, path = named(run) or ("run", find_run(run))
+    if kind == "run" and path.is_file():
+        if any(reading.values()):
+            raise UserError("options for reading worlds: a run keeps its own")
+        return _follow(path, watch) if lines else run_workbench(path, watch=watch)
+    if is_folder(Path(run)):
+        raise UserError(f"{run}: is a folder; expected a run, a scenario or a world")
+    if kind == "run":
+        raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
+    if not path.is_file():
+        raise UserError(f"{run}: no such file")
+    if watch or lines:
+        raise UserError(f"{'--watch' if watch else '--lines'}: only for runs")
+    return run_workbench(None, reading=given_reading(reading), file=path.absolute())
+
+
+def _follow(run: Path, watch: bool) -> int:
+    from ddenv.workbench.lines.line_mode import follow_in_lines
+
+    try:
+        follow_in_lines(run, watch, sys.stdin, sys.stdout)
+    except KeyboardInterrupt:
+        # As quit: the engine goes on.
+        return 130
+    return 0
+
+
+def _refuse_host(_: Any, __: Any, value: str | None) -> None:
+    if value is not None:
+        raise UserError(
+            "--host: the workbench is only served on 127.0.0.1, since anybody who can open it acts as you; "
+            "from another machine use ssh -L"
+        )
+
+
+@click.command("serve")
+@click.argument("run", required=False, shell_complete=runs)
+@click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
+@click.option(
+    "--font-size",
+    type=whole(6, 72),
+    default=16,
+    show_default=True,
+    help="Of the text, in pixels; 28 for a projector.",
+)
+@click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
+def serve_command(run: str | None, port: int, font_size: int) -> int:
+    """Serves the workbench to browsers on this machine; with RUN (a name or a file) attached to it."""
+    from ddenv.workbench.terminal.served import serve
+
+    serve(port, run, font_size)
+    return 0
+
+
+@click.command("config")
+@click.option("--example", is_flag=True, help="Print an example file with every action.")
+def config_command(example: bool) -> int:
+    """Shows the path of the file with your keys and theme, and lists all actions with their keys."""
+    from ddenv.workbench.config import example_lines, lines
+
+    print("\n".join(example_lines() if example else lines()))
+    return 0
