@@ -13,20 +13,22 @@ from ddenv.evidence.certificate import (
     MOST_PAIRS,
     MOST_REMOVAL_PAIRS,
     NEEDED_SHARE,
+    REFUTED,
     STAKES,
     error_of,
 )
 from ddenv.evidence.rates import wilson_interval
 
 # It takes so many times the expected number, if the rates are right.
-SHORTER, LONGER = 0.6, 2.2
+SHORTER, LONGER = 0.55, 2.2
 # Of the pairs of runs with the same seed, so many end alike whatever their rates are.
 ALIKE = 0.4
-# The logarithm of the wealth that a bet of the first certificate needs, with what it costs to bet with several stakes at once.
-NEEDS = math.log(2.0 / error_of(1)) + math.log(len(STAKES))
+# The logarithm of the wealth that a bet of the first certificate needs, with what it costs to bet with several stakes at once; and
+# that of a bet against it.
+NEEDS, NEEDS_AGAINST = math.log(2.0 / error_of(1) * len(STAKES)), math.log(REFUTED * len(STAKES))
 # Before it has runs, what is left is taken to show f as often as the whole world, and a removal never to, as if so many of its runs
 # had shown that.
-WORTH, WORTH_WITHOUT = 8, 4
+WORTH, WORTH_WITHOUT = 3, 4
 # Eight of ten rates are in the interval of so many standard deviations. How little may be left, as a share of all, until it ends.
 EIGHT_OF_TEN, LEAST_LEFT = 1.28, 0.3
 
@@ -111,7 +113,8 @@ class _Expected:
         needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
         removals = [NEEDS / _growth(_shares(each, end), needed) for each in without]
         removals = [max(self.at_least, each if each <= MOST_REMOVAL_PAIRS else HELPS_AFTER) for each in removals]
-        return max(of_left, *removals, 0.0) + of_whole + sum(removals)
+        lost = 2.0 * NEEDS_AGAINST / _growth((both, mine, theirs), needed)
+        return min(lost, max(of_left, *removals, 0.0) + of_whole + sum(removals))
 
 
 def _shares(first: float, second: float) -> tuple[float, float, float]:

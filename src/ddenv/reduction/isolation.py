@@ -188,12 +188,17 @@ def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
     "passes" is wrong with a probability of at most about the error of the rule: then the goal is not reached more often than at
     `rather_than`.
     """
-    reached = runs = 0
+    reached = runs = broken = 0
     found: bool | None = None
     while found is None and runs < MOST_RUNS:
         (shown,) = yield Wanted(((world, runs),), (world,))
-        reached, runs = reached + (shown is True), runs + 1
-        found = leans_to(reached, runs - reached, rule.wanted, rule.rather_than, rule.error)
+        reached, runs, broken = reached + (shown is True), runs + 1, broken + (shown == "broken")
+        # A run that broke counts against what is claimed.
+        fails, passing = (
+            leans_to(reached, missed, rule.wanted, rule.rather_than, rule.error)
+            for missed in (runs - reached - broken, runs - reached)
+        )
+        found = True if passing else False if fails is False else None
     for run in range(runs, at_least if found else 0):
         yield Wanted(((world, run),), (world,))
     return ("not shown" if found is None else "passes" if found else "fails"), None
