@@ -9,6 +9,7 @@ from typing import Any
 from ddenv.evidence.claims import (
     current,
     drift,
+    helping,
     is_minimal,
     meaning,
     missing,
@@ -84,6 +85,7 @@ def certificate(state: RunState) -> dict[str, Any] | None:
             "rate": claim.shown / claim.runs if claim.runs else None,
             "low": claim.low,
             "high": claim.high,
+            "keeps_at_least" if claim.without is None else "without_at_most": claim.bound,
             "outcomes": dict(claim.outcomes),
         }
         for claim in found.claims
@@ -91,8 +93,10 @@ def certificate(state: RunState) -> dict[str, Any] | None:
     return {
         "number": found.number,
         "keep_rate": found.keep_rate,
+        "certify_rate": found.certify_rate,
         "error": found.error,
         "minimal": is_minimal(found),
+        "minimal_but_for": list(helping(found)),
         "never_left_out": never_left_out(state, found),
         "means": promise(state, found) if is_minimal(found) else verdict_on(found),
         "claims": claims,
@@ -101,8 +105,9 @@ def certificate(state: RunState) -> dict[str, Any] | None:
 
 
 def _whole_world(state: RunState) -> FreshRuns | None:
-    """The certificate's runs of the whole world, if it made any beside those of what is left."""
-    return next((each for each in fresh_runs(state) if each.node == 0 and not each.is_left and each.runs), None)
+    """The certificate's runs of the whole world, if it made any with all seeds of those of what is left."""
+    runs = (each for each in fresh_runs(state) if each.node == 0 and not each.is_left and not each.is_chosen)
+    return next((each for each in runs if each.runs), None)
 
 
 def summary_lines(state: RunState, path: Path) -> list[str]:
@@ -112,7 +117,9 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         return [f"run file: {path}"]
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
-        what = "environment, not shown to be minimal"
+        found = current(state)
+        helps = () if found is None else helping(found)
+        what = f"environment, {f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
@@ -146,8 +153,8 @@ def _next(state: RunState, path: Path) -> list[str]:
 def _certificate_lines(state: RunState) -> list[str]:
     found = current(state)
     if found is None:
-        so_far = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
-        return [f"{so_far[0]}; {missing(state)}"]
+        rates = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
+        return [f"{rates[0]}; {missing(state)}", *_shown_so_far(state)]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
     lines += [_removal(claim) for claim in removals[:MOST_NAMES]]
@@ -158,8 +165,19 @@ def _certificate_lines(state: RunState) -> list[str]:
     return [*lines, promise(state, found)] if state.certified else lines
 
 
+def _shown_so_far(state: RunState) -> list[str]:
+    """What an unfinished certificate has shown, which holds whenever it is stopped."""
+    rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows_at_least]
+    return [
+        f"  {f'without {one.without}' if one.without else 'what is left'}: f in {one.shown} of {count(one.runs, 'fresh run')}, "
+        f"{f'at most {percent(one.bound or 0)} as often' if one.without else f'keeps at least {percent(one.bound or 0)} of the rate'}"
+        for one in rows
+    ]
+
+
 def _removal(claim: Claim) -> str:
-    return f"  without {claim.without}: {rate(claim)}: {short(claim)}"
+    often = f", at most {percent(claim.bound)} as often" if claim.bound is not None and claim.bound < 1.0 else ""
+    return f"  without {claim.without}: {rate(claim)}{often}: {short(claim)}"
 
 
 def broken(state: RunState) -> list[str]:

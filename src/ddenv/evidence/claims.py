@@ -119,12 +119,6 @@ def terms_of(certificate: Certificate) -> Terms:
     return Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
 
 
-def bound_so_far(state: RunState) -> tuple[float, float] | None:
-    """What the certificate in the making has shown that is kept, and what it has to show; None without one."""
-    now = in_the_making(state)
-    return None if now is None else (so_far(state, now)[None].bound or 0.0, now.certify_rate)
-
-
 def never_left_out(state: RunState, certificate: Certificate) -> int:
     """How many models of a finished certificate's environment no run leaves out: those that were pinned, with their stacks."""
     there = state.nodes[certificate.node].environment
