@@ -168,11 +168,13 @@ def _certificate_lines(state: RunState) -> list[str]:
 def _shown_so_far(state: RunState) -> list[str]:
     """What an unfinished certificate has shown, which holds whenever it is stopped."""
     rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows_at_least]
-    return [
-        f"  {f'without {one.without}' if one.without else 'what is left'}: f in {one.shown} of {count(one.runs, 'fresh run')}, "
-        f"{f'at most {percent(one.bound or 0)} as often' if one.without else f'keeps at least {percent(one.bound or 0)} of the rate'}"
-        for one in rows
-    ]
+    lines = []
+    for one in rows:
+        what = f"without {one.without}" if one.without else "what is left"
+        bound = percent(one.bound or 0.0)
+        often = f"at most {bound} as often" if one.without else f"at least {bound} of the rate is kept"
+        lines.append(f"  {what}: f in {one.shown} of {count(one.runs, 'fresh run')}: {often}")
+    return lines
 
 
 def _removal(claim: Claim) -> str:
