@@ -79,8 +79,9 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
 def _of(key: tuple[int, str | None], tests: list[Test], claim: Claim | None) -> FreshRuns:
     running = tuple(test for test in tests if test.outcome == "running")
     if claim is not None:
-        rate = (claim.low, claim.high, claim.outcomes)
-        return FreshRuns(*key, claim.shown, claim.runs, *rate, running, claim, bound=claim.bound)
+        return FreshRuns(
+            *key, claim.shown, claim.runs, claim.low, claim.high, claim.outcomes, running, claim, bound=claim.bound
+        )
     counts = Counter(test.outcome for test in tests if test.is_finished)
     outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
     runs, shown = counts.total() - sum(counts[outcome] for outcome in BROKEN), counts["similar"]
