@@ -67,7 +67,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         first = next(claim for claim in removals if claim.without == helps[0])
         return f"minimal but for {first_of(helps, MOST_NAMES)}: {keeps(certificate)}; without {helps[0]} {rate(first)}{but}"
     most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
-    without, bound = f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without, _at_most(certificate)
+    without, bound = (
+        f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
+        _at_most(certificate),
+    )
     often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
     return f"no {one} can be removed: {keeps(certificate)}; without {without} {often}{but}"
 
