@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing import get_context
 from statistics import fmean
 
@@ -21,7 +21,7 @@ import numpy as np
 import ddenv
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim, Terms, error_of, falls, keeps, settle
-from ddenv.evidence.rates import estimated_rate, wilson_interval
+from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction.reduce import RateClaim
 
 KEEP_RATE, CERTIFY_RATE, ITERATIONS, BASELINE_RUNS = 0.8, 2 / 3, 3, 10

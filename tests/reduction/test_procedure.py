@@ -172,7 +172,7 @@ def test_nothing_that_lost_the_rate_is_taken_again(world):
             case Certified():
                 certified, first = fact, fact.certificate.first_run
                 tests = {test for claim in fact.claims for test in claim.claim.rests_on}
-                there = takewhile(lambda run: (world.whole, run) in tests, count())
+                there = takewhile(lambda run, tests=tests: (world.whole, run) in tests, count())
                 runs = {first + run for run in there}
                 of_whole |= {run: world.outcome(world.whole, run) for run in runs}
             case SteppedBack():

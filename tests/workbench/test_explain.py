@@ -182,7 +182,7 @@ def test_a_certificate_comes_before_the_end(run):
 def test_minimal_is_said_with_what_it_means(run):
     words = told(fake_moments.finished(run), "absent")[1]
     assert (
-        "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 77 % of the whole world"
+        "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 77 %"
         in words
     )
     assert "Minimal means: what is left keeps at least 77 % of the whole world's rate" in words
