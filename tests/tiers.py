@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 # Why a test is slow by nature, as registered in pyproject.toml. The quick tier has one witness of each.
-SLOW = ("rates", "fuzz", "terminal", "browser", "examples", "screens", "programs")
+SLOW = ("rates", "claims", "fuzz", "terminal", "browser", "examples", "screens", "programs")
 
 # A slow machine is no bug.
 settings.register_profile(

@@ -190,11 +190,20 @@ class Reduction:
     )
     keep_rate: float = setting(
         0.8,
-        "part of the whole world's failure rate that the end must keep",
+        "part of the whole world's failure rate that the search keeps",
         above=0,
         most=0.95,
         shown="more",
-        cost="Lower is cheaper to show, and promises less.",
+        cost="Lower removes more, and leaves a rarer failure.",
+    )
+    certify_rate: float = setting(
+        2 / 3,
+        "part of the whole world's failure rate that the certificate has to show",
+        above=0,
+        most=0.95,
+        shown="more",
+        more="Fresh runs are made until they show that the end keeps this part; 'ddenv certify' can go on to a higher one.",
+        cost="0.8 takes about twice as many fresh runs.",
     )
     keep_supports: bool = setting(
         False,

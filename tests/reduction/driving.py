@@ -7,6 +7,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import count, takewhile
 
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Terms, error_of
@@ -203,7 +204,9 @@ class Driver:
             case steps.Certified():
                 first = step.certificate.first_run
                 tests = {test for claim in step.claims for test in claim.claim.rests_on}
-                now.of_whole |= {first + run for environment, run in tests if environment == self.world.whole}
+                # The whole world runs where what is left missed f, and then with every seed.
+                there = takewhile(lambda run: (self.world.whole, run) in tests, count())
+                now.of_whole |= {first + run for run in there}
             case steps.SteppedBack():
                 now.lost.append(now.chain[step.place + 1])
                 now.chain = now.chain[: step.place + 1]
@@ -223,7 +226,7 @@ class Driver:
             case steps.CertificateDue():
                 self.now.certificates += 1
                 number = self.now.certificates
-                terms = Terms(0.8, self.rate(), error_of(number), self.world.baseline_runs)
+                terms = Terms(2 / 3, 0.8, error_of(number), self.world.baseline_runs)
                 return Certificate(number, FIRST_FRESH + EACH_CERTIFICATE * number, terms)
         return None
 

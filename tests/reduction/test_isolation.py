@@ -109,10 +109,10 @@ def test_the_rule_is_seldom_wrong_at_either_of_its_rates():
 def test_fresh_runs_that_do_not_decide_show_nothing():
     rule, world = Passing(0.9, 0.45, 0.01), Environment.of((0,))
     every = settle(passes(world, rule, 20), lambda *_: True)
-    assert (every.verdict, every.runs) == ("passes", 20)
+    assert (every.verdict, len(every.rests_on)) == ("passes", 20)
     assert settle(passes(world, rule, 20), lambda *_: False).verdict == "fails"
     some = settle(passes(world, rule, 20), lambda _, run: run % 7 not in (2, 5))
-    assert (some.verdict, some.runs) == ("not shown", MOST_RUNS)
+    assert (some.verdict, len(some.rests_on)) == ("not shown", MOST_RUNS)
     assert settle(passes(world, rule, 20), lambda *_: "broken").verdict == "unknown"
 
 

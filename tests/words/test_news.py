@@ -95,11 +95,11 @@ def test_a_certificate_is_told_with_what_follows_from_it():
     lost = {"claims": [claim(None, "lost", 3, 9)], "tests": []}
     _, before, after = states(started(1), ("certificate_started", STARTED))
     assert news("certificate_started", before, after).startswith("certificate 1: fresh runs of what is left (4 models)")
-    assert "certificate: 0 of about 70 to 300 runs · 4 of 4 models" in headline(after)
+    assert "certificate: 0 of about 90 to 350 runs · 4 of 4 models" in headline(after)
     both = (("certificate_started", STARTED), ("certificate_finished", lost))
     _, before, after = states(*both)
     assert news("certificate_finished", before, after) == (
-        "  certificate 1: f is rarer in what is left, not shown to keep 80 % of the whole world's rate: "
+        "  certificate 1: what is left keeps less than 80 % of the whole world's rate: "
         "f in 3 of 9 fresh runs (10 % to 90 %)"
     )
     _, _, before, after = states(*both, ("rate_lost", {"node": 0, "lost": 0, "again": [], "tests": []}))

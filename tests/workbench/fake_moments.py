@@ -105,8 +105,8 @@ def guided(run: FakeRun) -> FakeRun:
 def certifying(run: FakeRun) -> FakeRun:
     """The rounds left two models, and fresh runs show what they are worth."""
     _rounds(run).start_certificate()
-    run.certify_all(2, None, "ssssss")
-    run.certify_all(0, None, "ssspss")
+    run.certify_all(2, None, "sssssspsssss")
+    run.certify_all(0, None, "......s")
     run.certify_all(2, "crate_00", "oppe")
     run.live((run.certify(2, "crate_00", 4), 0.6), (run.certify(2, "crate_01"), 0.25))
     return run
@@ -116,7 +116,6 @@ def finished(run: FakeRun) -> FakeRun:
     """A run that ended with two models, each shown to be needed."""
     _rounds(run).start_certificate()
     claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
-    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
 
 
@@ -156,7 +155,6 @@ def not_shown(run: FakeRun) -> FakeRun:
     """A run that ended with two models, one of which may not be needed."""
     _rounds(run).start_certificate()
     claims = ((None, "kept", 23 * "s"), ("crate_00", "not shown", 9 * "sp" + "oo"), ("crate_01", "unknown", "pseeeeee"))
-    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
 
 

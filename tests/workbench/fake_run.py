@@ -10,7 +10,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from ddenv import __version__
-from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.certificate import Pairs
+from ddenv.evidence.rates import anytime_interval
 from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
@@ -180,7 +181,7 @@ class FakeRun:
     def start_certificate(self) -> None:
         self.certificates += 1
         self.first_fresh = self.fresh
-        terms = {"rate": 0.7, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
+        terms = {"rate": 0.7, "keep_rate": 0.8, "error": 0.03, "at_least": 4, "certify_rate": 2 / 3}
         self.write("certificate_started", certificate=self.certificates, run=self.fresh, **terms)
 
     def certify(self, node: int, without: str | None = None, run: int = 0) -> int:
@@ -195,9 +196,11 @@ class FakeRun:
         return self.tests
 
     def certify_all(self, node: int, without: str | None, outcomes: str) -> None:
-        """A run for each letter: s similar, p pass, o another failure, e broken."""
+        """A run for each letter: s similar, p pass, o another failure, e broken; none where there is a point."""
         words = {"s": ("similar", 0.12, "stuck"), "p": ("pass", None, ""), "o": ("other", 2.3, "tipped over")}
         for run, letter in enumerate(outcomes):
+            if letter == ".":
+                continue
             outcome, distance, failure = words.get(letter, ("error", None, "the simulation broke"))
             self.finish(self.certify(node, without, run), outcome, distance, failure=failure)
 
@@ -208,7 +211,9 @@ class FakeRun:
 
     def _claim(self, without: str | None, verdict: str, outcomes: str) -> dict:
         shown, runs = outcomes.count("s"), len(outcomes.replace("e", ""))
-        low, high = wilson_interval(shown, runs) if runs else (0.0, 1.0)
+        low, high = anytime_interval(shown, runs)
+        pairs = Pairs(both=shown, second=runs - shown)
+        bound = pairs.keeps_at_least(0.015) if without is None else pairs.at_most(0.015)
         names = {"s": "similar", "p": "pass", "o": "other", "e": "error"}
         return {
             "without": None if without is None else self.elements.index(without),
@@ -218,6 +223,7 @@ class FakeRun:
             "low": low,
             "high": high,
             "outcomes": {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes},
+            "bound": bound,
         }
 
     def start_isolation(self, size: int) -> None:

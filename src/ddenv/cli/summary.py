@@ -9,6 +9,7 @@ from typing import Any
 from ddenv.evidence.claims import (
     current,
     drift,
+    helping,
     is_minimal,
     meaning,
     missing,
@@ -22,7 +23,7 @@ from ddenv.evidence.claims import (
 )
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.took_part import simulated
-from ddenv.runfile.progress import Node
+from ddenv.runfile.progress import Claim, Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
@@ -84,6 +85,7 @@ def certificate(state: RunState) -> dict[str, Any] | None:
             "rate": claim.shown / claim.runs if claim.runs else None,
             "low": claim.low,
             "high": claim.high,
+            "keeps_at_least" if claim.without is None else "without_at_most": claim.bound,
             "outcomes": dict(claim.outcomes),
         }
         for claim in found.claims
@@ -91,8 +93,10 @@ def certificate(state: RunState) -> dict[str, Any] | None:
     return {
         "number": found.number,
         "keep_rate": found.keep_rate,
+        "certify_rate": found.certify_rate,
         "error": found.error,
         "minimal": is_minimal(found),
+        "minimal_but_for": list(helping(found)),
         "never_left_out": never_left_out(state, found),
         "means": promise(state, found) if is_minimal(found) else verdict_on(found),
         "claims": claims,
@@ -101,8 +105,9 @@ def certificate(state: RunState) -> dict[str, Any] | None:
 
 
 def _whole_world(state: RunState) -> FreshRuns | None:
-    """The certificate's runs of the whole world, if it made any beside those of what is left."""
-    return next((each for each in fresh_runs(state) if each.node == 0 and not each.is_left and each.runs), None)
+    """The certificate's runs of the whole world, if it made any with all seeds of those of what is left."""
+    runs = (each for each in fresh_runs(state) if each.node == 0 and not each.is_left and not each.is_chosen)
+    return next((each for each in runs if each.runs), None)
 
 
 def summary_lines(state: RunState, path: Path) -> list[str]:
@@ -112,7 +117,9 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         return [printable(f"run file: {path}")]
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
-        what = "environment, not shown to be minimal"
+        found = current(state)
+        helps = () if found is None else helping(found)
+        what = f"environment, {f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
@@ -146,16 +153,33 @@ def _next(state: RunState, path: Path) -> list[str]:
 def _certificate_lines(state: RunState) -> list[str]:
     found = current(state)
     if found is None:
-        so_far = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
-        return [f"{so_far[0]}; {missing(state)}"]
+        rates = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
+        return [f"{rates[0]}; {missing(state)}", *_shown_so_far(state)]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
-    lines += [f"  without {claim.without}: {rate(claim)}: {short(claim)}" for claim in removals[:MOST_NAMES]]
+    lines += [_removal(claim) for claim in removals[:MOST_NAMES]]
     if (more := len(removals) - MOST_NAMES) > 0:
         lines.append(f"  and {count(more, 'more model')}")
     if (whole := _whole_world(state)) is not None:
         lines.append(f"  the whole world: {rate(whole)}")
     return [*lines, promise(state, found)] if state.certified else lines
+
+
+def _shown_so_far(state: RunState) -> list[str]:
+    """What an unfinished certificate has shown, which holds whenever it is stopped."""
+    rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows_at_least]
+    lines = []
+    for one in rows:
+        what = f"without {one.without}" if one.without else "what is left"
+        bound = percent(one.bound or 0.0)
+        often = f"at most {bound} as often" if one.without else f"at least {bound} of the rate is kept"
+        lines.append(f"  {what}: f in {one.shown} of {count(one.runs, 'fresh run')}: {often}")
+    return lines
+
+
+def _removal(claim: Claim) -> str:
+    often = f", at most {percent(claim.bound)} as often" if claim.bound is not None and claim.bound < 1.0 else ""
+    return f"  without {claim.without}: {rate(claim)}{often}: {short(claim)}"
 
 
 def broken(state: RunState) -> list[str]:

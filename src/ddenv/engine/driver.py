@@ -19,7 +19,7 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.claims import current, is_minimal, verdict_on
-from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, playing
@@ -366,17 +366,21 @@ class Driver:
         """The certificate that this search has already, or a new one; a finished one only if no other is asked for."""
         journal, last = self._journal, self._journal.state.certificate
         if last is None or (self._only_certify is not None and last.claims):
-            state, number = journal.state, len(journal.state.certificates) + 1
-            at_least = self._only_certify or self._reduction.baseline_runs
-            keep_rate = state.scenario["reduction"]["keep_rate"]
+            asked, number = self._reduction, len(journal.state.certificates) + 1
+            at_least = self._only_certify or asked.baseline_runs
             started = events.CertificateStarted(
-                number, journal.fresh_run, journal.rate_of_whole(), keep_rate, error_of(number), at_least
+                number,
+                journal.fresh_run,
+                journal.rate_of_whole(),
+                asked.keep_rate,
+                error_of(number),
+                at_least,
+                asked.certify_rate,
             )
             journal.record(started)
             last = journal.state.certificates[-1]
-        return steps.Certificate(
-            last.number, last.first_run, Terms(last.keep_rate, last.rate, last.error, last.at_least)
-        )
+        terms = Terms(last.certify_rate, last.keep_rate, last.error, last.at_least)
+        return steps.Certificate(last.number, last.first_run, terms)
 
     def _certified(self, step: steps.Certified) -> None:
         if not self._certificate.claims:
@@ -398,16 +402,15 @@ class Driver:
         return last
 
     def _claim_made(self, named: steps.NamedClaim, first: int) -> events.ClaimMade:
-        journal, runs = self._journal, range(first, first + named.claim.runs)
-        outcomes: dict[str, int] = {}
-        for test in journal.tests(named.environment, runs, full=True):
+        journal, outcomes = self._journal, dict[str, int]()
+        for test in journal.tests(named.environment, [first + run for run in named.runs], full=True):
             outcome = journal.state.tests[test - 1].outcome
             outcomes[outcome] = outcomes.get(outcome, 0) + 1
         sound = sum(number for outcome, number in outcomes.items() if outcome not in BROKEN)
         shown = outcomes.get("similar", 0)
-        low, high = wilson_interval(shown, sound) if sound else (0.0, 1.0)
-        number = journal.number(named.environment)
-        return events.ClaimMade(named.model, number, named.claim.verdict, shown, sound, low, high, outcomes)
+        number, claim = journal.number(named.environment), named.claim
+        interval = anytime_interval(shown, sound)
+        return events.ClaimMade(named.model, number, claim.verdict, shown, sound, *interval, outcomes, claim.bound)
 
     def _stepped_back(self, step: steps.SteppedBack) -> None:
         journal = self._journal

@@ -10,7 +10,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, known_failure
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, Claim, Verdict
-from ddenv.evidence.rates import Shown, wilson_interval
+from ddenv.evidence.rates import Shown, anytime_interval
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Passing, isolation
 from ddenv.reduction.procedure import Judged, NamedClaim, Wants
@@ -181,10 +181,10 @@ class _Isolator:
         journal.record(events.IsolationChecked(environment, claims, tuple(sorted(rests_on))))
 
     def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
-        shown = [self.shown(named.environment, first + run) for run in range(named.claim.runs)]
+        shown = [self.shown(named.environment, first + run) for run in named.runs]
         runs, reached = sum(type(one) is bool for one in shown), sum(one is True for one in shown)
-        low, high = wilson_interval(reached, runs) if runs else (0.0, 1.0)
-        return events.ReturnedMade(named.model, named.claim.verdict, reached, runs, low, high)
+        interval = anytime_interval(reached, runs)
+        return events.ReturnedMade(named.model, named.claim.verdict, reached, runs, *interval)
 
     def _known_checks(self) -> list[Checked]:
         """What fresh runs have shown before this engine."""
@@ -194,6 +194,6 @@ class _Isolator:
             claims = []
             for one in check.claims:
                 model = None if one.back is None else next(iter(journal.models([one.back])))
-                claims.append(NamedClaim(model, passing, Claim(cast(Verdict, one.verdict), one.runs)))
+                claims.append(NamedClaim(model, passing, Claim(cast(Verdict, one.verdict))))
             checks.append(Checked(self._whole - passing, tuple(claims)))
         return checks

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
+from itertools import count
 
 from ddenv.environment import Environment
 from ddenv.errors import UserError
@@ -198,12 +199,15 @@ class Journal:
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         whole, state = self._numbers[self.whole], self.state
-        tests = [
-            test
-            for test in state.tests
-            # Fresh runs that only ran ahead of time would make it depend on the number of workers.
-            if test.environment == whole and (test.phase not in (CERTIFY, ISOLATE) or state.rests_on >> test.id & 1)
-        ]
+        tests = [test for test in state.tests if test.environment == whole and test.phase not in (CERTIFY, ISOLATE)]
+        for certificate in state.certificates:
+            # A certificate runs the whole world at first only where what is left missed f: these runs would show it as too rare.
+            # Those that only ran ahead of time would make it depend on the number of workers.
+            for run in count(certificate.first_run):
+                test = self.test(self.whole, run, full=True)
+                if test is None or not state.rests_on >> test.id & 1:
+                    break
+                tests.append(test)
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
 

@@ -1,54 +1,60 @@
-"""What fresh runs show of a result: whether what is left keeps the rate of f, and whether each removal falls below it.
+"""What fresh runs show of a result: what share of the rate of f it keeps, and how often f still shows without each model.
 
-Fresh runs have seeds that chose nothing. Whole world, result, and result without one model run with the same seeds, in pairs. Each
-claim is a bet against its opposite: where the opposite is true, no bet is likely to win much, and reaches a wealth of 1 / error
-with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic statistics and safe
-anytime-valid inference", 2023). Nothing is assumed about how runs with the same seed depend on each other.
+Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the same seed. For each share there is
+a bet that the first one shows f at more than this share of the second one's rate. If it does not, the bet reaches a wealth of
+1 / error with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic statistics
+and safe anytime-valid inference", 2023). The wealth falls as the share rises, so the highest share whose bet has reached 1 / error
+is a lower bound of what is kept, valid at any time. A bet the other way gives an upper bound. Nothing is assumed about how runs
+with the same seed depend on each other.
+
+A run that was not made, or broke, counts against the claim. So the whole world need not run where what is left shows f: it is then
+taken to show f, too, which can only make the bound smaller.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ddenv.environment import Environment
 from ddenv.evidence.rates import HIGHEST_RATE, Shown
 
-Verdict = Literal["", "kept", "lost", "needed", "not needed", "passes", "fails", "not shown", "unknown"]
-# Asks for a run of each of these subjects with the next seed, is sent whether each showed f, and returns a verdict.
-Procedure = Generator[tuple[Environment, ...], tuple[bool, ...], Verdict]
+Verdict = Literal["", "kept", "lost", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"]
 
-# The chance that any claim of a run is wrong, over all its certificates; half of it is for rates kept, half for removals.
+# The chance that any claim of a run is wrong, over all its certificates; half of it is for rates kept, half for removals. It is not
+# divided by the number of models: "each model is needed" is wrong only if a certain one is not, and its own bet won by chance.
 ERROR = 0.05
-# From this rate on, nearly all runs are expected to show f. Then the result runs alone first, since no rate exceeds 1.
-SURE, MOST_ALONE, SHARE_ALONE, HOPELESS = 0.93, 80, 0.8, 0.02
-EXPECTED = (0.9, 0.95, 0.99, 1.0)
-# At this wealth a bet on the opposite ends the search for evidence. Where it is wrong, it only costs runs.
+# Without a needed model f shows in at most this share of the runs with it.
+NEEDED_SHARE = 0.8
+# At this wealth a bet against a claim ends the search for evidence.
 REFUTED = 20.0
-# The maximum number of pairs: a multiple of the expected number, and never more than these.
-PATIENCE, MOST_PAIRS, MOST_REMOVAL_PAIRS = 5.0, 600, 240
-# After this number of pairs a claim is given up if both bets grow so slowly that this many times their growth would not be enough.
-FEWEST_PAIRS, HOPE = 100, 4.0
-# Well above what must be kept: a rate that falls below this share of the whole world's is given up, since to show that it is kept
-# would take too many runs. After all pairs, the lower one counts.
-WELL_ABOVE, SOMEWHAT_ABOVE, HIGHEST_SHARE, HIGH_SHARE = 0.15, 0.1, 0.95, 0.9
+# So many seeds run the whole world only where what is left missed f; then each does. Below this wealth sooner.
+MOST_ALONE, HOPELESS = 40, 0.1
+# The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
+# many times as fast as they did.
+MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
+# A model without which f is shown to be rarer, and seems to keep so much of its rate, helps after so many pairs.
+HELPS_AFTER, HELPS_SHARE = 60, 0.75
+# If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
+ABOUT_AS_OFTEN = 0.9
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
 ENOUGH_RATIO, MOST_EARLIER = 3.0, 60
+# Each bet is a mixture of these stakes, as parts of the highest possible one.
+STAKES = (0.15, 0.3, 0.5, 0.7, 0.9)
 
 
 @dataclass(frozen=True)
 class Terms:
-    """The terms of a certificate: the share of the whole world's rate that must be kept, an estimate of that rate, the chance of
-    error of the claim, and the minimum number of runs.
+    """The terms of a certificate: the share of the whole world's rate that it has to show, the share at which the search aims, the
+    chance of error of a claim, and the minimum number of runs.
     """
 
+    certify_rate: float
     keep_rate: float
-    rate: float
     error: float
     at_least: int = 1
 
@@ -59,183 +65,212 @@ def error_of(number: int) -> float:
 
 
 @dataclass(frozen=True)
+class Pairs:
+    """Runs of two environments with the same seeds: how many showed f in both, in the first alone, in the second alone."""
+
+    both: int = 0
+    first: int = 0
+    second: int = 0
+
+    def after(self, first: bool, second: bool) -> Pairs:
+        """The pairs with one more."""
+        return Pairs(self.both + (first and second), self.first + (first > second), self.second + (second > first))
+
+    def above(self, share: float) -> float:
+        """The wealth of the bet that the first shows f at more than `share` (above 0) of the rate of the second."""
+        return self._wealth(lambda stake: (stake * (1.0 / share - 1.0), stake / share, -stake))
+
+    def below(self, share: float) -> float:
+        """The wealth of the bet that the first shows f at less than `share` of the rate of the second."""
+        return self._wealth(lambda stake: (-stake * (1.0 - share), -stake, stake * share))
+
+    def _wealth(self, gains: Callable[[float], tuple[float, float, float]]) -> float:
+        counts = (self.both, self.first, self.second)
+        return sum(_product(gains(stake), counts) for stake in STAKES) / len(STAKES)
+
+    def keeps_at_least(self, error: float, known: float = 0.0) -> float:
+        """The lower bound of the share, from 0 to 1; no lower than `known`."""
+        return _last(known, 1.0, lambda share: self.above(share) >= 1.0 / error)
+
+    def at_most(self, error: float, known: float = 1.0) -> float:
+        """The upper bound of the share, from 0 to 1; no higher than `known`."""
+        return 1.0 - _last(1.0 - known, 1.0, lambda more: self.below(1.0 - more) >= 1.0 / error)
+
+    @property
+    def share(self) -> float:
+        """How often the first showed f for each time that the second did."""
+        return (self.both + self.first) / max(1, self.both + self.second)
+
+
+def _product(gains: tuple[float, float, float], counts: tuple[int, int, int]) -> float:
+    return math.exp(min(700.0, sum(count * math.log1p(gain) for gain, count in zip(gains, counts, strict=True))))
+
+
+def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
+    """The highest number from `known` to `most` for which something holds that holds for all lower ones, to a thousandth."""
+    if not holds(known + 0.001 * (most - known)):
+        return known
+    while most - known > 0.001:
+        middle = (known + most) / 2.0
+        known, most = (middle, most) if holds(middle) else (known, middle)
+    return known
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a procedure asks for: these `tests`, as (environment, run); `later` environments will run with later seeds, if at all.
+
+    `bound` is what its tests have shown so far.
+    """
+
+    tests: tuple[tuple[Environment, int], ...]
+    later: tuple[Environment, ...]
+    bound: float | None = None
+
+
+# Asks for tests, is sent whether each showed f or broke, and returns a verdict with the bound that was shown.
+Procedure = Generator[Wanted, tuple[Shown, ...], tuple[Verdict, float | None]]
+
+
+@dataclass(frozen=True)
 class Claim:
-    """A verdict, "" while it is open, that rests on the first `runs` runs; the tests that it rests on and those still needed, as
-    (subject, run).
+    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run).
+
+    `wanted` are the tests that it needs next; `later` ones it may need after these. `broken` of its tests broke.
     """
 
     verdict: Verdict
-    runs: int
-    wanted: tuple[tuple[Environment, int], ...] = ()
+    bound: float | None = None
     rests_on: tuple[tuple[Environment, int], ...] = ()
+    broken: int = 0
+    wanted: tuple[tuple[Environment, int], ...] = ()
+    later: tuple[tuple[Environment, int], ...] = ()
+
+
+class Settling:
+    """A procedure that is carried as far as the finished runs go. What it claims follows from their outcomes in order alone."""
+
+    def __init__(self, procedure: Procedure) -> None:
+        # Every procedure asks for a run.
+        self._procedure, self._wanted = procedure, next(procedure)
+        self._tests: list[tuple[Environment, int]] = []
+        self._broken = 0
+        self._settled: Claim | None = None
+
+    def claim(self, shown: Callable[[Environment, int], Shown], ahead: int = 1) -> Claim:
+        """What it claims by now. Looks `ahead` for so many runs of each environment, so that idle workers have something to do."""
+        while self._settled is None:
+            wanted = self._wanted
+            known = tuple(shown(*test) for test in wanted.tests)
+            if None in known:
+                last = wanted.tests[-1][1]
+                later = ((subject, last + more) for more in range(1, ahead) for subject in wanted.later)
+                missing = (tuple(test for test in of if shown(*test) is None) for of in (wanted.tests, later))
+                return Claim("", wanted.bound, tuple(self._tests), self._broken, *missing)
+            self._tests += wanted.tests
+            self._broken += known.count("broken")
+            try:
+                if self._broken > max(MOST_BROKEN, len(self._tests) // 10):
+                    self._end("unknown", wanted.bound)
+                else:
+                    self._wanted = self._procedure.send(known)
+            except StopIteration as end:
+                self._end(*end.value)
+        return self._settled
+
+    def _end(self, verdict: Verdict, bound: float | None) -> None:
+        self._settled = Claim(verdict, bound, tuple(self._tests), self._broken)
 
 
 def settle(procedure: Procedure, shown: Callable[[Environment, int], Shown], ahead: int = 1) -> Claim:
-    """Carries a procedure as far as the finished runs go. It follows from their outcomes in order alone.
-
-    Looks `ahead` for this many runs of each subject, so that idle workers have something to do. A run that broke for one
-    of its subjects counts for none.
-    """
-    run = broken = 0
-    tests: list[tuple[Environment, int]] = []
-    # Every procedure asks for a run.
-    subjects = next(procedure)
-    while True:
-        known = [shown(subject, run) for subject in subjects]
-        if None in known:
-            later = ((subject, run + more) for more in range(max(1, ahead)) for subject in subjects)
-            return Claim("", run, tuple(one for one in later if shown(*one) is None), tuple(tests))
-        tests += [(subject, run) for subject in subjects]
-        run += 1
-        if "broken" in known:
-            broken += 1
-            if broken > max(MOST_BROKEN, run // 10):
-                return Claim("unknown", run, rests_on=tuple(tests))
-            continue
-        try:
-            subjects = procedure.send(tuple(one is True for one in known))
-        except StopIteration as end:
-            return Claim(end.value, run, rests_on=tuple(tests))
+    """What a procedure claims by the finished runs."""
+    return Settling(procedure).claim(shown, ahead)
 
 
 def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
-    """Whether `left` shows f at `keep_rate` of the rate of `whole` or more: "kept", "lost" or "not shown".
+    """What share of the rate of `whole` is kept by `left`: "kept" if at least `certify_rate` is, "lost", or "not shown".
 
-    "kept" is wrong with a probability of at most the terms' error. "lost" is no such claim: f is seen to be rarer than in
-    `whole`, and the runs do not show that enough is kept.
+    The bound, and so "kept", is wrong with a probability of at most the terms' error. "lost" says that less than `keep_rate` is
+    kept; this is wrong with a probability of at most 1 / `REFUTED`.
     """
     if left == whole:
         return (yield from _of_whole(left, max(1, terms.at_least)))
-    need, rate, alone, runs, hits, share = 1.0 / terms.error, terms.rate, 0.0, 0, 0, 0.0
-    if rate >= SURE and terms.keep_rate < EXPECTED[0]:
-        share, bet = SHARE_ALONE, [1.0 / len(EXPECTED)] * len(EXPECTED)
-        while runs < MOST_ALONE and sum(bet) >= HOPELESS:
-            (shown,) = yield (left,)
-            runs, hits = runs + 1, hits + shown
-            bet = [wealth * _likelier(each, terms.keep_rate, shown) for wealth, each in zip(bet, EXPECTED, strict=True)]
-            if share * sum(bet) >= need:
-                return (yield from _at_least(terms.at_least - runs, (left,), "kept"))
-        alone = share * sum(bet)
-        if sum(bet) >= HOPELESS:
-            rate = min(rate, hits / runs)
-    rate = min(max(rate, 0.05), HIGHEST_RATE)
-    stake, growth = _best_stake(round(rate, 2), terms.keep_rate)
-    highest = 0.995 / terms.keep_rate
-    bet_for = _Bet.of(0.5 * stake, stake, min(1.5 * stake, highest))
-    against, share_well = _Bet.of(0.2, 0.5, 0.9), max(terms.keep_rate, min(HIGHEST_SHARE, terms.keep_rate + WELL_ABOVE))
-    shown_left = shown_whole = 0
-    for pair in range(min(MOST_PAIRS, int(PATIENCE * math.log(3.0 / terms.error) / growth))):
-        mine, theirs = yield left, whole
-        shown_left, shown_whole = shown_left + mine, shown_whole + theirs
-        bet_for, against = bet_for.after(mine - terms.keep_rate * theirs), against.after(share_well * theirs - mine)
-        if alone + (1.0 - share) * bet_for.wealth >= need:
-            return (yield from _at_least(terms.at_least - runs - pair - 1, (left, whole), "kept"))
-        if against.wealth >= REFUTED:
-            return "lost"
-    return "not shown" if shown_left >= _likely_kept(terms) * shown_whole else "lost"
+    # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
+    assumed, sound, bound, run, alone = Pairs(), Pairs(), 0.0, 0, True
+    # The seeds with which only what is left has run, and showed f.
+    hits: list[int] = []
+    while run < MOST_PAIRS or hits:
+        alone = alone and run < MOST_ALONE and (not run or assumed.above(terms.certify_rate) >= HOPELESS)
+        if hits and not alone:
+            mine: Shown = True
+            (theirs,) = yield Wanted(((whole, hits.pop(0)),), (whole,), bound)
+            assumed, sound = replace(assumed, both=assumed.both - 1), replace(sound, first=sound.first - 1)
+        elif alone:
+            theirs = True
+            (mine,) = yield Wanted(((left, run),), (left,), bound)
+            if mine is True:
+                hits.append(run)
+                assumed, sound, theirs = assumed.after(True, True), sound.after(True, False), None
+            else:
+                (theirs,) = yield Wanted(((whole, run),), (left,), bound)
+            run += 1
+        else:
+            mine, theirs = yield Wanted(((left, run), (whole, run)), (left, whole), bound)
+            run += 1
+        if theirs is not None:
+            assumed = assumed.after(mine is True, theirs is not False)
+            sound = sound.after(mine is not False, theirs is True)
+        bound = assumed.keeps_at_least(terms.error, bound)
+        if bound >= terms.certify_rate and run >= terms.at_least:
+            return "kept", bound
+        if sound.below(terms.keep_rate) >= REFUTED:
+            return "lost", bound
+    return "not shown", bound
 
 
 def _of_whole(whole: Environment, runs: int) -> Procedure:
     """The whole world keeps its own rate, if f shows in it at all."""
     shown = 0
-    for _ in range(runs):
-        (mine,) = yield (whole,)
-        shown += mine
-    return "kept" if shown else "not shown"
+    for run in range(runs):
+        (mine,) = yield Wanted(((whole, run),), (whole,))
+        shown += mine is True
+    return ("kept", 1.0) if shown else ("not shown", None)
 
 
-def _likely_kept(terms: Terms) -> float:
-    """The share of the whole world's rate from which on it is likely that enough is kept."""
-    return max(terms.keep_rate, min(HIGH_SHARE, terms.keep_rate + SOMEWHAT_ABOVE))
+def falls(without: Environment, left: Environment, terms: Terms, share: float = NEEDED_SHARE) -> Procedure:
+    """How often f shows in `without`, as a part of its rate in `left`; "needed" if that is at most `share`.
 
-
-def falls(without: Environment, whole: Environment, terms: Terms) -> Procedure:
-    """Whether `without` shows f at less than `keep_rate` of the rate of `whole`: "needed", "not needed" or "not shown".
-
-    "needed" is wrong with a probability of at most the terms' error. "not needed" says that f shows about as often; the next
-    certificate has to show it.
+    The bound, and so "needed", is wrong with a probability of at most the terms' error. "helps" says that f is rarer, but not by so
+    much; "not needed" that it shows about as often, which the next certificate has to show.
     """
-    bet_for = _Bet.of(0.5, 0.75, 0.95, 0.95)
-    against = _Bet.of(0.2, 0.5, 0.9)
-    shown_without = shown_whole = 0
-    for pair in range(MOST_REMOVAL_PAIRS):
-        mine, theirs = yield without, whole
-        shown_without, shown_whole = shown_without + mine, shown_whole + theirs
-        gain = terms.keep_rate * theirs - mine
-        bet_for, against = bet_for.after(gain), against.after(-gain)
-        if bet_for.wealth >= 1.0 / terms.error:
-            return (yield from _at_least(terms.at_least - pair - 1, (without, whole), "needed"))
-        if against.wealth >= REFUTED:
-            return "not needed"
-        more = pair + 1, MOST_REMOVAL_PAIRS
-        if not bet_for.may_reach(1.0 / terms.error, *more) and not against.may_reach(REFUTED, *more):
+    assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
+    for run in range(MOST_REMOVAL_PAIRS):
+        mine, theirs = yield Wanted(((without, run), (left, run)), (without, left), bound)
+        assumed = assumed.after(mine is not False, theirs is True)
+        sound = sound.after(mine is True, theirs is not False)
+        bound = assumed.at_most(terms.error, bound)
+        if bound <= share and run + 1 >= terms.at_least:
+            return "needed", bound
+        rarer = rarer or assumed.below(1.0) >= REFUTED
+        often = sound.above(share)
+        if often >= REFUTED or (rarer and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE):
+            return "helps" if rarer else "not needed", bound
+        likeliest = max(often * terms.error * REFUTED, assumed.below(share))
+        if run + 1 >= FEWEST_PAIRS and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / terms.error:
             break
-    return "not needed" if shown_without and shown_without >= _likely_kept(terms) * shown_whole else "not shown"
+    about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
+    return ("helps" if rarer else "not needed" if about_as_often else "not shown"), bound
 
 
 def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: float) -> Procedure:
-    """Whether an earlier environment still shows f at `rate`, and not nearer to `lost_rate`: "kept" or "lost"."""
+    """Whether an earlier environment is shown to have lost the `rate` of f, being nearer to `lost_rate`: "lost", else "kept"."""
     good = min(rate, HIGHEST_RATE)
     bad = min(max(0.02, min(keep_rate * good, (good + lost_rate) / 2.0)), keep_rate * good)
     ratio = 0.0
-    for _ in range(MOST_EARLIER):
-        (shown,) = yield (earlier,)
-        ratio += math.log(good / bad) if shown else math.log((1.0 - good) / (1.0 - bad))
+    for run in range(MOST_EARLIER):
+        (shown,) = yield Wanted(((earlier, run),), (earlier,))
+        if shown != "broken":
+            ratio += math.log(good / bad) if shown else math.log((1.0 - good) / (1.0 - bad))
         if abs(ratio) >= ENOUGH_RATIO:
             break
-    return "kept" if ratio > 0 else "lost"
-
-
-def _at_least(more: int, subjects: tuple[Environment, ...], verdict: Verdict) -> Procedure:
-    """`verdict`, after so many more runs: its interval has to say something."""
-    for _ in range(more):
-        yield subjects
-    return verdict
-
-
-def _likelier(rate: float, limit: float, shown: bool) -> float:
-    """How much likelier a run is at `rate` than at `limit`."""
-    return rate / limit if shown else (1.0 - rate) / (1.0 - limit)
-
-
-@dataclass(frozen=True)
-class _Bet:
-    """A mixture of strategies; each bets a part of its wealth on every pair."""
-
-    stakes: tuple[float, ...]
-    wealths: tuple[float, ...]
-
-    @classmethod
-    def of(cls, *stakes: float) -> _Bet:
-        return cls(stakes, tuple(1.0 / len(stakes) for _ in stakes))
-
-    def after(self, gain: float) -> _Bet:
-        """The bet after a pair; the product of a stake and a gain is never below -1."""
-        pairs = zip(self.stakes, self.wealths, strict=True)
-        return _Bet(self.stakes, tuple(wealth * (1.0 + stake * gain) for stake, wealth in pairs))
-
-    @property
-    def wealth(self) -> float:
-        return sum(self.wealths)
-
-    def may_reach(self, wealth: float, pairs: int, most: int) -> bool:
-        """Whether it may reach `wealth` within `most` pairs, if it grows up to `HOPE` times as fast as in these `pairs`."""
-        growth = math.log(max(self.wealths) * len(self.stakes)) / pairs
-        return pairs < FEWEST_PAIRS or HOPE * growth * most >= math.log(wealth)
-
-
-@lru_cache(maxsize=1024)
-def _best_stake(rate: float, keep_rate: float) -> tuple[float, float]:
-    """The stake with which the wealth grows fastest where both show f at `rate`, independently; and its growth a pair, in nats."""
-    both, one = rate * rate, rate * (1.0 - rate)
-
-    def growth(stake: float) -> float:
-        return (
-            both * math.log(1.0 + (1.0 - keep_rate) * stake)
-            + one * math.log(1.0 + stake)
-            + one * math.log(1.0 - keep_rate * stake)
-        )
-
-    stakes = [step / 100 / keep_rate for step in range(1, 100)]
-    best = max(stakes, key=growth)
-    return best, max(growth(best), 1e-4)
+    return ("lost" if ratio <= -ENOUGH_RATIO else "kept"), None

@@ -7,20 +7,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ddenv.evidence.certificate import (
+    HELPS_AFTER,
+    MOST_ALONE,
+    MOST_PAIRS,
+    MOST_REMOVAL_PAIRS,
+    NEEDED_SHARE,
+    REFUTED,
+    STAKES,
+    error_of,
+)
 from ddenv.evidence.rates import wilson_interval
 
-# It takes so many times the expected number, if the rates are right. From the rate `SURE` on, what is left first runs alone.
-SHORTER, LONGER, SURE = 0.5, 2.2, 0.93
-# The maximum number of runs alone, and of pairs, for what is left and for a removal.
-MOST_ALONE, MOST_PAIRS, MOST_REMOVAL_PAIRS = 80, 600, 240
-# Logarithms of the wealth that the first certificate asks for, with what it costs to bet in several ways at once: that the rate is
-# kept, that it is not, and that a single model is needed.
-FOR_KEPT, FOR_LOST, FOR_NEEDED = 4.0, 2.0, 4.9
-# The share of the rate that bets against what is left, and the stakes of those for a removal.
-WELL_KEPT, STAKES = 0.95, (0.5, 0.75, 0.95)
+# It takes so many times the expected number, if the rates are right.
+SHORTER, LONGER = 0.55, 2.2
+# Of the pairs of runs with the same seed, so many end alike whatever their rates are.
+ALIKE = 0.4
+# The logarithm of the wealth that a bet of the first certificate needs, with what it costs to bet with several stakes at once; and
+# that of a bet against it.
+NEEDS, NEEDS_AGAINST = math.log(2.0 / error_of(1) * len(STAKES)), math.log(REFUTED * len(STAKES))
 # Before it has runs, what is left is taken to show f as often as the whole world, and a removal never to, as if so many of its runs
 # had shown that.
-WORTH, WORTH_WITHOUT = 8, 4
+WORTH, WORTH_WITHOUT = 3, 4
 # Eight of ten rates are in the interval of so many standard deviations. How little may be left, as a share of all, until it ends.
 EIGHT_OF_TEN, LEAST_LEFT = 1.28, 0.3
 
@@ -40,22 +48,22 @@ class Made:
 
 
 def certificate_tests(
-    rate: float, keep_rate: float, left: int, at_least: int, seen: int = 0, made: Made | None = None
+    rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0, made: Made | None = None
 ) -> tuple[int, int, int]:
     """Tests of a certificate of `left` needed models, as (low, likely, high): of ten, about eight take between low and high.
 
     `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known. `made` says what the
-    certificate's own runs showed so far: only the others are open. It runs what is left, alone or in pairs with the whole world,
-    and what is left without each model, in pairs as well; pairs of the whole world are the same for all.
+    certificate's own runs showed so far: only the others are open. It runs what is left, the whole world where that missed f, and
+    what is left without each model.
     """
     now = Made() if made is None else made
     # A damaged run file may ask for nothing, or for all.
-    rate, keep_rate = min(max(rate, 0.0), 1.0), min(max(keep_rate, 0.01), 0.99)
+    rate, certify_rate = min(max(rate, 0.0), 1.0), min(max(certify_rate, 0.01), 0.99)
     seen, tests = min(max(0, seen), MOST_PAIRS), max(0, now.tests)
     end, sure_end = _rate(now.end, rate, WORTH)
     without = [_rate(each, 0.0, WORTH_WITHOUT) for each in (*now.without[:left], *[(0, 0)] * (left - len(now.without)))]
     rates = [each for each, _ in without]
-    expected = _Expected(keep_rate, at_least, left)
+    expected = _Expected(certify_rate, at_least)
     likely = expected.tests(rate, end, rates)
     ends = [likely]
     if seen > 0:
@@ -70,7 +78,7 @@ def certificate_tests(
     # What is not known of the rates and chance within the certificate are independent factors.
     shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / likely)))
     longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / likely)))
-    most = MOST_ALONE * (rate >= SURE) + 2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS
+    most = 2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS
     still = max(likely - tests, LEAST_LEFT * likely if tests else 0.0)
     low, high = tests + max(0.0, likely - tests) / shorter, max(tests + still, min(most, tests + still * longer))
     return math.floor(low), round(tests + still), math.ceil(high)
@@ -88,41 +96,35 @@ def _ends(rate: float, runs: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Expected:
-    """As `ddenv.evidence.certificate` goes: wealth grows as the square of the mean gain of a pair over twice its second moment."""
+    """As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest stake on average."""
 
-    keep_rate: float
+    certify_rate: float
     at_least: int
-    left: int
 
     def tests(self, rate: float, end: float, without: Sequence[float]) -> float:
         """Where the whole world shows f at `rate`, and what is left, and that without each model, at these rates."""
-        rate, end = (min(max(each, 0.05), 0.985) for each in (rate, end))
-        lost = 2.0 * _pairs(rate, end, WELL_KEPT, -FOR_LOST)
-        needs = FOR_NEEDED + math.log(max(1, self.left))
-        removals = [max(self.at_least, _removal_pairs(rate, each, self.keep_rate, needs)) for each in without]
-        longest = max(removals, default=0.0)
-        if min(rate, end) >= SURE:
-            of_left, of_whole = max(self.at_least, 1.27 * FOR_KEPT / -math.log(self.keep_rate)), longest
+        kept = (1.0 / self.certify_rate - 1.0, 1.0 / self.certify_rate, -1.0)
+        both, mine, theirs = _shares(end, rate)
+        alone = max(float(self.at_least), NEEDS / _growth((both + mine, 0.0, theirs), kept))
+        if alone <= MOST_ALONE:
+            of_left, of_whole = alone, alone * (1.0 - end)
         else:
-            of_left = max(self.at_least, _pairs(rate, end, self.keep_rate, FOR_KEPT))
-            of_whole = max(of_left, longest)
-        return min(lost, of_left + of_whole + sum(removals))
+            of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, mine, theirs), kept))
+        needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
+        removals = [NEEDS / _growth(_shares(each, end), needed) for each in without]
+        removals = [max(self.at_least, each if each <= MOST_REMOVAL_PAIRS else HELPS_AFTER) for each in removals]
+        lost = 2.0 * NEEDS_AGAINST / _growth((both, mine, theirs), needed)
+        return min(lost, max(of_left, *removals, 0.0) + of_whole + sum(removals))
 
 
-def _pairs(rate: float, end: float, share: float, needs: float) -> float:
-    """Pairs until a bet has won `needs`: that what is left keeps more than this share of the rate, or, if negative, less."""
-    mean = end - share * rate
-    moment = end * (1 - rate) + end * rate * (1 - share) ** 2 + (1 - end) * rate * share**2
-    return min(MOST_PAIRS, needs * 2 * moment / (mean * abs(mean))) if mean * needs > 0 else MOST_PAIRS
+def _shares(first: float, second: float) -> tuple[float, float, float]:
+    """Of pairs of these rates, the shares in which both show f, only the first, only the second."""
+    both = ALIKE * min(first, second) + (1.0 - ALIKE) * first * second
+    return both, first - both, second - both
 
 
 @lru_cache(maxsize=4096)
-def _removal_pairs(rate: float, without: float, keep_rate: float, needs: float) -> float:
-    """Pairs until a bet has won `needs`: that without a model f shows at less than its share of the rate."""
-    growth = max(
-        rate * (1 - without) * math.log(1 + stake * keep_rate)
-        + without * (1 - rate) * math.log(1 - stake)
-        + rate * without * math.log(1 - stake * (1 - keep_rate))
-        for stake in STAKES
-    )
-    return min(MOST_REMOVAL_PAIRS, needs / growth) if growth > 0 else MOST_REMOVAL_PAIRS
+def _growth(shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
+    """How fast the wealth of a bet grows in a pair, in nats; nearly 0 if it shrinks."""
+    pairs = tuple(zip(shares, gains, strict=True))
+    return max(1e-4, *(sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES))

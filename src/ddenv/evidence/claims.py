@@ -6,8 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+from ddenv.environment import Environment
+from ddenv.evidence.certificate import Claim as Shows
+from ddenv.evidence.certificate import Terms, falls, settle
+from ddenv.evidence.certificate import keeps as keeps_rate
 from ddenv.evidence.certificate_cost import Made, certificate_tests
-from ddenv.evidence.rates import miss_chance, wilson_interval
+from ddenv.evidence.rates import Shown, miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.run_settings import settings
@@ -25,17 +29,29 @@ def is_minimal(certificate: Certificate) -> bool:
     return bool(claims) and all(claim.verdict == ("kept" if claim.without is None else "needed") for claim in claims)
 
 
+def helping(certificate: Certificate) -> tuple[str, ...]:
+    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much."""
+    left, *removals = certificate.claims
+    others = {claim.verdict for claim in removals} - {"needed"}
+    if left.verdict != "kept" or others != {"helps"}:
+        return ()
+    return tuple(claim.without for claim in removals if claim.verdict == "helps" and claim.without is not None)
+
+
 def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
     """What a finished certificate shows, in one sentence without a full stop.
 
     `pinned` models could not be left out; `each` is what was left out at a time.
     """
     left, *removals = certificate.claims
-    share = percent(certificate.keep_rate)
     if left.verdict == "lost":
-        return f"f is rarer in what is left, not shown to keep {share} of {_whole_rate(certificate)}: {rate(left)}"
+        return (
+            f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
+        )
     if left.verdict != "kept":
-        return f"not shown that what is left keeps {share} of {_whole_rate(certificate)}: {rate(left)}"
+        aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
+        shown = f"; it keeps at least {percent(left.bound)}" if left.bound else ""
+        return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
     for word, start in (
         ("unknown", "not shown that each model is needed: tests broke without"),
         ("not shown", "not shown that each model is needed: undecided without"),
@@ -47,14 +63,64 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     but = f"; {_stayed(pinned)}" if pinned else ""
     if not removals:
         return f"nothing is left that can be removed: {rate(left)}{but}"
+    if helps := helping(certificate):
+        first = next(claim for claim in removals if claim.without == helps[0])
+        return f"minimal but for {first_of(helps, MOST_NAMES)}: {keeps(certificate)}; without {helps[0]} {rate(first)}{but}"
     most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
-    without = f"any one of these {len(removals)} at most" if len(removals) > 1 else removals[0].without
-    return f"no {one} can be removed: {rate(left)}; without {without} {rate(most)}{but}"
+    without, bound = (
+        f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
+        _at_most(certificate),
+    )
+    often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
+    return f"no {one} can be removed: {keeps(certificate)}; without {without} {often}{but}"
 
 
-def _stayed(pinned: int) -> str:
-    """That nothing is claimed of models that were never left out."""
-    return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
+def keeps(certificate: Certificate) -> str:
+    """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
+    return f"{rate(certificate.claims[0])}, at least {percent(_kept(certificate))} of {_whole_rate(certificate)}"
+
+
+def _kept(certificate: Certificate) -> float:
+    """The share that "kept" has shown. Certificates of older versions had no bound beyond what they asked for."""
+    bound = certificate.claims[0].bound
+    return certificate.certify_rate if bound is None else bound
+
+
+def _at_most(certificate: Certificate) -> float | None:
+    """How often f shows without any one model, as a share of its rate with it; None if that was not bounded."""
+    bounds = [claim.bound for claim in certificate.claims if claim.without is not None]
+    return max((bound for bound in bounds if bound is not None), default=None) if None not in bounds else None
+
+
+def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Shows]:
+    """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left.
+
+    It holds whenever one looks. Models that no run has left out yet are missing.
+    """
+    node, whole = state.nodes[certificate.node], state.environments[origin(state, certificate.node).id]
+    left, outcomes = state.environments[node.id], dict[tuple[Environment, int], Shown]()
+    rests = dict[str, Environment]()
+    for test in state.confirm_tests:
+        if test.run < certificate.first_run or not test.is_finished:
+            continue
+        tested = state.environments[test.environment]
+        outcomes[tested, test.run - certificate.first_run] = (
+            "broken" if test.outcome in BROKEN else test.outcome == "similar"
+        )
+        if test.node == certificate.node and test.without is not None:
+            rests[test.without] = tested
+
+    def shown(environment: Environment, run: int) -> Shown:
+        return outcomes.get((environment, run))
+
+    terms = terms_of(certificate)
+    claims: dict[str | None, Shows] = {None: settle(keeps_rate(left, whole, terms), shown)}
+    return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
+
+
+def terms_of(certificate: Certificate) -> Terms:
+    """The terms of each claim of a certificate: half of the errors is for rates kept, half for removals."""
+    return Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
@@ -62,6 +128,11 @@ def never_left_out(state: RunState, certificate: Certificate) -> int:
     there = state.nodes[certificate.node].environment
     gone = {name for claim in certificate.claims for name in stack_with(state, there, claim.without)}
     return len(there) - len(gone) if is_minimal(certificate) else 0
+
+
+def _stayed(pinned: int) -> str:
+    """That nothing is claimed of models that were never left out."""
+    return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
 
 
 class Counted(Protocol):
@@ -117,12 +188,15 @@ def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Clai
 
 def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
-    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
-    share = rate.removesuffix(" rate")
+    rate, bound = _whole_rate(certificate), claim.bound
+    if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
+        return f"shown to keep at least {percent(bound)} of {rate}, not {percent(certificate.certify_rate)}"
+    often = "rarer" if bound is None else f"at most {percent(bound)} as often"
     return {
-        "kept": f"keeps {rate}",
-        "lost": f"f is rarer: not shown to keep {share}",
-        "needed": f"needed: without it the rate falls below {share}",
+        "kept": f"keeps at least {percent(certificate.certify_rate if bound is None else bound)} of {rate}",
+        "lost": f"keeps less than {percent(certificate.keep_rate)} of {rate}",
+        "needed": f"needed: without it f shows {often}",
+        "helps": "helps: without it f is rarer, but not by much",
         "not needed": "not needed: f shows about as often without it",
         "not shown": "not shown: the runs do not decide",
         "unknown": "unknown: too many runs broke",
@@ -217,7 +291,7 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
 def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
     """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     left = len(state.environment) - len(state.pinned.intersection(state.environment))
-    first, made = origin(state, now.node).number, 0
+    made = 0
     shown: dict[tuple[int, str | None], tuple[int, int]] = {}
     for test in state.confirm_tests:
         if test.run < now.first_run or not test.is_finished:
@@ -226,13 +300,10 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, in
         if test.outcome not in BROKEN:
             hits, runs = shown.get((test.node, test.without), (0, 0))
             shown[test.node, test.without] = hits + (test.outcome == "similar"), runs + 1
-    # The rate that it began with rests on the runs before; its own narrow the range.
-    hits, runs = shown.get((first, None), (0, 0))
     before = 0 if state.baseline is None else state.baseline.runs
-    rate = (now.rate * before + hits) / (before + runs) if before + runs else now.rate
     without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
     done = Made(made, shown.get((now.node, None), (0, 0)), without)
-    return certificate_tests(rate, now.keep_rate, left, now.at_least, before + runs, done)
+    return certificate_tests(now.rate, now.certify_rate, left, now.at_least, before, done)
 
 
 def usual_runs(state: RunState, now: Certificate) -> str:
@@ -253,15 +324,17 @@ def short(claim: Claim) -> str:
 
 def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
-    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
-    return f"what is left has to keep {rate}, and to fall below that without {_any_one(pinned)}"
+    aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
+    return f"they have to show that what is left keeps {aim}, and that f is rarer without {_any_one(pinned)}"
 
 
 def promise(state: RunState, certificate: Certificate) -> str:
     """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
-    rate, pinned = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}", never_left_out(state, certificate)
+    kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
+    most = _at_most(certificate)
+    often = "rarer" if most is None else f"at most {percent(most)} as often"
     return (
-        f"minimal means: what is left keeps {rate}, and falls below that without {_any_one(pinned)}; "
+        f"minimal means: what is left keeps at least {kept}; without {_any_one(pinned)} f shows {often}; "
         f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
     )
 

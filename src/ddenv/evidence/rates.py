@@ -29,6 +29,34 @@ def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tu
     return min(rate, max(0.0, centre - half)), max(rate, min(1.0, centre + half))
 
 
+def anytime_interval(successes: int, trials: int, error: float = 0.05) -> tuple[float, float]:
+    """An interval of a rate that may be asked for after each run: it misses the rate at any time with a probability of at most
+    `error`, however it is decided when to stop. It is 0 to 1 without runs.
+
+    Jeffreys' mixture of Betas against each rate (Robbins, "Statistical methods related to the law of the iterated logarithm",
+    1970).
+    """
+    misses = trials - successes
+    mixed = math.lgamma(successes + 0.5) + math.lgamma(misses + 0.5) - math.lgamma(trials + 1) - math.log(math.pi)
+
+    def is_likely(rate: float) -> bool:
+        if (successes and rate <= 0.0) or (misses and rate >= 1.0):
+            return False
+        at_rate = (successes and successes * math.log(rate)) + (misses and misses * math.log(1.0 - rate))
+        return mixed - at_rate < math.log(1.0 / error)
+
+    def edge(inside: float, outside: float) -> float:
+        if is_likely(outside):
+            return outside
+        for _ in range(30):
+            middle = (inside + outside) / 2.0
+            inside, outside = (middle, outside) if is_likely(middle) else (inside, middle)
+        return inside
+
+    middle = successes / trials if trials else 0.5
+    return edge(middle, 0.0), edge(middle, 1.0)
+
+
 def miss_chance(rate: float, iterations: int) -> float:
     """The probability that `1 + iterations` runs all miss a failure that shows at `rate`."""
     return (1.0 - rate) ** (1 + iterations)
@@ -47,7 +75,7 @@ def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool
     Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): at either rate it is wrong with a probability of
     at most about `error`, although it may be asked after each run.
     """
-    rate, runs, hits = min(rate, 0.99), 0, 0
+    runs = hits = 0
     for shown in outcomes:
         runs, hits = runs + 1, hits + shown
         found = leans_to(hits, runs - hits, rate, rate / 2, error)
@@ -57,8 +85,11 @@ def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool
 
 
 def leans_to(hits: int, misses: int, rate: float, other: float, error: float) -> bool | None:
-    """The same after `hits` and `misses`, if no fewer runs decided: whether they speak for `rate` or for `other`, a lower one."""
-    rate = min(rate, 0.99)
+    """The same after `hits` and `misses`, if no fewer runs decided: whether they speak for `rate` or for `other`, a lower one.
+
+    No few runs tell rates above 0.99 apart, so these are taken as 0.99, or as 0.97 for `other`.
+    """
+    rate, other = min(rate, 0.99), min(other, 0.97)
     ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))
     return ratio > 0 if abs(ratio) >= math.log((1.0 - error) / error) else None
 

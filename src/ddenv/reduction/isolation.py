@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.evidence.certificate import Procedure, Terms, error_of, falls
+from ddenv.evidence.certificate import Procedure, Terms, Wanted, error_of, falls
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import by_chunks
 from ddenv.reduction.guide import Search
@@ -142,19 +142,19 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Gen
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing, error = asked.whole - removed, error_of(number + 1) / 2.0
     backs = [model for model in asked.suspects if model in removed]
-    terms = Terms(asked.keep_rate, asked.rule.wanted, error / len(backs))
+    terms = Terms(asked.rule.wanted, asked.keep_rate, error)
 
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, passing, passes(passing, Passing(asked.rule.wanted, asked.rule.rather_than, error), asked.at_least)
         for model in backs:
             with_it = passing | asked.stacks.by_first[model]
-            yield model, with_it, falls(with_it, passing, terms)
+            yield model, with_it, falls(with_it, passing, terms, asked.keep_rate)
 
     def ends(claim: NamedClaim) -> bool:
         return claim.claim.verdict != "passes" if claim.model is None else claim.claim.verdict == "not needed"
 
     first = asked.first_run + number * asked.block
-    return Checked(removed, (yield from settled(driver, claims, ends, first, "isolate")))
+    return Checked(removed, (yield from settled(driver, claims(), ends, first, "isolate")))
 
 
 def isolating(suspects: Partition, first: int) -> Search:
@@ -188,12 +188,17 @@ def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
     "passes" is wrong with a probability of at most about the error of the rule: then the goal is not reached more often than at
     `rather_than`.
     """
-    reached = runs = 0
+    reached = runs = broken = 0
     found: bool | None = None
     while found is None and runs < MOST_RUNS:
-        (shown,) = yield (world,)
-        reached, runs = reached + shown, runs + 1
-        found = leans_to(reached, runs - reached, rule.wanted, rule.rather_than, rule.error)
-    for _ in range(at_least - runs if found else 0):
-        yield (world,)
-    return "not shown" if found is None else ("passes" if found else "fails")
+        (shown,) = yield Wanted(((world, runs),), (world,))
+        reached, runs, broken = reached + (shown is True), runs + 1, broken + (shown == "broken")
+        # A run that broke counts against what is claimed.
+        fails, passing = (
+            leans_to(reached, missed, rule.wanted, rule.rather_than, rule.error)
+            for missed in (runs - reached - broken, runs - reached)
+        )
+        found = True if passing else False if fails is False else None
+    for run in range(runs, at_least if found else 0):
+        yield Wanted(((world, run),), (world,))
+    return ("not shown" if found is None else "passes" if found else "fails"), None

@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, zip_longest
 from typing import Any, Protocol
 
 from ddenv.environment import Environment
-from ddenv.evidence.certificate import Claim, Procedure, Terms, falls, good_enough, keeps, settle
+from ddenv.evidence.certificate import Claim, Procedure, Settling, Terms, falls, good_enough, keeps
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.guide import Search
 from ddenv.reduction.round import Candidate, Partition, Round
@@ -209,6 +209,11 @@ class NamedClaim:
     environment: Environment
     claim: Claim
 
+    @property
+    def runs(self) -> range:
+        """The fresh runs of its environment on which it rests, counted from the certificate's first one."""
+        return range(sum(environment == self.environment for environment, _ in self.claim.rests_on))
+
 
 class Runs(Protocol):
     """The runs of one predicate, as far as they are known: what judges candidates and settles claims asks for."""
@@ -365,21 +370,21 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, left, keeps(left, whole, terms)
         for model, rest in rests.items():
-            yield model, rest, falls(rest, whole, replace(terms, error=terms.error / len(rests)))
+            yield model, rest, falls(rest, left, terms)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
             return claim.claim.verdict == "lost"
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
-    certified = Certified(certificate, (yield from settled(driver, claims, ends, certificate.first_run, "certify")))
+    certified = Certified(certificate, (yield from settled(driver, claims(), ends, certificate.first_run, "certify")))
     yield certified
     return certified
 
 
 def settled(
     driver: Runs,
-    claims: Callable[[], Iterable[tuple[int | None, Environment, Procedure]]],
+    claims: Iterator[tuple[int | None, Environment, Procedure]],
     ends: Callable[[NamedClaim], bool],
     first_run: int,
     why: str,
@@ -389,32 +394,29 @@ def settled(
     def fresh(environment: Environment, run: int) -> Shown:
         return driver.shown(environment, first_run + run, full=True)
 
-    # Hundreds of runs need not be looked at again once they have decided.
-    decided: dict[int | None, NamedClaim] = {}
+    opened: list[tuple[int | None, Environment, Settling]] = []
     while True:
         named: list[NamedClaim] = []
-        for model, environment, shows in claims():
-            named.append(decided.get(model) or NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
-            if named[-1].claim.verdict:
-                decided[model] = named[-1]
-            # Each open claim has work for a worker.
-            if ends(named[-1]) or sum(not one.claim.verdict for one in named) == driver.workers:
-                break
-        tests = dict.fromkeys(
+        # Each open claim has work for a worker.
+        while not (named and ends(named[-1])) and sum(not one.claim.verdict for one in named) < driver.workers:
+            if len(named) == len(opened):
+                if (more := next(claims, None)) is None:
+                    break
+                model, environment, procedure = more
+                opened.append((model, environment, Settling(procedure)))
+            model, environment, settling = opened[len(named)]
+            named.append(NamedClaim(model, environment, settling.claim(fresh, driver.workers)))
+        # Of each pair the larger world first: its run may imply the other one.
+        next_ones = [sorted(one.claim.wanted, key=lambda test: -len(test[0])) for one in named]
+        later = zip_longest(*(one.claim.later for one in named))
+        wants = dict.fromkeys(
             Test(environment, first_run + run, why, without=_left_out(named, environment))
-            for ahead in range(driver.workers)
-            for claim in named
-            for environment, run in _in_order(claim.claim)
-            if run == claim.claim.runs + ahead
+            for tests in (*next_ones, *later)
+            for environment, run in filter(None, tests)
         )
-        if not tests:
+        if not wants:
             return tuple(named)
-        yield Wants(tuple(tests))
-
-
-def _in_order(claim: Claim) -> Sequence[tuple[Environment, int]]:
-    """Of each pair the larger world first: its run may imply the other one."""
-    return sorted(claim.wanted, key=lambda test: (test[1], -len(test[0])))
+        yield Wants(tuple(wants))
 
 
 def _left_out(named: Iterable[NamedClaim], environment: Environment) -> int | None:
@@ -447,14 +449,13 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
     def fresh(environment: Environment, run: int) -> Shown:
         return driver.shown(environment, first + run, full=True)
 
-    runs = range(lost.claim.runs)
-    sound = [shown for run in runs if isinstance(shown := fresh(lost.environment, run), bool)]
+    sound = [shown for run in lost.runs if isinstance(shown := fresh(lost.environment, run), bool)]
     lost_rate = sum(sound) / max(1, len(sound))
     claims: dict[Environment, Claim] = {}
 
     def judged(environment: Environment) -> Claim:
         shows = good_enough(environment, rate, terms.keep_rate, lost_rate)
-        claims[environment] = settle(shows, fresh, driver.workers)
+        claims[environment] = Settling(shows).claim(fresh, driver.workers)
         return claims[environment]
 
     while not isinstance(place := last_good(chain, judged), int):

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count, takewhile
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -17,7 +18,7 @@ from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, Verdict, error_of
-from ddenv.evidence.rates import Shown, estimated_rate, wilson_interval
+from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
 from ddenv.reduction.guide import Search, make_guide, search
@@ -59,8 +60,9 @@ class RateClaim:
     """A claim about what is left, or, if `without` is an element, about that without it.
 
     `verdict`: what is left is "kept" (it keeps the rate) or "lost"; an element is "needed" (without it the rate falls below what
-    must be kept) or "not needed"; "not shown" if the runs do not decide. `shown` of `runs` fresh runs showed the failure;
-    `low`..`high` is Wilson's 95 % interval of the rate.
+    must be kept), "helps" (without it the failure is rarer, but not that rare) or "not needed"; "not shown" if the runs do not
+    decide. `shown` of `runs` fresh runs showed the failure; `low`..`high` is the 95 % interval of the rate. What is left keeps at
+    least `bound` of the rate of all elements; without an element the failure shows at most `bound` times as often as with it.
     """
 
     without: str | None
@@ -69,6 +71,7 @@ class RateClaim:
     runs: int
     low: float
     high: float
+    bound: float | None = None
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,7 @@ def reduce(
     seed: int = 0,
     accept_rate: str | None = None,
     keep_rate: float = 0.8,
+    certify_rate: float = 2 / 3,
     baseline_runs: int = 10,
     check: bool = True,
     on_round: Callable[[NamedRound], None] | None = None,
@@ -134,7 +138,8 @@ def reduce(
     With `accept_rate` "first", the first run with the failure decides, as in the paper; the end may fail far more rarely than all
     elements do. With "kept", the default if there are `iterations`, all elements are run `baseline_runs` times at first, and more
     often if the failure is rare. The search takes what seems to keep `keep_rate` of their failure rate. Fresh runs show at the end
-    whether that is so, and without which elements the rate falls below it; where a claim fails, the search steps back or goes on.
+    whether at least `certify_rate` of it is kept, and without which elements the failure is rarer; where a claim fails, the search
+    steps back or goes on.
     All claims together are wrong with a probability of at most 5 %.
 
     `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of the run that failed.
@@ -163,6 +168,7 @@ def reduce(
         _check_count(name, number)
     _check_number("delta", delta)
     _check_number("keep_rate", keep_rate, 0.95)
+    _check_number("certify_rate", certify_rate, 0.95)
     path = _trajectory(trajectory)
     failure = path[-1, 1:4] if failure_pose is None and path is not None else failure_pose
     known = Evidence(
@@ -190,7 +196,8 @@ def reduce(
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
 
     keeps_rate = accept_rate == "kept"
-    caller = _Caller(names, test, begin, keep_rate if keeps_rate else 0.0, iterations, baseline_runs, on_round)
+    kept = keep_rate if keeps_rate else 0.0
+    caller = _Caller(names, test, begin, kept, certify_rate, iterations, baseline_runs, on_round)
     # A missing argument is reported before the first test.
     next(begin(caller.leg()), None)
     if keeps_rate:
@@ -218,6 +225,7 @@ class _Caller:
     test: Test
     begin: Callable[[steps.Leg], Search]
     keep_rate: float
+    certify_rate: float
     iterations: int
     baseline_runs: int
     on_round: Callable[[NamedRound], None] | None
@@ -257,7 +265,15 @@ class _Caller:
         return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
 
     def rate(self) -> float:
-        return estimated_rate(sum(self._of_whole), len(self._of_whole))
+        """From the baseline, and from fresh calls: at first these are made only where what is left does not show the failure, which
+        would show the rate as too low, so none counts after the first that was not made.
+        """
+        shown = list(self._of_whole)
+        for number in range(1, self._certificates + 1):
+            first = FIRST_FRESH + number * EACH_CERTIFICATE
+            tests = ((self.whole, run) for run in count(first))
+            shown += [self._known[test] for test in takewhile(self._known.__contains__, tests)]
+        return estimated_rate(sum(shown), len(shown))
 
     def goes_on(self) -> bool:
         return True
@@ -309,7 +325,7 @@ class _Caller:
         self._known[asked.environment, asked.run] = shown
         if asked.why == "round":
             self.trials.append(Trial(asked.environment, shown, self.names))
-        elif asked.environment == self.whole:
+        elif asked.why == "baseline":
             self._of_whole.append(shown)
 
     def _failures(self) -> int:
@@ -349,14 +365,14 @@ class _Caller:
 
     def _certificate(self) -> steps.Certificate:
         self._certificates += 1
-        terms = Terms(self.keep_rate, self.rate(), error_of(self._certificates), self.baseline_runs)
+        terms = Terms(self.certify_rate, self.keep_rate, error_of(self._certificates), self.baseline_runs)
         return steps.Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
 
     def _claim(self, named: steps.NamedClaim, first: int) -> RateClaim:
-        runs = named.claim.runs
-        shown = sum(self._known[named.environment, first + run] for run in range(runs))
-        without = None if named.model is None else self.names[named.model]
-        return RateClaim(without, named.claim.verdict, shown, runs, *wilson_interval(shown, runs))
+        shown = sum(self._known[named.environment, first + run] for run in named.runs)
+        without, claim = None if named.model is None else self.names[named.model], named.claim
+        interval = anytime_interval(shown, len(named.runs))
+        return RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound)
 
 
 # Larger numbers are a mistake, and their squares could be infinite.

@@ -47,6 +47,6 @@ def last_good(
         place = (good + bad) // 2
         claim = judged(chain[place])
         if not claim.verdict:
-            return claim.wanted
+            return claim.wanted + claim.later
         good, bad = (place, bad) if claim.verdict == "kept" else (good, place)
     return good

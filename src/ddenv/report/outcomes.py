@@ -247,8 +247,9 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
 
 def _fresh_row(each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
     ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
-    shown = percent(each.shown / each.runs) if each.runs else "–"
-    interval = f"{percent(each.low)} to {percent(each.high)}" if each.runs else "–"
+    has_rate = each.runs and not each.is_chosen
+    shown = percent(each.shown / each.runs) if has_rate else "–"
+    interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate else "–"
     means = "" if each.claim is None else meaning(each.claim, found)
     return _name(each), thousands(each.runs), ended, shown, interval, means
 
@@ -258,7 +259,8 @@ def _name(each: FreshRuns) -> Cell:
         return "without ", Name(each.without)
     if each.is_left:
         return "what is left"
-    return "the whole world" if each.node == 0 else f"environment {each.node}"
+    world = "the whole world" if each.node == 0 else f"environment {each.node}"
+    return f"{world}, where what is left missed f" if each.is_chosen else world
 
 
 def _earlier(state: RunState, found: Certificate) -> list[Block]:

@@ -420,7 +420,9 @@ class SlicesRefuted(Event):
 
 @dataclass(frozen=True, slots=True)
 class CertificateStarted(Event):
-    """Full runs with fresh seeds follow, from run number `run` on. What is left has to keep `keep_rate` of `rate`."""
+    """Full runs with fresh seeds follow, from run number `run` on. They have to show that what is left keeps `certify_rate` of the
+    rate of f, which was estimated as `rate`; the search aimed at `keep_rate`. Before there was a `certify_rate`, they were one.
+    """
 
     certificate: Number
     run: Natural
@@ -428,23 +430,26 @@ class CertificateStarted(Event):
     keep_rate: Share
     error: Annotated[float, Range(1e-9, 1)]
     at_least: Natural
+    certify_rate: Share | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ClaimMade:
     """A claim about an environment: about what is left, or, if `without` is a model, about that without it.
 
-    `shown` of `runs` showed f, `low`..`high` is their interval; `outcomes` counts all of them.
+    `shown` of `runs` showed f, `low`..`high` is their interval; `outcomes` counts all of them. What is left keeps at least `bound`
+    of the rate; without a model f shows at most `bound` times as often as with it.
     """
 
     without: Natural | None
     environment: Natural
-    verdict: Annotated[str, OneOf("kept", "lost", "needed", "not needed", "not shown", "unknown")]
+    verdict: Annotated[str, OneOf("kept", "lost", "needed", "helps", "not needed", "not shown", "unknown")]
     shown: Natural
     runs: Natural
     low: Share
     high: Share
     outcomes: dict[str, Natural]
+    bound: Share | None = None
 
 
 @dataclass(frozen=True, slots=True)

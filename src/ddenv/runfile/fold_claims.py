@@ -22,6 +22,7 @@ def certificate_started(state: RunState, event: e.CertificateStarted, _: float) 
         rate=event.rate,
         error=event.error,
         at_least=event.at_least,
+        certify_rate=event.keep_rate if event.certify_rate is None else event.certify_rate,
         branch=origin(state, state.node).parent is not None,
     )
     if certificate.number != len(state.certificates) + 1:
@@ -51,6 +52,7 @@ def _claim(state: RunState, made: e.ClaimMade) -> Claim:
         high=made.high,
         outcomes=tuple(made.outcomes.items()),
         environment=made.environment,
+        bound=made.bound,
     )
 
 

@@ -98,10 +98,11 @@ class Node:
 class Certificate:
     """What fresh runs show of the environment of `node`; number 1 is the run's first certificate.
 
-    `first_run` is the number of its first run. What is left must keep `keep_rate` of the whole world's rate, which was estimated as
-    `rate`; all claims together are wrong with a probability of at most `error`. What is left is run `at_least` so often. `claims`
-    are empty while its tests are made. `past`: a search began since. `branch`: the environment is in a branch whose f is another
-    failure, so that the rate where that branch begins stands for the whole world's.
+    `first_run` is the number of its first run. They have to show that what is left keeps `certify_rate` of the whole world's rate,
+    which was estimated as `rate`; the search aimed at `keep_rate`. All claims together are wrong with a probability of at most
+    `error`. What is left is run `at_least` so often. `claims` are empty while its tests are made. `past`: a search began since.
+    `branch`: the environment is in a branch whose f is another failure, so that the rate where that branch begins stands for the
+    whole world's.
     """
 
     number: int
@@ -111,6 +112,7 @@ class Certificate:
     rate: float
     error: float
     at_least: int
+    certify_rate: float
     claims: tuple[Claim, ...] = ()
     past: bool = False
     branch: bool = False
@@ -120,9 +122,10 @@ class Certificate:
 class Claim:
     """One claim of a certificate: about what is left, or, if `without` is a model, about that without it.
 
-    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; a model is "needed" (without it the rate falls below what must
-    be kept) or "not needed"; "not shown" if the runs do not decide, "unknown" if they broke. `shown` of `runs` showed f; `outcomes`
-    has the number of each outcome. `low`..`high` is Wilson's 95 % interval of the rate, 0..1 without runs.
+    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; a model is "needed" (without it f is rare enough), "helps" (f
+    is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide, "unknown" if they broke. `shown` of `runs`
+    showed f; `outcomes` has the number of each outcome. `low`..`high` is the 95 % interval of the rate, 0..1 without runs. What is
+    left keeps at least `bound` of the rate; without a model f shows at most `bound` times as often as with it. None is not known.
     """
 
     without: str | None
@@ -133,6 +136,7 @@ class Claim:
     high: float
     outcomes: tuple[tuple[str, int], ...] = ()
     environment: int = 0
+    bound: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

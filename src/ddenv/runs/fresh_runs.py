@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.claims import so_far
+from ddenv.evidence.rates import anytime_interval
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stacks_of
+from ddenv.text import percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,9 +19,10 @@ class FreshRuns:
     """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
 
     `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome, with broken runs.
-    `low`..`high` is Wilson's 95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `is_left`: all
-    that is left ran. `claim` is what the certificate says of them, once it is finished; it makes none of the whole world, nor of
-    earlier environments.
+    `low`..`high` is the 95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `is_left`: all that is
+    left ran. `claim` is what the certificate says of them, once it is finished; it makes none of the whole world, nor of earlier
+    environments. What is left keeps at least `bound` of the rate, by the runs so far; without the model f shows at most `bound`
+    times as often. `is_chosen`: the whole world ran only where what is left missed f, so these runs say nothing about its rate.
     """
 
     node: int
@@ -32,6 +35,15 @@ class FreshRuns:
     running: tuple[Test, ...] = ()
     claim: Claim | None = None
     is_left: bool = False
+    bound: float | None = None
+    is_chosen: bool = False
+
+    @property
+    def shows_at_least(self) -> str:
+        """What the runs have shown: "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing yet."""
+        if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
+            return ""
+        return f"{'≤' if self.without else '≥'} {percent(self.bound)}"
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
@@ -51,15 +63,26 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     earlier = sorted((key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0])
     keys += [*earlier, *([(first, None)] if certificate.node != first else [])]
     found = [_of(key, tests.get(key, []), claims.get(key[1]) if key[0] == certificate.node else None) for key in keys]
-    return (replace(found[0], is_left=True), *found[1:])
+    bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
+    left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))
+    return tuple(
+        replace(
+            one,
+            is_left=number == 0,
+            bound=one.bound if one.claim or one.node != certificate.node else bounds.get(one.without),
+            is_chosen=one.node == first != certificate.node and whole_runs < left_runs,
+        )
+        for number, one in enumerate(found)
+    )
 
 
 def _of(key: tuple[int, str | None], tests: list[Test], claim: Claim | None) -> FreshRuns:
     running = tuple(test for test in tests if test.outcome == "running")
     if claim is not None:
-        return FreshRuns(*key, claim.shown, claim.runs, claim.low, claim.high, claim.outcomes, running, claim)
+        return FreshRuns(
+            *key, claim.shown, claim.runs, claim.low, claim.high, claim.outcomes, running, claim, bound=claim.bound
+        )
     counts = Counter(test.outcome for test in tests if test.is_finished)
     outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
     runs, shown = counts.total() - sum(counts[outcome] for outcome in BROKEN), counts["similar"]
-    low, high = wilson_interval(shown, runs) if runs else (0.0, 1.0)
-    return FreshRuns(*key, shown, runs, low, high, outcomes, running)
+    return FreshRuns(*key, shown, runs, *anytime_interval(shown, runs), outcomes, running)

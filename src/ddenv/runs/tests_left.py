@@ -80,7 +80,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
-    certificate = certificate_tests(rate, settings(state).keep_rate, left, baseline.runs, baseline.runs)
+    certificate = certificate_tests(rate, settings(state).certify_rate, left, baseline.runs, baseline.runs)
     search = (max(0, each - done) for each in forecast.tests)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
@@ -152,6 +152,6 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
     seen = asked.baseline_runs
     if rate is None:
         rate, seen = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1), 0
-    certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
+    certificate = certificate_tests(rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
     search = few[0], usual[1], many[2]
     return Rough(asked.baseline_runs, search, certificate, SHARE if slices else (1.0, 1.0, 1.0))

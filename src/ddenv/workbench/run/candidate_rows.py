@@ -55,7 +55,7 @@ MEANINGS = {
     "runs": "the runs that did not break",
     "ended": "how the runs ended; k explains the signs",
     "f": "the share of the runs that showed f",
-    "95 %": "the interval of that share, in per cent",
+    "shown": "what the runs have shown so far: at least so much of the rate is kept, or without the model f is at most so frequent",
 }
 # Columns that only candidates fill.
 OF_CANDIDATES = ("distance", "evidence")
@@ -89,7 +89,7 @@ FRESH_COLUMNS = (
     Column("runs", 5, right=True),
     Column("ended", 10, right=True, spare=2),
     Column("f", 7, right=True, spare=1),
-    Column("95 %", 11, right=True),
+    Column("shown", 8, right=True),
     Column("verdict", 14),
 )
 
@@ -265,6 +265,8 @@ def name_of(one: FreshRuns) -> str:
         return f"- {shortened(one.without, MODEL_WIDTH)}"
     if one.is_left:
         return "what is left"
+    if one.is_chosen:
+        return "whole, if missed"
     return "whole world" if one.node == 0 else f"step {one.node}"
 
 
@@ -274,7 +276,8 @@ def certificate_title(state: RunState) -> tuple[str, str]:
     if certificate is None:
         return "", ""
     number = f" {certificate.number}" if certificate.number > 1 else ""
-    keeps = f"has to keep {percent(certificate.keep_rate)}"
+    left, aim = fresh_runs(state)[0], percent(certificate.certify_rate)
+    keeps = f"keeps {left.shows_at_least}, aim {aim}" if left.shows_at_least else f"has to show {aim}"
     far = (
         made_of_usual(state, certificate) if in_the_making(state) else count(fresh_runs_made(state, certificate), "run")
     )
@@ -287,8 +290,8 @@ def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
         "environment": name_of(one),
         "runs": str(one.runs) if one.runs else "",
         "ended": signs(dict(one.outcomes)),
-        "f": percent(one.shown / one.runs) if one.runs else "",
-        "95 %": f"{percent(one.low)[:-2]} to {percent(one.high)[:-2]}" if one.runs else "",
+        "f": percent(one.shown / one.runs) if one.runs and not one.is_chosen else "",
+        "shown": one.shows_at_least,
         "verdict": _claim(snapshot, one),
     }
 

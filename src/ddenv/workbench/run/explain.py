@@ -26,7 +26,7 @@ from ddenv.workbench.run.explain_decisions import (
 )
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count, metres, percent
+from ddenv.workbench.shared.wording import bar, count, metres, percent
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8
@@ -412,10 +412,14 @@ def _so_far(state: RunState) -> tuple[str, ...]:
     left, whole = rows[0], rows[-1]
     beside = (
         f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
-        if whole.without is None and whole.runs and len(rows) > 1
+        if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen
         else ""
     )
-    return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
+    aim = 0.0 if state.certificate is None else state.certificate.certify_rate
+    return (
+        f"keeps {bar(left.bound or 0.0, aim)} at least {percent(left.bound or 0.0)}, aim {percent(aim)}",
+        f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",
+    )
 
 
 def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:

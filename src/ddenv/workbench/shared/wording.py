@@ -54,8 +54,14 @@ VERDICT = {
 
 
 # The signs of the verdicts of a certificate.
-CLAIM = {"kept": "●", "lost": "✗", "needed": "●", "not needed": "○", "not shown": "?", "unknown": "✗"}
+CLAIM = {"kept": "●", "lost": "✗", "needed": "●", "helps": "◐", "not needed": "○", "not shown": "?", "unknown": "✗"}
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
+
+
+def bar(part: float, aim: float, width: int = 20) -> str:
+    """A share as a bar of so many cells, with a mark where it has to come."""
+    filled, mark = round(part * width), min(width - 1, round(aim * width))
+    return "".join("┃" if cell == mark else "█" if cell < filled else "░" for cell in range(width))
 
 
 def signs(counts: Mapping[str, int]) -> str:

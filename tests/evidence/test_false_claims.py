@@ -1,0 +1,150 @@
+"""How often a claim is false where it is hardest: at the border of what it says, with seeds that share their luck, and broken runs.
+
+`DDENV_CLAIMS=1000` simulates so many certificates and reductions of each kind.
+"""
+
+import os
+import random
+from dataclasses import dataclass
+
+import pytest
+from scipy.stats import binomtest
+
+import ddenv
+from ddenv.environment import Environment
+from ddenv.evidence.certificate import ERROR, REFUTED, Terms, error_of, falls, keeps, settle
+from ddenv.evidence.rates import anytime_interval
+from ddenv.reduction.isolation import Passing, passes
+
+pytestmark = pytest.mark.claims
+
+SIMULATED = int(os.environ.get("DDENV_CLAIMS", "150"))
+WHOLE, LEFT, REST = Environment.whole(6), Environment.whole(2), Environment.whole(1)
+TERMS = Terms(2 / 3, 0.8, error_of(1) / 2, 10)
+
+
+@dataclass(frozen=True)
+class World:
+    """The true rates of f in the whole world, in what is left, and in that without a model.
+
+    A share `together` of the seeds has the same luck in all of them. A share `breaks` of the runs of what is left breaks where it
+    would have missed f, and as many of the runs without a model where they would have shown it: the worst that breaking can do.
+    """
+
+    whole: float
+    left: float
+    rest: float = 0.0
+    together: float = 0.0
+    breaks: float = 0.0
+
+    def shown(self, salt):
+        def shown(environment, run):
+            own, common = random.Random(f"{salt} {environment.bits} {run}"), random.Random(f"{salt} {run}")
+            luck = (common if common.random() < self.together else own).random()
+            f = luck < {WHOLE: self.whole, LEFT: self.left, REST: self.rest}[environment]
+            against = f == (environment != LEFT)
+            return "broken" if against and own.random() < self.breaks else f
+
+        return shown
+
+
+def check(false, error, simulated=SIMULATED):
+    """Fails if so many false claims are unlikely where each is false with a chance of `error`."""
+    assert binomtest(false, simulated, error, alternative="greater").pvalue > 0.001, f"{false} of {simulated} are false"
+
+
+KEPT = {
+    "sure": World(1.0, 0.665),
+    "usual": World(0.9, 0.599),
+    "the same luck": World(0.9, 0.599, together=0.8),
+    "rare": World(0.4, 0.265, together=0.5),
+    "broken": World(0.9, 0.599, breaks=0.2),
+}
+
+
+@pytest.mark.parametrize("world", KEPT.values(), ids=KEPT)
+def test_what_is_kept_is_rarely_less_than_the_bound(world):
+    claims = [settle(keeps(LEFT, WHOLE, TERMS), world.shown(salt)) for salt in range(SIMULATED)]
+    check(sum((claim.bound or 0.0) > world.left / world.whole for claim in claims), TERMS.error)
+
+
+NEEDED = {
+    "sure": World(1.0, 1.0, 0.805),
+    "usual": World(0.9, 0.9, 0.725, together=0.3),
+    "the same luck": World(0.6, 0.6, 0.485, together=0.8),
+    "broken": World(0.9, 0.9, 0.725, breaks=0.2),
+}
+
+
+@pytest.mark.parametrize("world", NEEDED.values(), ids=NEEDED)
+def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world):
+    claims = [settle(falls(REST, LEFT, TERMS), world.shown(salt)) for salt in range(SIMULATED)]
+    check(sum((claim.bound or 1.0) < world.rest / world.left for claim in claims), TERMS.error)
+
+
+@pytest.mark.parametrize("together", [0.0, 0.8])
+@pytest.mark.parametrize("rate", [0.4, 0.8, 1.0])
+def test_what_changes_nothing_rarely_helps(rate, together):
+    world = World(rate, rate, rate, together)
+    claims = [settle(falls(REST, LEFT, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    check(claims.count("helps") + claims.count("needed"), 1.0 / REFUTED + TERMS.error)
+
+
+@pytest.mark.parametrize("together", [0.0, 0.8])
+def test_what_keeps_what_the_search_aims_at_is_rarely_lost(together):
+    world = World(0.9, 0.721, together=together)
+    claims = [settle(keeps(LEFT, WHOLE, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    check(claims.count("lost"), 1.0 / REFUTED)
+
+
+@pytest.mark.parametrize(("reached", "runs"), [(0, 10), (5, 10), (27, 30), (300, 300)])
+def test_a_world_rarely_passes_that_passes_as_seldom_as_the_whole_world(reached, runs):
+    rule, error = Passing.of(reached, runs), error_of(1) / 2
+    rate, passed = min(rule.rather_than, 0.97), 0
+    for salt in range(SIMULATED):
+        shown = World(rate, rate).shown(salt)
+        passed += settle(passes(LEFT, Passing(rule.wanted, rule.rather_than, error), 10), shown).verdict == "passes"
+    check(passed, error)
+
+
+@pytest.mark.parametrize("rate", [0.05, 0.5, 0.9, 1.0])
+def test_an_interval_rarely_misses_the_rate_although_it_is_looked_at_after_each_run(rate):
+    missed = 0
+    for salt in range(SIMULATED):
+        draw, shown = random.Random(salt), 0
+        for run in range(1, 120):
+            shown += draw.random() < rate
+            low, high = anytime_interval(shown, run)
+            if not low <= rate <= high:
+                missed += 1
+                break
+    check(missed, 0.05)
+
+
+# Where is f in 0.9 of the runs, and how often does it show in what is left?
+LOOPS = {
+    "a model that halves it": lambda kept: 0.9 * 0.5 ** ("b" not in kept),
+    "many that each take a bit": lambda kept: 0.9 * 0.93 ** (5 - len(kept & set("bcdef"))),
+    "one that takes a fifth": lambda kept: 0.9 * 0.81 ** ("b" not in kept),
+    "either of two": lambda kept: 0.9 * (0.3 + 0.7 * bool(kept & set("bc"))),
+}
+
+
+@pytest.mark.parametrize("rate", LOOPS.values(), ids=LOOPS)
+def test_all_claims_of_a_whole_reduction_are_rarely_false(rate):
+    false = 0
+    for salt in range(SIMULATED):
+        draw = random.Random(salt)
+
+        def shows_f(kept, draw=draw):
+            return "a" in kept and draw.random() < rate(kept)
+
+        found = ddenv.reduce("abcdefgh", shows_f, algorithm="ddmin", iterations=3)
+        left = frozenset(found.kept)
+        for claim in found.claims:
+            share = rate(left) / rate(frozenset("abcdefgh")) if "a" in left else 0.0
+            if claim.without is None:
+                false += claim.verdict == "kept" and claim.bound > share
+            elif claim.verdict == "needed" and claim.without != "a":
+                false += claim.bound < rate(left - {claim.without}) / rate(left)
+    check(false, ERROR)
