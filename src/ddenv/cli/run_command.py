@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ddenv.cli.options import (
+    Number,
     cluster_option,
     jobs_option,
     json_option,
@@ -24,6 +25,7 @@ from ddenv.cli.options import (
 )
 from ddenv.cli.terminal import announce, asking, say
 from ddenv.errors import UserError
+from ddenv.settings import SETTINGS
 from ddenv.text import count, printable
 
 if TYPE_CHECKING:
@@ -122,11 +124,25 @@ def resume_command(
     metavar="N",
     help="Run what is left at least so often; as often as the baseline's whole world if not given.",
 )
+@click.option(
+    "--certify-rate",
+    type=Number(SETTINGS["certify_rate"]),
+    metavar="PART",
+    help="Go on with the last certificate, and keep all of its runs, until it shows that this part of the rate is kept.",
+)
 @jobs_option()
 @cluster_option()
 @trust_option
 @json_option
-def certify_command(run: str, runs: int | None, jobs: int, cluster: str | None, trust: bool, as_json: bool) -> int:
+def certify_command(
+    run: str,
+    runs: int | None,
+    certify_rate: float | None,
+    jobs: int,
+    cluster: str | None,
+    trust: bool,
+    as_json: bool,
+) -> int:
     """Makes one more certificate of what RUN (a name or a file) has left, with fresh seeds; it changes nothing else."""
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.run_settings import settings
@@ -140,7 +156,8 @@ def certify_command(run: str, runs: int | None, jobs: int, cluster: str | None, 
     if state.status != "finished" and not (state.confirming and state.ended):
         raise UserError(f"{path}: its search is not over; let it end first: ddenv resume {path}")
     at_least = runs or settings(state).baseline_runs
-    return follow_to_summary(path, start_engine(path, jobs, certify=at_least, cluster=cluster), as_json)[0]
+    engine = start_engine(path, jobs, certify=at_least, certify_rate=certify_rate, cluster=cluster)
+    return follow_to_summary(path, engine, as_json)[0]
 
 
 @click.command("isolate")

@@ -54,6 +54,11 @@ def main() -> int:
         "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
     )
     parser.add_argument(
+        "--certify-rate",
+        type=float,
+        help="go on with the last certificate until it shows that this part of the rate is kept",
+    )
+    parser.add_argument(
         "--isolate",
         type=int,
         help="find the nearest world that passes, with at least so many fresh runs of it; 0: as many as usual",
@@ -108,7 +113,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
             note_start(scenario, world, robot, journal)
             bench = Bench(journal, pool, control, others)
             if options.certify:
-                Driver(scenario, world, journal, bench, control).certify(options.certify)
+                Driver(scenario, world, journal, bench, control).certify(options.certify, options.certify_rate)
             elif options.isolate is not None or journal.state.isolating is not None:
                 isolate(world, journal, bench, options.isolate or None, before)
             else:

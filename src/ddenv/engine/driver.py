@@ -62,6 +62,8 @@ class Driver:
         self._baseline: events.BaselineFinished | str = ""
         # How many runs of what is left a new certificate needs at least; None if the search makes it when it is over.
         self._only_certify: int | None = None
+        # The share of the rate up to which the last certificate goes on, with all its runs.
+        self._certify_rate: float | None = None
         # What the procedure asks of what is known.
         self.shown, self.rate = journal.shown, journal.rate_of_whole
         self.refused, self.refused_by_user = journal.is_refused, journal.is_refused_by_user
@@ -82,8 +84,12 @@ class Driver:
         else:
             self._conclude()
 
-    def certify(self, at_least: int) -> None:
-        """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`."""
+    def certify(self, at_least: int, certify_rate: float | None = None) -> None:
+        """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`.
+
+        With a `certify_rate` the last certificate goes on, with all its runs, until it shows that this share of the rate is kept.
+        """
+        self._certify_rate = certify_rate
         # A search that is due would begin at the end.
         leg, self._only_certify = self._next_leg(), at_least
         chain = tuple(self._journal.state.environments[node.id] for node in self._journal.state.path)
@@ -367,15 +373,16 @@ class Driver:
         journal, last = self._journal, self._journal.state.certificate
         if last is None or (self._only_certify is not None and last.claims):
             asked, number = self._reduction, len(journal.state.certificates) + 1
-            at_least = self._only_certify or asked.baseline_runs
+            # What the bets have won so far holds for any share, so that the same ones can go on.
+            goes_on = last is not None and self._certify_rate is not None
             started = events.CertificateStarted(
                 number,
-                journal.fresh_run,
+                last.first_run if last is not None and goes_on else journal.fresh_run,
                 journal.rate_of_whole(),
                 asked.keep_rate,
-                error_of(number),
-                at_least,
-                asked.certify_rate,
+                last.error if last is not None and goes_on else error_of(number),
+                self._only_certify or asked.baseline_runs,
+                self._certify_rate or asked.certify_rate,
             )
             journal.record(started)
             last = journal.state.certificates[-1]

@@ -200,10 +200,10 @@ class Journal:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         whole, state = self._numbers[self.whole], self.state
         tests = [test for test in state.tests if test.environment == whole and test.phase not in (CERTIFY, ISOLATE)]
-        for certificate in state.certificates:
+        for first in dict.fromkeys(certificate.first_run for certificate in state.certificates):
             # A certificate runs the whole world at first only where what is left missed f: these runs would show it as too rare.
             # Those that only ran ahead of time would make it depend on the number of workers.
-            for run in count(certificate.first_run):
+            for run in count(first):
                 test = self.test(self.whole, run, full=True)
                 if test is None or not state.rests_on >> test.id & 1:
                     break
