@@ -11,7 +11,7 @@ import pytest
 
 from ddenv.engine.judging import fix_failure
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
-from ddenv.runfile.events import BaselineFinished
+from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile
@@ -120,7 +120,7 @@ def last_baseline(folder, salt: int, jobs: int, kill_every: int):
         return None, state.status, sorted(runs)
     # The numbers of tests depend on how often an engine was killed.
     seen = [(state.tests[one.test - 1].run, one.runs, one.kinds, one.position) for one in state.baseline.seen]
-    return replace(state.baseline, failure_test=0, seen=()), seen, sorted(runs)
+    return replace(state.baseline, failure_test=0, judged=Outcomes({}, {}), seen=()), seen, sorted(runs)
 
 
 def _kill_at_end_of_baseline(file: RunFile, events: int) -> None:

@@ -299,7 +299,7 @@ class BaselineFinished(Event):
     iterations_95: Natural
     judged: Outcomes
     broken: Natural = 0
-    wall_limit: Seconds | None = None
+    wall_limit: Seconds | None = field(default=None, compare=False)
     seen: tuple[SeenFailure, ...] = ()
 
     @property
