@@ -137,8 +137,18 @@ def test_a_newer_file_is_refused(path):
 def test_a_file_from_before_the_first_release_is_refused(path, version):
     with sqlite3.connect(path) as database:
         database.execute(f"PRAGMA user_version = {version}")
-    with pytest.raises(UserError, match=rf"before its first release \(format {version}\); this one reads format 7"):
+    with pytest.raises(UserError, match=rf"before its first release \(format {version}\); this one reads format 8"):
         RunFile(path)
+
+
+def test_a_file_of_format_7_is_read_and_an_engine_that_writes_it_makes_it_newer(path):
+    with sqlite3.connect(path) as database:
+        database.execute("PRAGMA user_version = 7")
+    with RunFile(path) as file:
+        assert file.events()
+        file.own()
+    with sqlite3.connect(path) as database:
+        assert database.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION,)
 
 
 def test_damage_is_told_and_not_thrown(path):

@@ -27,8 +27,8 @@ from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.reading import LARGEST, Invalid, number, plain, read, vector
 
 APPLICATION_ID = 0x64644531
-# The format of the file. Earlier ones were never released; from this one on, all are read.
-SCHEMA_VERSION = OLDEST_VERSION = 7
+# The format of the file. Those before the oldest one are refused; 8 has the bounds of certificates.
+SCHEMA_VERSION, OLDEST_VERSION = 8, 7
 # The maximum time, Unix time in s: the year 5138.
 LATEST = 1e11
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
@@ -300,6 +300,8 @@ class RunFile:
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
+            # What is written from now on, earlier versions of ddenv cannot read.
+            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
