@@ -33,8 +33,7 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
     assert left["means"] == "keeps at least 77 % of the whole world's rate"
     assert (first["without"], first["rate"], second["shown"], second["runs"]) == ("crate_00", 0.0, 1, 12)
     assert (left["keeps_at_least"], second["without_at_most"]) == pytest.approx((0.77, 0.74), abs=0.01)
-    # It ran only where what is left missed f, which was never.
-    assert found["certificate"]["whole_world"] is None
+    assert found["certificate"]["whole_world"]["outcomes"] == {"similar": 22, "pass": 1}
     assert "minimal environment: 2 of 11 models" in lines
     assert (
         "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 77 % of the whole world's rate" in lines
@@ -73,8 +72,13 @@ def test_an_engine_makes_at_least_so_many_runs(run, monkeypatch, capsys):
     fake_moments.finished(run)
     in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
     in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)
+    in_process(monkeypatch, capsys, "certify", run.path, "--certify-rate", 0.8, "--jobs", 1)
     # As often as the baseline, if not said otherwise.
-    assert started == [(run.path, 1, {"certify": 40, "cluster": None}), (run.path, 1, {"certify": 4, "cluster": None})]
+    assert started == [
+        (run.path, 1, {"certify": 40, "certify_rate": None, "cluster": None}),
+        (run.path, 1, {"certify": 4, "certify_rate": None, "cluster": None}),
+        (run.path, 1, {"certify": 4, "certify_rate": 0.8, "cluster": None}),
+    ]
 
 
 def test_what_cannot_be_certified_is_refused_in_one_line(run, monkeypatch, capsys):

@@ -92,7 +92,7 @@ def test_it_begins_with_a_paragraph_for_everyone(run):
     assert "".join(words(part) for part in report.lead[0].parts) == (
         "In short: The robot got stuck before it reached its goal. Of the 11 models of its world, 2 are enough to make it "
         "fail like that: crate_00 and crate_01. It failed so in 23 of 23 new drives with nothing else there (80 % to 100 % of "
-        "all drives, with 95 % confidence); without any one of them in at most 1 of 12 (at most 48 %). This took 60 simulated "
+        "all drives, with 95 % confidence); without any one of them in at most 1 of 12 (at most 48 %). This took 83 simulated "
         "drives and 0 s of computing."
     )
     titles = [section.title for section in report.sections]

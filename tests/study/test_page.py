@@ -51,7 +51,7 @@ def test_several_seeds_are_told_as_median_and_range(study):
     assert row.replace(" |", "") in page.text
     # Behind it: re-runs, what is left, f in the whole world, in what is left and without a model, steps back, and the bound.
     left = "`crate_00`, `crate_01` (2 of 3); `crate_03` (1 of 3)"
-    rates = "15 of 18 (61 % to 94 %) | 15 of 15 (80 % to 100 %) | at most 0 of 4 (0 % to 49 %)"
+    rates = "9 of 12 (47 % to 91 %) | 15 of 15 (80 % to 100 %) | at most 0 of 4 (0 % to 49 %)"
     assert f"| model2model/failure-proximal | 46 % (33 % to 53 %) | {left} | {rates} | 0 | 13 |" in text
 
 
@@ -63,16 +63,16 @@ def test_what_went_wrong_is_told_with_its_seed(study):
     )
     for words in (
         "Not certified: model2model/sequential, seed 0: there is no failure to reduce.",
-        f"Not certified: model2model/sequential, seed 100000: {doubt} (57 % to 100 %).",
+        f"Not certified: model2model/sequential, seed 100000: {doubt} (42 % to 100 %).",
         "Not certified: model2model/sequential, seed 200000: not made yet.",
     ):
         assert words in page.text
         assert f"> {words.replace('_', chr(92) + '_')}" in text
-    problems = ["", "", "", "there is no failure to reduce", f"{doubt} (57 % to 100 %)", "not made yet"]
+    problems = ["", "", "", "there is no failure to reduce", f"{doubt} (42 % to 100 %)", "not made yet"]
     assert [row["problem"] for row in rows] == problems
     assert page.text.startswith("ddenv study") and "3 of 6 worlds are minimal: 85 % smaller on average" in page.text
     # What has to be kept is said with the result.
-    assert "it is certified if it keeps at least 80 % of the whole world's failure rate" in page.text
+    assert "it is certified if it keeps at least 67 % of the whole world's failure rate" in page.text
 
 
 def test_the_table_for_programs_has_a_row_for_each_cell(study):
@@ -101,11 +101,11 @@ def test_the_table_for_programs_has_a_row_for_each_cell(study):
         "least_to_show": "13",
         "least_to_find": "17",
         "keep_rate": "0.8",
-        "whole_runs": "6",
-        "whole_f": "5",
+        "whole_runs": "4",
+        "whole_f": "3",
         "left_runs": "5",
         "left_f": "5",
-        "left_low": "0.5655",
+        "left_low": "0.415",
         "left_high": "1.0",
         "without_most": "0.0",
         "paper_tests": "",

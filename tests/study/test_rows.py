@@ -28,7 +28,7 @@ def certificate(left, *verdicts):
         Claim(name, verdict, 0 if name else 20, 10 if name else 20, 0.0 if name else 0.84, 0.28 if name else 1.0)
         for name, verdict in zip(names, verdicts, strict=True)
     ]
-    return Certificate(1, 1, 10_000, 0.8, 0.95, 0.03, 10, tuple(claims))
+    return Certificate(1, 1, 10_000, 0.8, 0.95, 0.03, 10, 2 / 3, tuple(claims))
 
 
 def found(cell, tests, left=1, **other):

@@ -116,6 +116,7 @@ def finished(run: FakeRun) -> FakeRun:
     """A run that ended with two models, each shown to be needed."""
     _rounds(run).start_certificate()
     claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
+    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
 
 
@@ -155,6 +156,7 @@ def not_shown(run: FakeRun) -> FakeRun:
     """A run that ended with two models, one of which may not be needed."""
     _rounds(run).start_certificate()
     claims = ((None, "kept", 23 * "s"), ("crate_00", "not shown", 9 * "sp" + "oo"), ("crate_01", "unknown", "pseeeeee"))
+    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
 
 

@@ -121,7 +121,7 @@ def test_a_finished_certificate_has_its_verdicts_in_words(run):
         ("what is left", "23", "23●", "100 %", "≥ 77 %", "● kept"),
         ("- crate_00", "11", "2◇ 9○", "0 %", "≤ 70 %", "● needed"),
         ("- crate_01", "12", "1● 11○", "8 %", "≤ 74 %", "● needed"),
-        ("whole, if missed", "", "", "", "", ""),
+        ("whole world", "23", "22● 1○", "96 %", "", ""),
     ]
 
 

@@ -140,10 +140,10 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
 async def test_what_breaks_off_a_certificate_asks_before(run):
     fake_moments.certifying(run).hold()
     async with Attached(run, (80, 24)) as session:
-        assert "16 of about 50 to 900 runs" in str(session.screen.query_one("#round").border_subtitle)
+        assert "17 of about 35 to 150 runs" in str(session.screen.query_one("#round").border_subtitle)
         await session.press("p", "enter")
         assert isinstance(session.app.screen, Question)
-        assert "breaks off certificate 1 after 16 runs" in session.dialog()
+        assert "breaks off certificate 1 after 17 runs" in session.dialog()
         await session.press("n", "v")
         assert session.asked() == []
         assert "the rounds are over" in session.said()
@@ -151,7 +151,7 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert isinstance(session.app.screen, Question)
         await session.press("escape", "p", "enter", "y")
         assert session.asked() == [("pin", {"models": [0]})]
-        assert "Certificate 1 is broken off after 16 runs; a new search begins from 2 models" in session.said()
+        assert "Certificate 1 is broken off after 17 runs; a new search begins from 2 models" in session.said()
         # The budget alone breaks nothing off.
         state = session.screen.snapshot.state
         assert question(course.Change({"budget": 900}), state) == ""

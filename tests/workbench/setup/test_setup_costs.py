@@ -40,9 +40,9 @@ def test_tests_and_time_are_told():
     known = Past(1, 3.0, 0.9)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
-    assert "with 2 jobs at 3.0 s a test, as before; baseline 4, certificate 100" in words
+    assert "with 2 jobs at 3.0 s a test, as before; baseline 4, certificate 70" in words
     unknown = whole_cost(scenario(), 43, 2, Past())
-    assert unknown == "about 150 tests (70 to 350) if f always shows; baseline 4, certificate 100"
+    assert unknown == "about 100 tests (45 to 250) if f always shows; baseline 4, certificate 70"
     assert whole_cost(scenario(budget=9), 43, 1, known) == (
         "9 tests at most, 25 s with 1 job at 3.0 s a test, as before; baseline 4"
     )
