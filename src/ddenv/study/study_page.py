@@ -101,7 +101,9 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
 
 def _shares(found: Sequence[Found]) -> str:
     """The shares of the whole world's rate that have to be kept."""
-    return " or ".join(percent(share) for share in sorted({each.cell.scenario.reduction.certify_rate for each in found}))
+    return " or ".join(
+        percent(share) for share in sorted({each.cell.scenario.reduction.certify_rate for each in found})
+    )
 
 
 def _figures(

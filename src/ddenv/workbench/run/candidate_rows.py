@@ -266,7 +266,7 @@ def name_of(one: FreshRuns) -> str:
     if one.is_left:
         return "what is left"
     if one.is_chosen:
-        return "whole, if missed"
+        return "whole, missed"
     return "whole world" if one.node == 0 else f"step {one.node}"
 
 

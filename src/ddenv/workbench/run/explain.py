@@ -397,6 +397,7 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
         return (_after(certificate), *_now(snapshot, certificate))
     made = fresh_runs_made(state, certificate)
     return (
+        _bar(state, certificate),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
         f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
         *_so_far(state),
@@ -410,16 +411,17 @@ def _so_far(state: RunState) -> tuple[str, ...]:
     if not rows or not rows[0].runs:
         return ()
     left, whole = rows[0], rows[-1]
-    beside = (
-        f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
-        if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen
-        else ""
-    )
-    aim = 0.0 if state.certificate is None else state.certificate.certify_rate
-    return (
-        f"keeps {bar(left.bound or 0.0, aim)} at least {percent(left.bound or 0.0)}, aim {percent(aim)}",
-        f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",
-    )
+    beside = ""
+    if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
+        beside = f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
+    return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
+
+
+def _bar(state: RunState, certificate: Certificate) -> str:
+    """What is shown to be kept by now, and where it has to come."""
+    shown = fresh_runs(state)[0].bound or 0.0
+    kept = f"at least {percent(shown)} is kept" if shown else "nothing is shown yet"
+    return f"{bar(shown, certificate.certify_rate)} {kept}, aim {percent(certificate.certify_rate)}"
 
 
 def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
