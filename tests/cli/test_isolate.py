@@ -35,7 +35,7 @@ def test_what_is_known_is_said_without_a_test(run, started, monkeypatch, capsys)
     fake_moments.isolated(run)
     done = in_process(monkeypatch, capsys, "isolate", run.path)
     assert (done.returncode, started) == (0, [])
-    assert done.stdout.startswith("The nearest world that passes lacks 1 model of 11 (crate_00)")
+    assert done.stdout.startswith("A nearest world that passes lacks 1 model of 11 (crate_00)")
     found = json.loads(in_process(monkeypatch, capsys, "isolate", run.path, "--json").stdout)["nearest"]
     assert (found["gone"], found["shown"], len(found["instants"])) == (["crate_00"], True, 8)
     in_process(monkeypatch, capsys, "isolate", run.path, "--again", "--jobs", 1)
@@ -75,7 +75,7 @@ def test_a_run_that_has_not_ended_is_refused_in_one_line(run, started, monkeypat
 def test_why_says_it_after_the_reasons(run, monkeypatch, capsys):
     fake_moments.isolated(run)
     lines = in_process(monkeypatch, capsys, "why", run.path).stdout.splitlines()
-    assert [line[:12] for line in lines] == ["- Without cr", "- Without cr", "The nearest "]
+    assert [line[:12] for line in lines] == ["- Without cr", "- Without cr", "A nearest wo"]
     found = json.loads(in_process(monkeypatch, capsys, "why", run.path, "--json").stdout)
     assert len(found["reasons"]) == 2
     assert found["nearest"]["gone"] == ["crate_00"]

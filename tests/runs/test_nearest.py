@@ -29,7 +29,7 @@ def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
     assert found.gone == removed_in_passing(state, run.path) == ("crate_00",)
     assert found.shown
     assert found.words == (
-        "the nearest world that passes lacks 1 model of 11 (crate_00): without it the robot reaches its goal in 20 of 20 fresh "
+        "a nearest world that passes lacks 1 model of 11 (crate_00): without it the robot reaches its goal in 20 of 20 fresh "
         "runs (84 % to 100 %); with it put back in 0 of 9 fresh runs (0 % to 30 %)"
     )
     # The reduction is as it was.
@@ -46,7 +46,7 @@ def test_two_runs_with_one_seed_stand_side_by_side_from_where_they_part(run):
     first, *later = found.instants
     assert (first.seconds, first.apart) == (one.equal, 0.0)
     assert all(each.apart == pytest.approx(1.0) for each in later)
-    assert found.sentences.startswith("The nearest world")
+    assert found.sentences.startswith("A nearest world")
     assert f"With seed {one.seed} the two runs differ after {one.equal:.1f} s" in found.sentences
 
 
@@ -57,7 +57,7 @@ def test_where_trajectories_are_damaged_the_rest_is_said(run):
     database.close()
     found = read(run.path)[1]
     assert (found.gone, found.shown, found.parting) == (("crate_00",), True, None)
-    assert found.sentences.startswith("The nearest world that passes lacks 1 model")
+    assert found.sentences.startswith("A nearest world that passes lacks 1 model")
     assert "Where the ways part is not known: " in found.sentences
     assert found.lacks in found.sentences
 

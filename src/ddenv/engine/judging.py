@@ -228,11 +228,13 @@ class Sight:
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""
         state, run = journal.state, journal.state.tests[test - 1]
+        # Whether a model that affected no run was sensed depends on which of two equal runs was simulated.
+        seen = set(state.elements) if run.took_part is None else set(run.took_part.names(state.elements))
         return replace(
             self._known,
             trajectory=trajectory_of(rows_of(journal.file, test)),
             failure_position=_end(state, run),
-            first_sensed=dict(run.first_sensed),
+            first_sensed={name: at for name, at in run.first_sensed if name in seen},
             touched=frozenset(name for name, _ in run.first_touched),
             miss_chance=known_failure(state).miss_chance,
             _nearest={},

@@ -221,12 +221,12 @@ def of_passing(state: RunState, one: Isolation) -> str:
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(first)}"
     said = (
-        f"the nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
+        f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
     )
     for word, start in (
         ("unknown", "not shown that each of them has to go: tests broke with"),
         ("not shown", "not shown that each of them has to go: undecided with"),
-        ("not needed", "not the nearest: the robot passes about as often with"),
+        ("not needed", "not a nearest one: the robot passes about as often with"),
     ):
         found = [claim.back for claim in backs if claim.verdict == word and claim.back is not None]
         if found:
