@@ -62,7 +62,7 @@ def test_the_issue_says_what_fails_how_often_and_what_is_needed(run, tmp_path):
     assert "- `crate_00`\n- `crate_01`\n" in issue
     assert all(f"`{shown}`" in issue for shown in ("report.html", "ddenv open run.ddenv", "ddenv test scenario.yaml"))
     assert "Without crate_00 the robot reaches its goal" in issue
-    assert "The nearest world that passes lacks 1 model of 11 (crate_00)" in issue
+    assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in issue
 
 
 @pytest.mark.parametrize("name", ["handed", "handed.zip"])

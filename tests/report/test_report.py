@@ -128,7 +128,7 @@ def test_the_page_needs_nothing_else_and_runs_nothing(run, tmp_path):
 def test_the_nearest_world_that_passes_has_its_map_and_two_runs_side_by_side(run, tmp_path):
     fake_moments.isolated(run)
     text = page(run, tmp_path).text
-    assert "The nearest world that passes lacks 1 model of 11 (crate_00)" in text
+    assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in text
     rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "nearest world that passes: x, y, m")]
     assert {row[-1] for row in rows} == {"0.00", "1.00"}
     assert len(rows) == 8
