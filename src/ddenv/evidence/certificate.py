@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 from ddenv.environment import Environment
@@ -78,15 +79,11 @@ class Pairs:
 
     def above(self, share: float) -> float:
         """The wealth of the bet that the first shows f at more than `share` (above 0) of the rate of the second."""
-        return self._wealth(lambda stake: (stake * (1.0 / share - 1.0), stake / share, -stake))
+        return _wealth(self, 1.0 / share - 1.0, 1.0 / share, -1.0)
 
     def below(self, share: float) -> float:
         """The wealth of the bet that the first shows f at less than `share` of the rate of the second."""
-        return self._wealth(lambda stake: (-stake * (1.0 - share), -stake, stake * share))
-
-    def _wealth(self, gains: Callable[[float], tuple[float, float, float]]) -> float:
-        counts = (self.both, self.first, self.second)
-        return sum(_product(gains(stake), counts) for stake in STAKES) / len(STAKES)
+        return _wealth(self, share - 1.0, -1.0, share)
 
     def keeps_at_least(self, error: float, known: float = 0.0) -> float:
         """The lower bound of the share, from 0 to 1; no lower than `known`."""
@@ -102,8 +99,17 @@ class Pairs:
         return (self.both + self.first) / max(1, self.both + self.second)
 
 
-def _product(gains: tuple[float, float, float], counts: tuple[int, int, int]) -> float:
-    return math.exp(min(700.0, sum(count * math.log1p(gain) for gain, count in zip(gains, counts, strict=True))))
+# A screen asks for the same ones again and again.
+@lru_cache(maxsize=1 << 16)
+def _wealth(pairs: Pairs, both: float, first: float, second: float) -> float:
+    """The wealth of a bet that gains these multiples of its stake in a pair of each kind."""
+    logarithms = (
+        pairs.both * math.log1p(stake * both)
+        + pairs.first * math.log1p(stake * first)
+        + pairs.second * math.log1p(stake * second)
+        for stake in STAKES
+    )
+    return sum(math.exp(min(700.0, logarithm)) for logarithm in logarithms) / len(STAKES)
 
 
 def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
