@@ -115,7 +115,17 @@ class Page:
 
 async def shows(page: Page, expression: str) -> None:
     """Returns when a JavaScript expression is true."""
-    await eventually(lambda: page.value(expression), lambda: expression)
+
+    async def is_true():
+        try:
+            return await page.value(expression)
+        except RuntimeError as error:
+            # A page that is being exchanged gives no answer yet.
+            if "navigated" not in str(error):
+                raise
+            return False
+
+    await eventually(is_true, lambda: expression)
 
 
 def near(picture: np.ndarray, color: tuple[int, int, int], reach: int = 40) -> int:
