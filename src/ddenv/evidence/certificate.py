@@ -205,18 +205,20 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     assumed, sound, bound, run, alone = Pairs(), Pairs(), 0.0, 0, True
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
+    mine: Shown
+    theirs: Shown
     while run < MOST_PAIRS or hits:
         alone = alone and run < MOST_ALONE and (not run or assumed.above(terms.certify_rate) >= HOPELESS)
         if hits and not alone:
-            mine: Shown = True
+            mine = True
             (theirs,) = yield Wanted(((whole, hits.pop(0)),), (whole,), bound)
             assumed, sound = replace(assumed, both=assumed.both - 1), replace(sound, first=sound.first - 1)
         elif alone:
-            theirs = True
             (mine,) = yield Wanted(((left, run),), (left,), bound)
+            theirs = None
             if mine is True:
                 hits.append(run)
-                assumed, sound, theirs = assumed.after(True, True), sound.after(True, False), None
+                assumed, sound = assumed.after(True, True), sound.after(True, False)
             else:
                 (theirs,) = yield Wanted(((whole, run),), (left,), bound)
             run += 1

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ddenv.environment import Environment
-from ddenv.evidence.certificate import Claim as Shows
-from ddenv.evidence.certificate import Terms, falls, settle
-from ddenv.evidence.certificate import keeps as keeps_rate
+from ddenv.evidence.certificate import Claim as Settled
+from ddenv.evidence.certificate import Terms, falls, keeps, settle
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.evidence.rates import Shown, miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
@@ -65,17 +64,17 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         return f"nothing is left that can be removed: {rate(left)}{but}"
     if helps := helping(certificate):
         first = next(claim for claim in removals if claim.without == helps[0])
-        return f"minimal but for {first_of(helps, MOST_NAMES)}: {keeps(certificate)}; without {helps[0]} {rate(first)}{but}"
+        return f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
     most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
     without, bound = (
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
         _at_most(certificate),
     )
     often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
-    return f"no {one} can be removed: {keeps(certificate)}; without {without} {often}{but}"
+    return f"no {one} can be removed: {kept(certificate)}; without {without} {often}{but}"
 
 
-def keeps(certificate: Certificate) -> str:
+def kept(certificate: Certificate) -> str:
     """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
     return f"{rate(certificate.claims[0])}, at least {percent(_kept(certificate))} of {_whole_rate(certificate)}"
 
@@ -92,7 +91,7 @@ def _at_most(certificate: Certificate) -> float | None:
     return max((bound for bound in bounds if bound is not None), default=None) if None not in bounds else None
 
 
-def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Shows]:
+def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settled]:
     """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left.
 
     It holds whenever one looks. Models that no run has left out yet are missing.
@@ -114,7 +113,7 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Shows]
         return outcomes.get((environment, run))
 
     terms = terms_of(certificate)
-    claims: dict[str | None, Shows] = {None: settle(keeps_rate(left, whole, terms), shown)}
+    claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
     return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
 
 
