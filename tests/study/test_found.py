@@ -102,7 +102,10 @@ def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
 @pytest.mark.parametrize(
     ("claims", "problem"),
     [
-        ({None: ("lost", "ssppppppppppp")}, "what is left keeps less than 80 % of the whole world's rate: f in 2 of 13 fresh runs (1 % to 56 %)"),
+        (
+            {None: ("lost", "ssppppppppppp")},
+            "what is left keeps less than 80 % of the whole world's rate: f in 2 of 13 fresh runs (1 % to 56 %)",
+        ),
         (
             {None: ("not shown", "sssp")},
             "not shown that what is left keeps 67 % of the whole world's rate; it keeps at least 10 %: f in 3 of 4",
