@@ -65,7 +65,10 @@ def test_a_branch_has_to_keep_the_rate_of_its_own_failure_where_it_begins(tmp_pa
     path = new_run(tmp_path, accept_rate="kept", growth="steady", skip="implied", baseline_runs=10, keep_rate=0.8)
     state = drive(path, Guided(path, oracle, guide(), 2))
     assert (state.environment, state.minimal) == (("wall",), True)
-    assert meaning(state.certificate.claims[0], state.certificate) == "keeps at least 67 % of the rate where its branch begins"
+    assert (
+        meaning(state.certificate.claims[0], state.certificate)
+        == "keeps at least 67 % of the rate where its branch begins"
+    )
     # The whole world never showed it.
     assert not any(test.outcome == "similar" for test in state.tests if test.phase == "baseline")
 

@@ -64,7 +64,9 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         return f"nothing is left that can be removed: {rate(left)}{but}"
     if helps := helping(certificate):
         first = next(claim for claim in removals if claim.without == helps[0])
-        return f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
+        return (
+            f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
+        )
     most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
     without, bound = (
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
@@ -219,9 +221,7 @@ def of_passing(state: RunState, one: Isolation) -> str:
     names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(first)}"
-    said = (
-        f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
-    )
+    said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
     for word, start in (
         ("unknown", "not shown that each of them has to go: tests broke with"),
         ("not shown", "not shown that each of them has to go: undecided with"),
