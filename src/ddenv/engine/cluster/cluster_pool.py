@@ -42,19 +42,19 @@ REFERENCE = 0
 
 @dataclass(eq=False)
 class _Worker:
-    """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered, `isin` whether it is
-    taken in. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
+    """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered. It is `accepted` once it
+    has shown the same bits. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
     """
 
     address: str
     threads: int
     hello: Hello | None = None
-    isin: bool = False
+    accepted: bool = False
     asked: dict[str, tuple[Asked | None, Future[Any]]] = field(default_factory=dict)
 
     @property
     def free(self) -> int:
-        return self.threads - len(self.asked) if self.isin else 0
+        return self.threads - len(self.asked) if self.accepted else 0
 
     @property
     def name(self) -> str:
@@ -109,7 +109,7 @@ class ClusterPool:
 
     @property
     def _room(self) -> int:
-        return sum(worker.threads for worker in self._workers.values() if worker.isin)
+        return sum(worker.threads for worker in self._workers.values() if worker.accepted)
 
     @property
     def idle(self) -> int:
@@ -254,7 +254,7 @@ class ClusterPool:
         if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker):
             self._wait_again([asked])
             if isinstance(answer, NotGreeted):
-                worker.isin = False
+                worker.accepted = False
                 self._ask(worker)
             return
         self._progress.pop(asked.test, None)
@@ -284,7 +284,7 @@ class ClusterPool:
             if why := refusal(worker.hello, run, self._reference):
                 self._leave_out(worker, why)
             else:
-                worker.isin = True
+                worker.accepted = True
         self._greeted.clear()
 
     def _leave_out(self, worker: _Worker, why: str) -> None:
@@ -293,7 +293,7 @@ class ClusterPool:
     def _say(self) -> None:
         """Tells what has changed."""
         if self._room != self._said:
-            workers = sum(worker.isin for worker in self._workers.values())
+            workers = sum(worker.accepted for worker in self._workers.values())
             tests = count(self._room, "test")
             self._news.append(f"{count(workers, 'worker')} of the cluster can make {tests} at the same time")
         if self._news:
@@ -328,7 +328,7 @@ class ClusterPool:
         """Drops what runs: the workers end it by themselves."""
         if self._home is not None:
             self._home.close()
-        client, taken = self._client, [worker.address for worker in self._workers.values() if worker.isin]
+        client, taken = self._client, [worker.address for worker in self._workers.values() if worker.accepted]
         self._workers.clear()
         if client is not None and taken:
             with suppress(Exception):
