@@ -49,12 +49,16 @@ def _fresh(state: RunState) -> str:
 
 
 def _fresh_whole(state: RunState) -> str:
-    """How often f showed in the whole world, in the runs of the same certificate."""
+    """How often f showed in the whole world, by the same certificate, if it did not only run where what is left missed f."""
     found = _certificate(state)
-    first = 0 if found is None else found.first_run
-    whole = [test for test in state.tests if test.phase == CERTIFY and test.run >= first and test.node == 0]
-    outcomes = [test.outcome for test in whole if test.without is None and test.outcome in ("similar", "other", "pass")]
-    if not outcomes:
+    if found is None:
+        return "no fresh run"
+    tests = [
+        test for test in state.tests if test.phase == CERTIFY and test.run >= found.first_run and test.without is None
+    ]
+    whole = [test for test in tests if test.node == 0]
+    outcomes = [test.outcome for test in whole if test.outcome in ("similar", "other", "pass")]
+    if not outcomes or {test.run for test in whole} < {test.run for test in tests if test.node == found.node}:
         return "no fresh run"
     shown, runs = outcomes.count("similar"), len(outcomes)
     return claims.rate(Claim(None, "", shown, runs, *wilson_interval(shown, runs)))
