@@ -9,6 +9,7 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.page.blocks import Picture, Table
+from ddenv.page.markdown import markdown
 from ddenv.report.report import content, files_of, write_report
 from ddenv.report.rounds import MOST_ROUNDS
 from ddenv.report.run_data import read_run
@@ -84,6 +85,13 @@ def words(cell):
     """A cell without what makes parts of it stand out."""
     parts = cell if isinstance(cell, tuple) else (cell,)
     return "".join(part if isinstance(part, str) else part.text for part in parts)
+
+
+def test_a_certificate_that_was_stopped_says_what_it_has_shown(run):
+    fake_moments.certifying(run).write("engine_stopped", reason="stopped by the user")
+    text = markdown(content(read_run(run.path)), "a")
+    assert "Its certificate is not finished: what its runs have shown by now holds all the same." in text
+    assert "| what is left | 12 | 11 | keeps at least 49 % of the rate |" in text
 
 
 def test_it_begins_with_a_paragraph_for_everyone(run):

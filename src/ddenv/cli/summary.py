@@ -167,14 +167,12 @@ def _certificate_lines(state: RunState) -> list[str]:
 
 def _shown_so_far(state: RunState) -> list[str]:
     """What an unfinished certificate has shown, which holds whenever it is stopped."""
-    rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows_at_least]
-    lines = []
-    for one in rows:
-        what = f"without {one.without}" if one.without else "what is left"
-        bound = percent(one.bound or 0.0)
-        often = f"at most {bound} as often" if one.without else f"at least {bound} of the rate is kept"
-        lines.append(f"  {what}: f in {one.shown} of {count(one.runs, 'fresh run')}: {often}")
-    return lines
+    rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows]
+    names = [f"without {one.without}" if one.without else "what is left" for one in rows]
+    return [
+        f"  {name}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}"
+        for name, one in zip(names, rows, strict=True)
+    ]
 
 
 def _removal(claim: Claim) -> str:

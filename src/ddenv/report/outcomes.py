@@ -224,10 +224,14 @@ def worth(record: Record) -> Section | None:
 
 
 def _without(state: RunState) -> list[Block]:
-    so_far = drift(state)
-    words = missing(state)
-    first = f"{words[:1].upper()}{words[1:]}: nothing is claimed of what is left."
-    return [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
+    so_far, words = drift(state), missing(state)
+    rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
+    claimed = "what its runs have shown by now holds all the same" if rows else "nothing is claimed of what is left"
+    first = f"{words[:1].upper()}{words[1:]}: {claimed}."
+    block = say(first, f" From all runs so far: {so_far[0]}." if so_far else "")
+    shown = ((_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows)
+    table = Table(("environment", "runs", "with f", "shown"), tuple(shown), frozenset({1, 2}))
+    return [block, table] if rows else [block]
 
 
 def _with(state: RunState, found: Certificate) -> list[Block]:

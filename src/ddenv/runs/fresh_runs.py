@@ -45,6 +45,17 @@ class FreshRuns:
             return ""
         return f"{'≤' if self.without else '≥'} {percent(self.bound)}"
 
+    @property
+    def shows(self) -> str:
+        """The same in words."""
+        if self.bound is None or not self.shows_at_least:
+            return ""
+        return (
+            f"at most {percent(self.bound)} as often"
+            if self.without
+            else f"keeps at least {percent(self.bound)} of the rate"
+        )
+
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     """The runs of the current environment's certificate: what is left comes first, the world that f was seen in last."""
