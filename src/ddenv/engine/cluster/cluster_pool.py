@@ -38,6 +38,9 @@ from ddenv.world.scenario import Scenario
 Tell = Callable[[int, str], None]
 # The number of the test made here to compare with.
 REFERENCE = 0
+# The maximum time until a result that is there has come, s. A client that is closed meanwhile would never bring it, and its thread
+# would keep the engine from ending.
+FETCHED = 20.0
 
 
 @dataclass(eq=False)
@@ -251,7 +254,7 @@ class ClusterPool:
         if asked is None:
             self._answered(worker, answer)
             return
-        if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker):
+        if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker | TimeoutError):
             self._wait_again([asked])
             if isinstance(answer, NotGreeted):
                 worker.accepted = False
@@ -339,7 +342,7 @@ class ClusterPool:
 def _answer(done: Future[Any]) -> Any:
     """What came of a task; the exception where it came to nothing."""
     try:
-        return done.result()
+        return done.result(timeout=FETCHED)
     except BaseException as error:
         return error
 
