@@ -427,10 +427,10 @@ class CertificateStarted(Event):
     certificate: Number
     run: Natural
     rate: Share
-    keep_rate: Share
+    keep_rate: Annotated[float, Range(1e-9, 1)]
     error: Annotated[float, Range(1e-9, 1)]
     at_least: Natural
-    certify_rate: Share | None = None
+    certify_rate: Annotated[float, Range(1e-9, 1)] | None = None
 
 
 @dataclass(frozen=True, slots=True)
