@@ -1,4 +1,4 @@
-"""What rests on what: found once before the first test, known to views, and kept together where the user asks for it."""
+"""Which models rest on which: found once before the first test, known to views, and kept together where the user asks for it."""
 
 import tempfile
 from pathlib import Path
@@ -123,7 +123,7 @@ def test_it_shows_that_it_takes_long(tmp_path, world, monkeypatch):
         before, state = state, fold([event], state)
         said.append(news(event.kind, before, state))
         assert state.settling == (event.kind == "supports_started")
-    first = said.index("finding what rests on what")
+    first = said.index("finding which models rest on which")
     assert said[first + 1] == "2 models of the world rest on others"
 
 
@@ -132,7 +132,9 @@ def test_what_cannot_be_found_is_said_and_stops_only_who_needs_it(tmp_path, worl
     state = drive(new_run(tmp_path, world=world), pool(needs("wall"), supports=broken))
     assert state.minimal
     assert (state.supports, state.unsettled) == ((), broken.failure)
-    with pytest.raises(UserError, match=r"keep_supports: what rests on what is unknown: took longer than 1 s"):
+    with pytest.raises(
+        UserError, match=r"keep_supports: it is not known which models rest on which: took longer than 1 s"
+    ):
         drive(new_run(tmp_path, world=world, keep_supports=True), pool(needs("wall"), supports=broken))
 
 

@@ -1,4 +1,4 @@
-"""What falls when others go, by what rests on what."""
+"""What falls when others go, by which models rest on which."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -103,7 +103,9 @@ def test_a_certificate_is_told_with_what_follows_from_it():
         "f in 3 of 9 fresh runs (10 % to 90 %)"
     )
     _, _, before, after = states(*both, ("rate_lost", {"node": 0, "lost": 0, "again": [], "tests": []}))
-    assert news("rate_lost", before, after) == "  back to 4 models, the last environment that seems to keep the rate"
+    assert (
+        news("rate_lost", before, after) == "  back to 4 models, the last environment not shown to have lost the rate"
+    )
     _, _, before, after = states(*both, ("left_out", {"without": 1, "environment": [0, 2, 3], "evidence_test": 1}))
     assert news("left_out", before, after) == "  reduced to 3 models after 0 tests: without b f shows about as often"
 

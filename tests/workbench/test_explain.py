@@ -35,7 +35,7 @@ def test_a_starting_engine_is_not_called_dead(run):
 
 def test_it_is_said_that_the_piles_settle(run):
     run.created().write("supports_started")
-    assert told(run)[1].startswith("Finding what rests on what")
+    assert told(run)[1].startswith("Finding which models rest on which")
     run.supports()
     assert "rests on" not in told(run)[1]
 

@@ -95,7 +95,7 @@ def _map(world: World, **marks: Any) -> str:
 
 
 def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
-    """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what took no part in the
+    """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what did not affect the
     runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
     """
     from ddenv.evidence.took_part import in_whole_world

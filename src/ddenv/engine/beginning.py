@@ -1,5 +1,5 @@
 """What an engine does before its first test: it asks whether the engines before it died at once, whether it still computes the same
-as they did, and what rests on what.
+as they did, and which models rest on which.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
     if scenario.oracle is not None:
         if needed:
             raise UserError(
-                "reduction.keep_supports: only ddenv's own simulator finds what rests on what; leave it out, or 'oracle'"
+                "reduction.keep_supports: only ddenv's own simulator finds which models rest on which; leave it out, or 'oracle'"
             )
         return
     elements = journal.state.elements
@@ -127,6 +127,6 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
         ties = None if found.ties is None else journal.pairs(found.ties)
         journal.record(events.Supports(journal.pairs(found.supports), ties))
     elif needed:
-        raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")
+        raise UserError(f"reduction.keep_supports: it is not known which models rest on which: {found.failure}")
     else:
         journal.record(events.Supports((), why=found.failure))

@@ -1,4 +1,4 @@
-"""Stacks: models that are connected by what rests on what, as one element of a search.
+"""Stacks: models that are connected by which models rest on which, as one element of a search.
 
 The algorithm gets one model of each stack, and searches as ever. Its rounds are expanded, so that whatever is tested has all
 of a stack or nothing of it.

@@ -151,7 +151,7 @@ class EngineFailed(Event):
 
 @dataclass(frozen=True, slots=True)
 class SupportsStarted(Event):
-    """The piles are being settled, to find what rests on what; only if that takes more than a second."""
+    """The piles are being settled, to find which models rest on which; only if that takes more than a second."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
 from ddenv.text import count, first_of
 
-SETTLING = "finding what rests on what"
+SETTLING = "finding which models rest on which"
 ISOLATING = "finding the nearest world that passes"
 CONFIRMING = "certifying what is left with fresh runs"
 # A line names so many failures of the baseline.
@@ -155,7 +155,7 @@ def _certificate(kind: str, after: RunState) -> str:
         case "certificate_finished":
             return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
         case "rate_lost":
-            return f"  back to {models}, the last environment that seems to keep the rate"
+            return f"  back to {models}, the last environment not shown to have lost the rate"
     return (
         f"  reduced to {models} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
     )
@@ -204,7 +204,7 @@ def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
 
 def _supports(state: RunState) -> str:
     if state.unsettled:
-        return f"what rests on what is unknown: {state.unsettled}"
+        return f"it is not known which models rest on which: {state.unsettled}"
     resting = len({upper for upper, _ in state.supports})
     return f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others" if resting else ""
 

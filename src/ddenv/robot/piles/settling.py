@@ -1,4 +1,4 @@
-"""What the rehearsals of a world's piles show: where everything comes to rest, what never does, and what rests on what."""
+"""What the rehearsals of a world's piles show: where everything comes to rest, what never does, and which models rest on which."""
 
 from __future__ import annotations
 

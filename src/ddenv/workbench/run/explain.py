@@ -31,7 +31,8 @@ from ddenv.workbench.shared.wording import bar, count, metres, percent
 # Maximum number of kept models that a sentence names.
 NAMED = 8
 _SETTLING = (
-    "Finding what rests on what: the piles fall and settle once, without the robot. Then it is known what a removal would drop.",
+    "Finding which models rest on which: the piles fall and settle once, without the robot. "
+    "Then it is known what a removal would drop.",
 )
 
 
@@ -442,7 +443,7 @@ def _what(test: Test, certificate: Certificate) -> str:
 
 def _after(certificate: Certificate) -> str:
     if certificate.claims[0].verdict == "lost":
-        return "f is rarer in what is left. Earlier environments run, to find the last one that seems to keep the rate."
+        return "What is left keeps too little of the rate. Earlier environments run, to find the last one not shown to lose it."
     return "The certificate is finished."
 
 
