@@ -72,7 +72,10 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     keys = [(certificate.node, None), *((certificate.node, name) for name in removals)]
     first = origin(state, certificate.node).number
     earlier = sorted((key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0])
-    keys += [*earlier, *([(first, None)] if certificate.node != first else [])]
+    keys += earlier
+    # A finished certificate need not have run the whole world.
+    if certificate.node != first and (not claims or (first, None) in tests):
+        keys.append((first, None))
     found = [_of(key, tests.get(key, []), claims.get(key[1]) if key[0] == certificate.node else None) for key in keys]
     bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
     left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))
