@@ -181,12 +181,24 @@ class Reduction:
         used_by=("ddenv",),
         cost="On needs many more tests, for a result that is as minimal.",
     )
-    accept_rate: Literal["first", "kept"] = setting(
+    accept_rate: Literal["first", "kept", "exact"] = setting(
         "kept",
-        "when a candidate is taken: at its first run with f (first), or once its runs show that it keeps the rate of f (kept)",
+        "when a candidate is taken: at its first run with f (first), once its runs show that it keeps the rate of f (kept), "
+        "or if a failing run of the baseline, repeated with its seed, still shows f (exact)",
         printed="first",
+        shown="more",
+        may_change=True,
+        more="The first rule is the paper's. With it and with exact, the end may fail far more rarely than the whole world.",
+        cost="Where f is rare, kept takes thousands of tests and exact about a hundred.",
+    )
+    exact_seeds: int = setting(
+        4,
+        "how many failing runs of the baseline 'accept_rate: exact' repeats; a candidate is taken if one of them shows f",
+        least=1,
+        most=1000,
         shown="option",
-        more="The first rule is the paper's. With it, the end may fail far more rarely than the whole world.",
+        may_change=True,
+        cost="More lose fewer candidates by chance, and run each candidate without f more often.",
     )
     keep_rate: float = setting(
         0.8,

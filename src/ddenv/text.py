@@ -89,8 +89,8 @@ def rounded(number: float) -> int:
 
 
 def between(low: float, high: float) -> str:
-    """An estimate's range as it is said: "50 to 1,000"."""
-    return f"{rounded(low):,} to {rounded(high):,}"
+    """An estimate's range as it is said: "50 to 1,000", or "20" where it is known."""
+    return f"{rounded(low):,} to {rounded(high):,}" if low < high else f"{rounded(high):,}"
 
 
 def about(low: float, middle: float, high: float) -> str:

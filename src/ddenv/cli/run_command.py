@@ -38,6 +38,11 @@ if TYPE_CHECKING:
 @scenario_options
 @reading_options
 @setting_options()
+@click.option(
+    "--exact",
+    is_flag=True,
+    help="Reduce failing runs of the baseline themselves, each repeated with its seed, as --accept-rate exact does.",
+)
 @jobs_option()
 @click.option("--name", help="Name of the run.")
 @click.option(
@@ -46,7 +51,14 @@ if TYPE_CHECKING:
 @trust_option
 @json_option
 def run_command(
-    scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **options: Any
+    scenario: str,
+    name: str | None,
+    output: Path | None,
+    exact: bool,
+    jobs: int,
+    trust: bool,
+    as_json: bool,
+    **options: Any,
 ) -> int:
     """Reduces SCENARIO (ditch, rubble, friction, a YAML file or an SDF world) without a screen."""
     from ddenv.cli.follow import follow_to_summary
@@ -55,6 +67,8 @@ def run_command(
     from ddenv.runs.export import export_world
     from ddenv.runs.programs import start_engine
 
+    if exact:
+        options["accept_rate"] = "exact"
     path, world = create_named(scenario, options, asking(trust), name, output, announce)
     announce_notes(world, as_json)
     code, state = follow_to_summary(path, start_engine(path, jobs), as_json)

@@ -4,13 +4,10 @@ as they did, and which models rest on which.
 
 from __future__ import annotations
 
-import numpy as np
-
-from ddenv.engine.bench import Bench
+from ddenv.engine.bench import Bench, made_again
 from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import rows_of
-from ddenv.engine.limits import note, wall_limit
+from ddenv.engine.limits import note
 from ddenv.engine.pool import Workers
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
@@ -55,10 +52,6 @@ def check_crash_loop(journal: Journal) -> None:
         )
 
 
-# How long to wait for the test before looking at commands again, s.
-WAIT = 0.05
-
-
 def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool) -> None:
     """Makes the first baseline run again, and compares its bits, if this engine computes with anything else than the earlier ones.
 
@@ -68,15 +61,10 @@ def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool
     test = _comparable(state)
     if state.physics.now == state.physics.proven or test is None:
         return
-    journal.record(events.Comparing(test.id))
-    pool.submit(0, frozenset(state.elements), test.seed, limit=wall_limit(state))
-    while not (ended := pool.finished(WAIT)):
-        control.poll()
-    result = ended[0][1]
-    same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
-    if not same and not mixed:
+    result = made_again(journal, pool, control, test)
+    if result is not None and not mixed:
         raise UserError(_differs(journal, result))
-    journal.record(events.Compared(same))
+    journal.record(events.Compared(result is None))
 
 
 def _comparable(state: RunState) -> Test | None:

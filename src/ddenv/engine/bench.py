@@ -14,7 +14,7 @@ import numpy as np
 
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failures_of, result_data
+from ddenv.engine.judging import failures_of, result_data, rows_of
 from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
@@ -26,8 +26,9 @@ from ddenv.reduction.procedure import Test
 from ddenv.reduction.verdict import Acceptance, decided_by, standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import Implied, TestFinished, TestStarted, TrialJudged
+from ddenv.runfile.events import Comparing, Implied, TestFinished, TestStarted, TrialJudged
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
+from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT, Motions
 from ddenv.text import count
 from ddenv.world.scenario import FailureSpec
@@ -153,7 +154,7 @@ class Bench:
         environment, state = journal.number(wanted.environment), journal.state
         # All candidates meet the same noise.
         seed, number = state.scenario["reduction"]["seed"] + wanted.run, len(state.tests) + 1
-        round = journal.current.number if wanted.why == "round" else None
+        round = state.round.number if state.round is not None and wanted.why == "round" else None
         started = TestStarted(
             number,
             environment,
@@ -193,6 +194,12 @@ class Bench:
             self.tick()
         return result
 
+    def made_again(self, test: KnownTest) -> RunResult | Broken | None:
+        """As the function `made_again`, once all workers are idle."""
+        while self._busy:
+            self.tick()
+        return made_again(self._journal, self._pool, self._control, test)
+
     # Tries of the user.
 
     def finish_trials(self) -> None:
@@ -223,7 +230,7 @@ class Bench:
 
     def _judge(self, trial: Trial, environment: Environment, verdict: str) -> None:
         runs, _ = decided_by(lambda run: self._journal.shown(environment, run), self.rule)
-        tests = self._journal.tests(environment, range(runs))
+        tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
         known = sum(self._journal.state.tests[test - 1].trial != trial.number for test in tests)
         self._journal.record(TrialJudged(trial.number, verdict, tests, known))
 
@@ -317,6 +324,17 @@ class Bench:
             spec = FailureSpec.model_validate(state.scenario["failure"])
             self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
         return self._failures
+
+
+def made_again(journal: Journal, pool: Workers, control: Control, test: KnownTest) -> RunResult | Broken | None:
+    """Makes a run of the whole world again; returns how it ended unless it repeats to the last bit. Raises Stopped."""
+    journal.record(Comparing(test.id))
+    pool.submit(0, frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state))
+    while not (ended := pool.finished(WAIT)):
+        control.poll()
+    result = ended[0][1]
+    same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
+    return None if same else result
 
 
 def _samples(trajectory: np.ndarray) -> bytes:

@@ -13,11 +13,11 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
-from ddenv.engine.limits import limit_after
+from ddenv.engine.limits import limit_after, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import Terms, error_of
+from ddenv.evidence.certificate import RUNS_BESIDE, Terms, error_of
 from ddenv.evidence.claims import current, is_minimal, verdict_on
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
@@ -131,6 +131,7 @@ class Driver:
         """The current search, or a new one where one is due."""
         journal = self._journal
         if journal.state.leg is None or journal.state.search_due:
+            self._check_repeats()
             state = journal.state
             first = 1 if state.round is None else state.round.number + 1
             rate = journal.rate_of_whole() if state.scenario["reduction"]["accept_rate"] == "kept" else 0.0
@@ -147,6 +148,19 @@ class Driver:
         self._look_at(leg.evidence_test)
         return self._leg
 
+    def _check_repeats(self) -> None:
+        """Raises UserError if the first search that reduces chosen runs exactly begins, and one of them does not repeat."""
+        journal = self._journal
+        exact, last = journal.exact_runs(), journal.state.leg
+        if not exact or (last is not None and last.settings["accept_rate"] == "exact"):
+            return
+        test = journal.test(journal.whole, exact[0])
+        if test is not None and test.phase == "baseline" and self._bench.made_again(test) is not None:
+            raise UserError(
+                f"reduction.accept_rate: exact needs runs that repeat, and run {test.run + 1} of the whole world, made again "
+                f"with seed {test.seed}, is another one; keep its rate: --accept-rate kept"
+            )
+
     def _leg_of(self, leg: Leg, environment: tuple[str, ...]) -> steps.Leg:
         """A search of `environment`. It may leave out whole stacks, and none with a model that is pinned."""
         journal, state = self._journal, self._journal.state
@@ -154,7 +168,12 @@ class Driver:
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        rule = Acceptance(1 + self._reduction.iterations, leg.rate, self._reduction.keep_rate, leg.steps_back)
+        asked, exact = self._reduction, journal.exact_runs()
+        rule = (
+            Acceptance(len(exact), exact=exact)
+            if exact
+            else Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
+        )
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         return steps.Leg(leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again)
 
@@ -243,6 +262,7 @@ class Driver:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
+        note_rare(self._journal)
         self._control.round_finished()
         return self._first_leg()
 
@@ -324,7 +344,7 @@ class Driver:
             self._unknown.add(step.environment)
         if round.candidates[step.index].verdict:
             return
-        tests = journal.tests(step.environment, range(step.runs))
+        tests = journal.tests(step.environment, map(self._leg.rule.run, range(step.runs)))
         known = sum(journal.state.tests[test - 1].round != round.number for test in tests)
         journal.record(events.CandidateJudged(round.number, step.index, step.verdict, tests, known))
 
@@ -374,20 +394,26 @@ class Driver:
         if last is None or (self._only_certify is not None and last.claims):
             asked, number = self._reduction, len(journal.state.certificates) + 1
             # What the bets have won so far holds for any share, so that the same ones can go on.
-            goes_on = last is not None and self._certify_rate is not None
+            goes_on = last is not None and self._certify_rate is not None and not last.seeds
+            # Where chosen runs were reduced, a rate is shown if the user asks for one.
+            exact = () if self._certify_rate else self._leg.rule.exact
+            shown = [run for run in exact if journal.shown(journal.environment, run)]
+            seeds = tuple(journal.state.tests[test - 1].seed for test in journal.tests(journal.environment, shown))
+            at_least = max(self._only_certify or 0, RUNS_BESIDE) if seeds else self._only_certify or asked.baseline_runs
             started = events.CertificateStarted(
                 number,
                 last.first_run if last is not None and goes_on else journal.fresh_run,
                 journal.rate_of_whole(),
                 asked.keep_rate,
                 last.error if last is not None and goes_on else error_of(number),
-                self._only_certify or asked.baseline_runs,
+                at_least,
                 self._certify_rate or asked.certify_rate,
+                seeds,
             )
             journal.record(started)
             last = journal.state.certificates[-1]
         terms = Terms(last.certify_rate, last.keep_rate, last.error, last.at_least)
-        return steps.Certificate(last.number, last.first_run, terms)
+        return steps.Certificate(last.number, last.first_run, terms, self._leg.rule.exact if last.seeds else ())
 
     def _certified(self, step: steps.Certified) -> None:
         if not self._certificate.claims:
@@ -399,6 +425,8 @@ class Driver:
                 for environment, run in claim.claim.rests_on
                 for test in journal.tests(environment, (first + run,), full=True)
             }
+            for claim in step.claims:
+                rested_on |= set(journal.tests(claim.environment, step.certificate.exact))
             journal.record(events.CertificateFinished(claims, tuple(sorted(rested_on))))
 
     @property
@@ -410,13 +438,15 @@ class Driver:
 
     def _claim_made(self, named: steps.NamedClaim, first: int) -> events.ClaimMade:
         journal, outcomes = self._journal, dict[str, int]()
-        for test in journal.tests(named.environment, [first + run for run in named.runs], full=True):
+        runs = named.exact or [first + run for run in named.runs]
+        for test in journal.tests(named.environment, runs, full=not named.exact):
             outcome = journal.state.tests[test - 1].outcome
             outcomes[outcome] = outcomes.get(outcome, 0) + 1
         sound = sum(number for outcome, number in outcomes.items() if outcome not in BROKEN)
         shown = outcomes.get("similar", 0)
         number, claim = journal.number(named.environment), named.claim
-        interval = anytime_interval(shown, sound)
+        share = shown / max(1, sound)
+        interval = (share, share) if named.exact else anytime_interval(shown, sound)
         return events.ClaimMade(named.model, number, claim.verdict, shown, sound, *interval, outcomes, claim.bound)
 
     def _stepped_back(self, step: steps.SteppedBack) -> None:

@@ -13,6 +13,7 @@ from ddenv.evidence.slices import Ties, implies
 from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, FIRST_FRESH_RUN, FRESH_RUNS, ISOLATE, Round, RunState, Test
 from ddenv.runfile.store import Motions, RunFile, uncollected
 from ddenv.runfile.supports import stack_with
@@ -210,6 +211,14 @@ class Journal:
                 tests.append(test)
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
+
+    def exact_runs(self) -> tuple[int, ...]:
+        """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
+        asked, whole = settings(self.state), self._numbers[self.whole]
+        if asked.accept_rate != "exact":
+            return ()
+        runs = (test.run for test in self.rested_on if test.environment == whole and test.outcome == "similar")
+        return tuple(sorted({run for run in runs if run < FIRST_FRESH_RUN})[: asked.exact_seeds])
 
     @property
     def fresh_run(self) -> int:

@@ -19,7 +19,7 @@ from ddenv.runfile.store import Live
 from ddenv.runs import processor
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
-from ddenv.text import about, count, duration
+from ddenv.text import about, between, count, duration
 from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
@@ -34,6 +34,8 @@ GIGABYTE = 1e9
 # A run is slow if it simulates less than `SLOW` s in each real second; that is known after so many real seconds.
 SLOW = 1.0
 KNOWN_AFTER = 10.0
+# Where f shows in less than this share of the baseline, the failing runs themselves can be reduced at much lower cost.
+RARE = 0.7
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
 HELPS = "what helps: fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
@@ -65,6 +67,27 @@ def note(journal: Journal, about: str, words: str) -> None:
     """Writes an event with a sentence, unless one `about` the same is there."""
     if about not in dict(journal.state.notes):
         journal.record(Noted(about, words))
+
+
+def note_rare(journal: Journal) -> None:
+    """Offers to reduce the failing runs themselves where f shows in few runs, with the costs of both ways."""
+    state, base = journal.state, journal.state.baseline
+    asked = Reduction.model_validate(state.scenario["reduction"])
+    if base is None or base.rate >= RARE or asked.accept_rate != "kept":
+        return
+    kept, exact = (
+        between(low, high)
+        for low, _, high in (
+            rough_run(len(state.elements), each, base.rate).tests
+            for each in (asked, asked.model_copy(update={"accept_rate": "exact"}))
+        )
+    )
+    note(
+        journal,
+        "rare",
+        f"f shows in {base.failures} of {count(base.runs, 'run')}: to keep its rate takes about {kept} tests; to reduce the "
+        f"failing runs themselves, exactly, about {exact}: change accept_rate to exact, or run with --exact",
+    )
 
 
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:

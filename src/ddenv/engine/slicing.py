@@ -57,15 +57,18 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
 
 
 def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:
-    """The runs known of the models `there`, of those that decisions rest on, and what took part in each seed's.
+    """The runs known of the models `there`, of those that decisions rest on, and what took part in each seed's. Where chosen runs
+    are reduced exactly, only those of them that show f count.
 
     None where slices may not be used, or where it is unknown what took part in one of them.
     """
     tests: list[Test] = []
     met: dict[int, Environment] = {}
-    ties = journal.ties
+    ties, exact = journal.ties, journal.exact_runs()
     for test in journal.rested_on:
         if not test.is_finished or test.outcome in BROKEN:
+            continue
+        if exact and (test.run not in exact or test.outcome != "similar"):
             continue
         environment = journal.state.environments[test.environment]
         if ties is not None and test.took_part is not None and implies(test.took_part, environment, there, ties):

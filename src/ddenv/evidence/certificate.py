@@ -22,7 +22,9 @@ from typing import Literal
 from ddenv.environment import Environment
 from ddenv.evidence.rates import HIGHEST_RATE, Shown
 
-Verdict = Literal["", "kept", "lost", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"]
+Verdict = Literal[
+    "", "kept", "lost", "exact", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"
+]
 
 # The chance that any claim of a run is wrong, over all its certificates; half of it is for rates kept, half for removals. It is not
 # divided by the number of models: "each model is needed" is wrong only if a certain one is not, and its own bet won by chance.
@@ -40,6 +42,8 @@ MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
 HELPS_AFTER, HELPS_SHARE = 60, 0.75
 # If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
 ABOUT_AS_OFTEN = 0.9
+# Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
+RUNS_BESIDE = 20
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
@@ -268,6 +272,12 @@ def falls(without: Environment, left: Environment, terms: Terms, share: float = 
             break
     about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
     return ("helps" if rarer else "not needed" if about_as_often else "not shown"), bound
+
+
+def often(environment: Environment, runs: int) -> Procedure:
+    """Runs an environment so often: it claims nothing but how often f showed."""
+    yield Wanted(tuple((environment, run) for run in range(runs)), ())
+    return "exact", None
 
 
 def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: float) -> Procedure:

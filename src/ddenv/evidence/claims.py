@@ -8,7 +8,7 @@ from typing import Protocol
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
-from ddenv.evidence.certificate import Terms, falls, keeps, settle
+from ddenv.evidence.certificate import Terms, falls, keeps, often, settle
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.evidence.rates import Shown, miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
@@ -25,7 +25,9 @@ NO_FRESH_RUNS = "no fresh runs were made"
 def is_minimal(certificate: Certificate) -> bool:
     """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
     claims = certificate.claims
-    return bool(claims) and all(claim.verdict == ("kept" if claim.without is None else "needed") for claim in claims)
+    if not claims or (claims[0].verdict != "kept" and not certificate.seeds):
+        return False
+    return all(claim.verdict == "needed" for claim in claims[1:])
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
@@ -47,7 +49,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         return (
             f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
         )
-    if left.verdict != "kept":
+    if left.verdict != "kept" and not certificate.seeds:
         aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
         shown = f"; it keeps at least {percent(left.bound)}" if left.bound else ""
         return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
@@ -60,6 +62,8 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         if names:
             return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
+    if certificate.seeds:
+        return f"{_exactly(certificate)}; with other seeds {rate(left)}{but}"
     if not removals:
         return f"nothing is left that can be removed: {rate(left)}{but}"
     if helps := helping(certificate):
@@ -74,6 +78,22 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     )
     often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
     return f"no {one} can be removed: {kept(certificate)}; without {without} {often}{but}"
+
+
+def _exactly(certificate: Certificate) -> str:
+    """What the chosen runs show: "f shows with seed 3 each time; without any one of these 4 models it does not"."""
+    _, *removals = certificate.claims
+    shows = f"f shows with {_seeds(certificate)} each time"
+    if not removals:
+        return f"{shows}; nothing is left that can be removed"
+    names = f"any one of these {len(removals)} models" if len(removals) > 1 else removals[0].without
+    runs = removals[0].runs
+    return f"{shows}; without {names} it {f'shows with none of the {runs} chosen seeds' if runs > 1 else 'does not'}"
+
+
+def _seeds(certificate: Certificate) -> str:
+    seeds = certificate.seeds
+    return f"seed{'s' * (len(seeds) > 1)} {first_of([str(seed) for seed in seeds], MOST_NAMES)}"
 
 
 def kept(certificate: Certificate) -> str:
@@ -115,6 +135,8 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
         return outcomes.get((environment, run))
 
     terms = terms_of(certificate)
+    if certificate.seeds:
+        return {None: settle(often(left, terms.at_least), shown)}
     claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
     return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
 
@@ -150,7 +172,9 @@ class Counted(Protocol):
 
 
 def rate(fresh: Counted) -> str:
-    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"."""
+    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"; without an interval, how often chosen ones did."""
+    if fresh.low == fresh.high:
+        return f"f in {fresh.shown} of {count(fresh.runs, 'chosen run')}"
     interval = f" ({percent(fresh.low)} to {percent(fresh.high)})" if fresh.runs else ""
     return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
 
@@ -166,6 +190,8 @@ def for_everyone(certificate: Certificate) -> str:
         return said
     most = max(removals, key=lambda claim: claim.high)
     one = "it" if len(removals) == 1 else "any one of them"
+    if certificate.seeds:
+        return f"{said}; of the drives that were chosen, none of {most.runs} failed so without {one}"
     seldom = f"at most {most.shown}" if most.shown else "none"
     return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
 
@@ -192,8 +218,15 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     rate, bound = _whole_rate(certificate), claim.bound
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
         return f"shown to keep at least {percent(bound)} of {rate}, not {percent(certificate.certify_rate)}"
-    often = "rarer" if bound is None else f"at most {percent(bound)} as often"
+    often = (
+        "never with these seeds"
+        if claim.is_exact
+        else "rarer"
+        if bound is None
+        else f"at most {percent(bound)} as often"
+    )
     return {
+        "exact": f"f shows with {_seeds(certificate)} each time",
         "kept": f"keeps at least {percent(certificate.certify_rate if bound is None else bound)} of {rate}",
         "lost": f"keeps less than {percent(certificate.keep_rate)} of {rate}",
         "needed": f"needed: without it f shows {often}",
@@ -299,6 +332,8 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, in
         if test.outcome not in BROKEN:
             hits, runs = shown.get((test.node, test.without), (0, 0))
             shown[test.node, test.without] = hits + (test.outcome == "similar"), runs + 1
+    if now.seeds:
+        return now.at_least, now.at_least, now.at_least
     before = 0 if state.baseline is None else state.baseline.runs
     without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
     done = Made(made, shown.get((now.node, None), (0, 0)), without)
@@ -323,12 +358,16 @@ def short(claim: Claim) -> str:
 
 def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
+    if certificate.seeds:
+        return f"they say how often what is left shows f with other seeds than {_seeds(certificate)}"
     aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
     return f"they have to show that what is left keeps {aim}, and that f is rarer without {_any_one(pinned)}"
 
 
 def promise(state: RunState, certificate: Certificate) -> str:
     """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
+    if certificate.seeds:
+        return f"minimal means: {_exactly(certificate)}; for other seeds fresh runs say how often f shows, and nothing more"
     kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
     most = _at_most(certificate)
     often = "rarer" if most is None else f"at most {percent(most)} as often"
@@ -384,7 +423,14 @@ def has_dropped(state: RunState) -> bool:
     """Whether the runs of the current environment so far show that f is rarer in it than it may be."""
     here = state.here
     whole = None if here is None else origin(state, here.number)
-    if here is None or whole is None or here is whole or not here.runs or not whole.runs:
+    if (
+        settings(state).accept_rate == "exact"
+        or here is None
+        or whole is None
+        or here is whole
+        or not here.runs
+        or not whole.runs
+    ):
         return False
     least = settings(state).keep_rate * whole.shown / len(whole.runs)
     return wilson_interval(here.shown, len(here.runs))[1] < least
@@ -415,12 +461,17 @@ def seen(node: Node) -> str:
 
 
 def missed(state: RunState) -> str:
-    """How likely all runs of a candidate miss f, by the baseline's rate, and by the lower end of its interval."""
-    base, iterations = state.baseline, settings(state).iterations
+    """How likely all runs of a candidate miss f, by the baseline's rate and its interval; without a full stop."""
+    base, asked = state.baseline, settings(state)
     if base is None:
         return ""
-    middle, most = (percent(miss_chance(rate, iterations)) for rate in (base.rate, base.low))
-    return middle if middle == most else f"{middle} (at most {most})"
+    if asked.accept_rate == "exact":
+        return f"each candidate runs with the seeds of {count(min(asked.exact_seeds, base.failures), 'failing run')} of these"
+    middle, most = (percent(miss_chance(rate, asked.iterations)) for rate in (base.rate, base.low))
+    chance = middle if middle == most else f"{middle} (at most {most})"
+    rare = base.iterations_95 > asked.iterations
+    enough = f"; a 95 % chance to see f needs --iterations {base.iterations_95}" if rare else ""
+    return f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is {chance}{enough}"
 
 
 def of_runs(shown: int, runs: int) -> str:

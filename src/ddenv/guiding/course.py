@@ -216,8 +216,10 @@ CHANGEABLE = {one.name: one for one in SETTINGS.values() if one.may_change}
 ONLY_CHANGEABLE = f"only {', '.join(CHANGEABLE)} can be changed during a run"
 
 
-def number(name: str, text: str) -> int | None:
-    """The number that was typed; None for no limit. Raises UserError."""
+def typed(name: str, text: str) -> int | str | None:
+    """The value that was typed or chosen; None for no limit. Raises UserError."""
+    if CHANGEABLE[name].choices:
+        return text
     if not text.strip() and CHANGEABLE[name].none:
         return None
     try:
@@ -230,7 +232,7 @@ def _check(name: str, value: Any) -> None:
     """Raises UserError for a value that the setting cannot have."""
     one = CHANGEABLE[name]
     if not one.allows(value):
-        expected = one.range if one.kind is int else "a name"
+        expected = one.range if one.kind is int else " or ".join(one.choices) or "a name"
         raise UserError(f"{name}: expected {expected}, found {printable(str(value)[:20])}")
     if name == "pair":
         split_pair(str(value))

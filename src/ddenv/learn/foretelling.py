@@ -231,7 +231,7 @@ def _is_regular(round: Round, after: Round) -> bool:
 
 def _why_ended(test: Test, candidate: Candidate, options: Settings) -> Question:
     """What the outcome of a candidate's test means."""
-    if test.outcome == "pass" and options.iterations == 0 and options.accept_rate == "first":
+    if test.outcome == "pass" and options.most_runs == 1 and options.accept_rate != "kept":
         return _reason("only pass", test.id)
     # Of a single model nobody would be wrong to call it the smallest world.
     most = 2 if test.outcome == "similar" and candidate.size == 1 else None
@@ -241,9 +241,9 @@ def _why_ended(test: Test, candidate: Candidate, options: Settings) -> Question:
 def _goes(candidate: Candidate, options: Settings) -> str:
     """What f without some models says of these."""
     gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
-    if options.accept_rate != "first":
+    if options.accept_rate == "kept":
         return f"f can show without {gone}. Whether it shows often enough, more runs will say."
-    if options.iterations:
+    if options.most_runs > 1:
         return f"f showed without {gone}. Here the first run with f decides, so they go."
     return f"f shows without {gone}: they can go."
 

@@ -53,6 +53,10 @@ class Passing:
         wanted = max(MOSTLY, 1.0 - FAILURES_LEFT * (1.0 - rate))
         return cls(wanted, max(rate, wanted / 2.0))
 
+    def run(self, place: int) -> int:
+        """The runs are those of the search, from its first one."""
+        return place
+
     def verdict(self, shown: int, missed: int) -> Verdict:
         """Of a world in which `shown` runs reached the goal and `missed` did not: "similar" if it passes; "" while it is open."""
         passes = leans_to(shown, missed, self.wanted, self.rather_than, self.error)

@@ -19,7 +19,7 @@ from itertools import islice, zip_longest
 from typing import Any, Protocol
 
 from ddenv.environment import Environment
-from ddenv.evidence.certificate import Claim, Procedure, Settling, Terms, falls, good_enough, keeps
+from ddenv.evidence.certificate import Claim, Procedure, Settling, Terms, Verdict, falls, good_enough, keeps, often
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.guide import Search
 from ddenv.reduction.round import Candidate, Partition, Round
@@ -34,7 +34,7 @@ MOST_STEPS_BACK = 14
 class Test:
     """Run number `run` of an environment. With `full` it runs to its end, even if the robot is stuck for good.
 
-    `why` is "baseline", "round" (for candidate number `candidate`), "certify" or "isolate"; "hand" and "audit" are tests that the
+    `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left), "certify" or "isolate"; "hand" and "audit" are tests that the
     driver makes beside the procedure. `without` is the model that a fresh run leaves out.
     """
 
@@ -194,20 +194,28 @@ class Leg:
 
 @dataclass(frozen=True)
 class Certificate:
-    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`."""
+    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`.
+
+    With `exact` it claims what these runs of the search show; its fresh runs say how often f shows with other seeds.
+    """
 
     number: int
     first_run: int
     terms: Terms
+    exact: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class NamedClaim:
-    """A claim about an environment: about what is left, or about that without `model`."""
+    """A claim about an environment: about what is left, or about that without `model`.
+
+    It rests on the runs `exact` of the search alone, if there are any, else on fresh ones.
+    """
 
     model: int | None
     environment: Environment
     claim: Claim
+    exact: tuple[int, ...] = ()
 
     @property
     def runs(self) -> range:
@@ -363,13 +371,15 @@ def _judged(driver: Runs, index: int, environment: Environment, verdict: str, ru
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator[Step, Any, Certified]:
     """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
     left, whole = chain[-1], leg.whole
+    while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
+        yield Wants(tuple(Test(left, run, "round") for run in missing))
     certificate: Certificate = yield CertificateDue()
     terms = replace(certificate.terms, error=certificate.terms.error / 2)
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
 
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
-        yield None, left, keeps(left, whole, terms)
-        for model, rest in rests.items():
+        yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
+        for model, rest in () if certificate.exact else rests.items():
             yield model, rest, falls(rest, left, terms)
 
     def ends(claim: NamedClaim) -> bool:
@@ -377,9 +387,19 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
             return claim.claim.verdict == "lost"
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
-    certified = Certified(certificate, (yield from settled(driver, claims(), ends, certificate.first_run, "certify")))
+    made = yield from settled(driver, claims(), ends, certificate.first_run, "certify")
+    if certificate.exact:
+        made += tuple(_exactly(driver, model, rest, certificate.exact) for model, rest in rests.items())
+    certified = Certified(certificate, made)
     yield certified
     return certified
+
+
+def _exactly(driver: Driver, model: int, rest: Environment, runs: tuple[int, ...]) -> NamedClaim:
+    """Whether f shows without `model` in any of these runs of the search, which has made them."""
+    shown = [driver.shown(rest, run) for run in runs]
+    open_verdict: Verdict = "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
+    return NamedClaim(model, rest, Claim("not needed" if True in shown else open_verdict), runs)
 
 
 def settled(

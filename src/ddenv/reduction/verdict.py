@@ -25,6 +25,10 @@ class Rule(Protocol):
         """The verdict after `shown` runs that showed what is looked for and `missed` that did not; "" while it is open."""
         ...
 
+    def run(self, place: int) -> int:
+        """The number of the run at this place, from 0."""
+        ...
+
 
 @dataclass(frozen=True)
 class Acceptance:
@@ -34,12 +38,19 @@ class Acceptance:
     world, and Bayes decides between three rates of the candidate: that one, one that is clearly below `keep_rate` of it, and
     `SPURIOUS`. After each of `steps_back` the rule is stricter: the search has taken worlds where f is rarer. It bounds no error
     by itself, the certificate does; it makes a refuted certificate rare.
+
+    With `exact` the runs of these numbers decide, and no others.
     """
 
     most_misses: int
     rate: float = 0.0
     keep_rate: float = 0.8
     steps_back: int = 0
+    exact: tuple[int, ...] = ()
+
+    def run(self, place: int) -> int:
+        """The number of the run at this place, from 0."""
+        return self.exact[place] if self.exact else place
 
     def verdict(self, shown: int, missed: int) -> Verdict:
         """The verdict after `shown` runs with f and `missed` without it, if no fewer of them decided; "" while it is open."""
@@ -131,7 +142,7 @@ def _row(shown: Callable[[Environment, int], Shown], candidate: Environment, rul
     missing: list[int] = []
     hits = misses = 0
     while not (verdict := rule.verdict(hits, misses)):
-        run = hits + misses
+        run = rule.run(hits + misses)
         known = shown(candidate, run)
         if known == "broken":
             return "unknown", missing
@@ -148,7 +159,7 @@ def decided_by(shown: Callable[[int], Shown], rule: Rule) -> tuple[int, int]:
     """How many runs of a candidate decided its verdict, and how many of them showed f; all of them are finished."""
     hits = misses = 0
     while not rule.verdict(hits, misses):
-        known = shown(hits + misses)
+        known = shown(rule.run(hits + misses))
         if known == "broken":
             return hits + misses + 1, hits
         if known:

@@ -18,7 +18,6 @@ from ddenv.page.blocks import (
     named,
     percent,
     say,
-    section,
     thousands,
 )
 from ddenv.page.step_chart import WIDTH, opening
@@ -104,7 +103,7 @@ def _baseline(state: RunState) -> list[Block]:
     return [
         say(words),
         Picture("interval", interval(base), "The failure rate with its interval."),
-        *_missed(state, base),
+        *([say(f"{missed(state)[:1].upper()}{missed(state)[1:]}.")] if base.rate < 1 else []),
         *_seen(base),
     ]
 
@@ -117,20 +116,6 @@ def _seen(base: BaselineFinished) -> list[Block]:
     f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
     words = "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces another one."
     return [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
-
-
-def _missed(state: RunState, base: BaselineFinished) -> list[Block]:
-    """What the failure rate means for a candidate."""
-    iterations = section(state.scenario, "reduction").get("iterations", 3)
-    if base.rate >= 1 or not isinstance(iterations, int):
-        return []
-    words = (
-        f"A candidate is dissimilar when f does not show in {count(1 + iterations, 'test')}; "
-        f"by this rate the chance that they all miss it is {missed(state)}."
-    )
-    if base.iterations_95 > iterations:
-        words += f" For 95 % certainty it needs {base.iterations_95} re-runs (--iterations {base.iterations_95})."
-    return [say(words)]
 
 
 def _tests(state: RunState) -> list[Block]:

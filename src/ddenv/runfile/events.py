@@ -422,6 +422,8 @@ class SlicesRefuted(Event):
 class CertificateStarted(Event):
     """Full runs with fresh seeds follow, from run number `run` on. They have to show that what is left keeps `certify_rate` of the
     rate of f, which was estimated as `rate`; the search aimed at `keep_rate`. Before there was a `certify_rate`, they were one.
+
+    With `seeds`, on which what is left shows f, chosen runs were reduced exactly, and fresh ones only say how often f shows.
     """
 
     certificate: Number
@@ -431,6 +433,7 @@ class CertificateStarted(Event):
     error: Annotated[float, Range(1e-9, 1)]
     at_least: Natural
     certify_rate: Annotated[float, Range(1e-9, 1)] | None = None
+    seeds: tuple[Natural, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -438,12 +441,13 @@ class ClaimMade:
     """A claim about an environment: about what is left, or, if `without` is a model, about that without it.
 
     `shown` of `runs` showed f, `low`..`high` is their interval; `outcomes` counts all of them. What is left keeps at least `bound`
-    of the rate; without a model f shows at most `bound` times as often as with it.
+    of the rate; without a model f shows at most `bound` times as often as with it. A claim about the runs themselves, not about a
+    rate, has their share as both ends of the interval.
     """
 
     without: Natural | None
     environment: Natural
-    verdict: Annotated[str, OneOf("kept", "lost", "needed", "helps", "not needed", "not shown", "unknown")]
+    verdict: Annotated[str, OneOf("kept", "lost", "exact", "needed", "helps", "not needed", "not shown", "unknown")]
     shown: Natural
     runs: Natural
     low: Share

@@ -24,6 +24,7 @@ def certificate_started(state: RunState, event: e.CertificateStarted, _: float) 
         at_least=event.at_least,
         certify_rate=event.keep_rate if event.certify_rate is None else event.certify_rate,
         branch=origin(state, state.node).parent is not None,
+        seeds=event.seeds,
     )
     if certificate.number != len(state.certificates) + 1:
         raise ValueError(certificate.number)

@@ -102,7 +102,7 @@ class Certificate:
     which was estimated as `rate`; the search aimed at `keep_rate`. All claims together are wrong with a probability of at most
     `error`. What is left is run `at_least` so often. `claims` are empty while its tests are made. `past`: a search began since.
     `branch`: the environment is in a branch whose f is another failure, so that the rate where that branch begins stands for the
-    whole world's.
+    whole world's. With `seeds`, on which what is left shows f, it claims what chosen runs of the search show, and asks for no rate.
     """
 
     number: int
@@ -116,16 +116,19 @@ class Certificate:
     claims: tuple[Claim, ...] = ()
     past: bool = False
     branch: bool = False
+    seeds: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
     """One claim of a certificate: about what is left, or, if `without` is a model, about that without it.
 
-    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; a model is "needed" (without it f is rare enough), "helps" (f
-    is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide, "unknown" if they broke. `shown` of `runs`
-    showed f; `outcomes` has the number of each outcome. `low`..`high` is the 95 % interval of the rate, 0..1 without runs. What is
-    left keeps at least `bound` of the rate; without a model f shows at most `bound` times as often as with it. None is not known.
+    `verdict`: what is left is "kept" (it keeps the rate), "lost", or "exact" (its rate was only measured); a model is "needed"
+    (without it f is rare enough), "helps" (f is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide,
+    "unknown" if they broke. `shown` of `runs` showed f; `outcomes` has the number of each outcome. `low`..`high` is the 95 %
+    interval of the rate, 0..1 without runs. What is left keeps at least `bound` of the rate; without a model f shows at most
+    `bound` times as often as with it. None is not known.
+    A claim that `is_exact` is about these runs of the search, and about no rate.
     """
 
     without: str | None
@@ -137,6 +140,10 @@ class Claim:
     outcomes: tuple[tuple[str, int], ...] = ()
     environment: int = 0
     bound: float | None = None
+
+    @property
+    def is_exact(self) -> bool:
+        return self.low == self.high
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,11 @@ class Settings(Reduction, Failure):
         for one in SETTINGS.values():
             setattr(self, one.name, read(scenario, one))
 
+    @property
+    def most_runs(self) -> int:
+        """How many runs without f, and none with it, a candidate may have."""
+        return self.exact_seeds if self.accept_rate == "exact" else 1 + self.iterations
+
 
 def settings(state: RunState) -> Settings:
     """What the run is asked to do now."""

@@ -14,6 +14,8 @@ def purpose(state: RunState, test: Test) -> str:
     row = made_for(state, test)
     if row is not None:
         return f"{f'round {test.round} · ' if isinstance(row, Candidate) else ''}{row.label}"
+    if test.phase == "round" and test.candidate is None:
+        return "what is left, with a chosen seed"
     if test.phase == "round":
         return f"round {test.round}"
     if test.phase == "audit":

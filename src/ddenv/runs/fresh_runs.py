@@ -68,13 +68,13 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     claims = {claim.without: claim for claim in certificate.claims}
     # Stacks that are kept together are named by their first models. Where the rate is lost, nothing is claimed of removals.
     free = (stack[0] for stack in stacks_of(state, state.environment) if state.pinned.isdisjoint(stack))
-    removals = [name for name in free if not claims or name in claims]
+    removals = [name for name in free if name in claims or not (claims or certificate.seeds)]
     keys = [(certificate.node, None), *((certificate.node, name) for name in removals)]
     first = origin(state, certificate.node).number
     earlier = sorted((key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0])
     keys += earlier
     # A finished certificate need not have run the whole world.
-    if certificate.node != first and (not claims or (first, None) in tests):
+    if certificate.node != first and (not (claims or certificate.seeds) or (first, None) in tests):
         keys.append((first, None))
     found = [_of(key, tests.get(key, []), claims.get(key[1]) if key[0] == certificate.node else None) for key in keys]
     bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
+from ddenv.evidence.certificate import RUNS_BESIDE
 from ddenv.evidence.certificate_cost import certificate_tests
 from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
@@ -30,6 +31,8 @@ SCALE = {
 RERUN, FEWER, MORE = 0.75, 0.35, 2.3
 # Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is to be kept.
 FEWEST_MISSES = 2
+# Tests of a search that keeps the rate grow with this power of 1 / rate: 70, 117, 237 and 342 for rates of 1, .8, .5 and .32.
+RARER, LEAST_RATE = 1.5, 0.02
 # How many models are left, if nothing is known.
 SURVIVORS = 3
 # How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the rubble 27 to 34 of 36, among 5,000
@@ -80,7 +83,9 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
-    certificate = certificate_tests(rate, settings(state).certify_rate, left, baseline.runs, baseline.runs)
+    asked = settings(state)
+    certificate = certificate_tests(rate, asked.certify_rate, left, baseline.runs, baseline.runs)
+    certificate = (RUNS_BESIDE,) * 3 if asked.accept_rate == "exact" else certificate
     search = (max(0, each - done) for each in forecast.tests)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
@@ -143,8 +148,9 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
     of the world: `TOOK_PART` is how many models these were in the bundled worlds of 25 to 43 models and in one of 5,000: few,
     usual, many. Without slices every model is searched, and each test counts as long as one of the whole world.
     """
-    runs = 1 + asked.iterations
-    runs = runs if asked.accept_rate == "first" else min(runs, FEWEST_MISSES)
+    runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
+        asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
+    )
     slices = slices and asked.slice
     searched = [min(models, most) if slices else models for most in TOOK_PART]
     few, usual, many = (rough_tests(each, asked.algorithm, runs, asked.growth == "paper") for each in searched)
@@ -154,4 +160,9 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
         rate, seen = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1), 0
     certificate = certificate_tests(rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
     search = few[0], usual[1], many[2]
+    if asked.accept_rate == "exact":
+        certificate = (RUNS_BESIDE,) * 3
+    elif asked.accept_rate == "kept":
+        low, likely, high = (round(each * max(rate, LEAST_RATE) ** -RARER) for each in search)
+        search = low, likely, high
     return Rough(asked.baseline_runs, search, certificate, SHARE if slices else (1.0, 1.0, 1.0))

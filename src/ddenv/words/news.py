@@ -18,7 +18,6 @@ from ddenv.evidence.claims import (
 from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
 from ddenv.runfile.events import DEEDS, BaselineFinished, deed
 from ddenv.runfile.progress import Removal
-from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
 from ddenv.text import count, first_of
 
@@ -126,6 +125,8 @@ def _engine(kind: str, before: RunState, after: RunState) -> str:
             return f"engine started{resumed}{workers}; {count(len(after.elements), 'model')} can be removed"
         case "cluster":
             return after.cluster
+        case "comparing" if after.physics.now == after.physics.proven:
+            return "a failing run is made again with its seed, to see whether it repeats"
         case "comparing":
             return (
                 f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
@@ -151,6 +152,8 @@ def _certificate(kind: str, after: RunState) -> str:
     match kind:
         case "certificate_started":
             what = f"fresh runs of what is left ({models}), without each model, and of the whole world"
+            if last.seeds:
+                what = f"the chosen seeds show what is left ({models}); fresh runs show how often f shows with others"
             return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
         case "certificate_finished":
             return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
@@ -226,7 +229,7 @@ def baseline(state: RunState) -> str:
     others = f"; {also} (--failure reduces another one)" if (also := other_failures(found)) else ""
     return (
         f"baseline: f in {found.failures} of {found.runs} runs ({found.rate:.0%}, 95 % interval {found.low:.0%} to "
-        f"{found.high:.0%}){broke}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m{others}; {iterations(state)}"
+        f"{found.high:.0%}){broke}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m{others}; {missed(state)}"
     )
 
 
@@ -247,14 +250,3 @@ def _endings(state: RunState, one: Candidate | Trial | Removal) -> str:
     tests = (state.tests[id - 1] for id in one.tests if 0 < id <= len(state.tests))
     endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
     return f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
-
-
-def iterations(state: RunState) -> str:
-    """The chance that all runs of a candidate miss f, and how many are enough; "" before the baseline is finished."""
-    found, given = state.baseline, settings(state).iterations
-    if found is None:
-        return ""
-    line = f"the chance that {count(1 + given, 'run')} of a candidate miss f is {missed(state)}"
-    if found.iterations_95 > given:
-        line += f"; a 95 % chance to see f needs --iterations {found.iterations_95}"
-    return line

@@ -196,8 +196,8 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     # More runs are made of what shows f until it is clear that it keeps the rate.
     options = settings(snapshot.state)
     # What has a verdict needs no more.
-    enough = options.accept_rate != "first" or (item.verdict and len(done) <= options.iterations)
-    most = "" if enough else f"/{1 + options.iterations}"
+    enough = options.accept_rate == "kept" or (item.verdict and len(done) < options.most_runs)
+    most = "" if enough else f"/{options.most_runs}"
     return {
         "environment": item.label,
         "runs": str(len(done)) if done else "",
@@ -278,6 +278,7 @@ def certificate_title(state: RunState) -> tuple[str, str]:
     number = f" {certificate.number}" if certificate.number > 1 else ""
     left, aim = fresh_runs(state)[0], percent(certificate.certify_rate)
     keeps = f"keeps {left.shows_at_least}, aim {aim}" if left.shows_at_least else f"has to show {aim}"
+    keeps = "chosen seeds" if certificate.seeds else keeps
     far = (
         made_of_usual(state, certificate) if in_the_making(state) else count(fresh_runs_made(state, certificate), "run")
     )

@@ -1,4 +1,4 @@
-"""Changing how a run goes on: the pair, the algorithm, re-runs and the budget."""
+"""Changing how a run goes on: the pair, the algorithm, when a candidate is taken, re-runs and the budget."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from ddenv.guiding.situation import Situation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
-from ddenv.settings import Value
+from ddenv.settings import Setting, Value
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.methods import KINDS, note, paragraph
 from ddenv.workbench.widgets.entry import Entry
 
 # Beside the pair and the algorithm, which have lists.
-NUMBERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "method")
+OTHERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "method")
 
 
 class Change(ModalScreen[course.Change | None]):
@@ -48,7 +48,7 @@ class Change(ModalScreen[course.Change | None]):
             "partitioning": partitioning,
             "prioritization": prioritization,
         }
-        now = {one.name: getattr(options, one.name) for one in NUMBERS}
+        now = {one.name: getattr(options, one.name) for one in OTHERS}
         self._texts = {name: "" if value is None else str(value) for name, value in now.items()}
 
     def compose(self) -> ComposeResult:
@@ -59,10 +59,10 @@ class Change(ModalScreen[course.Change | None]):
                         yield Static(kind, classes="label", markup=False)
                         yield self._select(kind)
                     yield Static("", id=f"{kind}-meaning", classes="meaning", markup=False)
-                for one in NUMBERS:
+                for one in OTHERS:
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
-                        yield Entry(self._texts[one.name], id=one.name)
+                        yield self._field(one)
                     empty = "; empty: no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)
@@ -78,6 +78,13 @@ class Change(ModalScreen[course.Change | None]):
             [(Text(plain(name)), name) for name in known], value=now, allow_blank=False, id=kind, compact=True
         )
 
+    def _field(self, one: Setting) -> Select[str] | Entry:
+        now = self._texts[one.name]
+        if one.choices:
+            names = [(name, name) for name in one.choices]
+            return Select(names, value=now, allow_blank=False, id=one.name, compact=True)
+        return Entry(now, id=one.name)
+
     @on(Select.Changed)
     def _explain(self) -> None:
         algorithm = str(self.query_one("#algorithm", Select).value)
@@ -86,13 +93,17 @@ class Change(ModalScreen[course.Change | None]):
             words = note(kind, algorithm) or paragraph(kind, name)
             self.query_one(f"#{kind}-meaning", Static).update(Text(words))
 
+    def _text(self, one: Setting) -> str:
+        field = self.query_one(f"#{one.name}", Select) if one.choices else self.query_one(f"#{one.name}", Input)
+        return str(field.value)
+
     def _command(self) -> course.Change:
         """The command for the settings in the dialog. Raises UserError, which begins with the name of the wrong field."""
         kinds = {kind: str(self.query_one(f"#{kind}", Select).value) for kind in KINDS}
         asked: dict[str, Value] = {
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",
             "algorithm": kinds["algorithm"],
-            **{one.name: course.number(one.name, self.query_one(f"#{one.name}", Input).value) for one in NUMBERS},
+            **{one.name: course.typed(one.name, self._text(one)) for one in OTHERS},
         }
         command = course.Change(course.Change(asked).new(self._state))
         if why := command.refusal(Situation(self._state)):
@@ -106,7 +117,7 @@ class Change(ModalScreen[course.Change | None]):
         except UserError as error:
             self.query_one("#wrong", Static).update(Text(str(error)))
             field = str(error).partition(":")[0]
-            if any(field == one.name for one in NUMBERS):
+            if any(field == one.name for one in OTHERS):
                 self.query_one(f"#{field}", Input).focus()
             return
         self.dismiss(command)

@@ -90,7 +90,7 @@ def _happening(snapshot: Snapshot) -> Happening:
     return _with_pause(state, _testing(snapshot, state.round, options))
 
 
-def baseline_sentence(state: RunState, iterations: int) -> str:
+def baseline_sentence(state: RunState) -> str:
     """How often the whole world fails, with Wilson's interval, and what that means for flaky candidates."""
     base = state.baseline
     if base is None:
@@ -104,9 +104,8 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
         sentence += f" {also[:1].upper()}{also[1:]}."
     if base.rate >= 1.0:
         return sentence
-    tests = count(1 + iterations, "test")
-    need = "" if base.iterations_95 <= iterations else f"; for 95 % certainty set iterations to {base.iterations_95}"
-    return f"{sentence} The chance that {tests} of a candidate all miss f is {missed(state)}{need}."
+    words = missed(state)
+    return f"{sentence} {words[:1].upper()}{words[1:]}."
 
 
 def _with_pause(state: RunState, happening: Happening) -> Happening:
@@ -185,7 +184,7 @@ def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
     arrived = arrival(state)
     if arrived:
         return (arrived, first)
-    then = baseline_sentence(state, options.iterations) if state.round is None else follows(options, state.round)
+    then = baseline_sentence(state) if state.round is None else follows(options, state.round)
     return (first, then) if then else (first,)
 
 
@@ -224,25 +223,26 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
         return "next", (*last_reduction(state), _next(state, candidate, place, options))
     # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
     test = running[0]
-    sentences = _first_run(place, options) if test.run == 0 else _rerun(state, candidate, test, place, options)
+    first = not _number(candidate, test)
+    sentences = _first_run(place, options) if first else _rerun(state, candidate, test, place, options)
     if beside := len(running) - 1:
         sentences = (*sentences, f"Idle workers make {count(beside, 're-run')} of it at the same time.")
     if ahead:
         sentences = (*sentences, f"Idle workers test {count(ahead, 'later candidate')} at the same time.")
-    return "test" if test.run == 0 else "rerun", sentences
+    return "test" if first else "rerun", sentences
 
 
 def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
     if shown := _shown_of(state, candidate):
-        if options.accept_rate == "first" and _last(state, candidate) == _last(state, candidate, "similar"):
+        if options.accept_rate != "kept" and _last(state, candidate) == _last(state, candidate, "similar"):
             return f"{place}: {shown}, and the first time decides."
         return f"Next is one more run of {place}: {shown}."
     if not candidate.tests:
         return f"Next is {place}."
-    if len(candidate.tests) > options.iterations:
+    if len(candidate.tests) >= options.most_runs:
         return f"f did not show in {count(len(candidate.tests), 'test')} of {place}."
     again = _why_again(_last(state, candidate))
-    return f"Next is re-run {len(candidate.tests)} of {options.iterations} of {place}: {again}"
+    return f"Next is re-run {len(candidate.tests)} of {options.most_runs - 1} of {place}: {again}"
 
 
 def _place(candidate: Candidate, current: Round, options: Settings) -> str:
@@ -265,18 +265,23 @@ def _first_run(place: str, options: Settings) -> tuple[str, ...]:
 def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, options: Settings) -> tuple[str, ...]:
     if shown := _shown_of(state, candidate):
         return (
-            f"Run {test.run + 1} of {place}: {shown}.",
+            f"Run {_number(candidate, test) + 1} of {place}: {shown}.",
             "It is taken once its runs show that it keeps the rate of f, and given up once that is unlikely.",
         )
     before = _last(state, candidate)
     return (
-        f"Re-run {test.run} of {options.iterations} of {place}: {_why_again(before)}",
-        f"A failure can be flaky: a candidate is dissimilar {_enough(options)} {count(1 + options.iterations, 'test')} without f.",
+        f"Re-run {_number(candidate, test)} of {options.most_runs - 1} of {place}: {_why_again(before)}",
+        f"A failure can be flaky: a candidate is dissimilar {_enough(options)} {count(options.most_runs, 'test')} without f.",
     )
 
 
+def _number(candidate: Candidate, test: Test) -> int:
+    """The place of a test among those of its candidate, from 0. Its run number differs where chosen runs are repeated."""
+    return candidate.tests.index(test.id) if test.id in candidate.tests else test.run
+
+
 def _enough(options: Settings) -> str:
-    return "only after" if options.accept_rate == "first" else "after at most"
+    return "after at most" if options.accept_rate == "kept" else "only after"
 
 
 def _shown_of(state: RunState, candidate: Candidate) -> str:
@@ -320,10 +325,10 @@ def _nothing_found(state: RunState, current: Round, options: Settings) -> tuple[
 
 
 def _finished(state: RunState) -> Happening:
-    options, kept = settings(state), count(len(state.environment), "model")
+    kept = count(len(state.environment), "model")
     if state.baseline is None:
         return None, (_reason(state, "The run ended in the baseline."),)
-    base = baseline_sentence(state, options.iterations)
+    base = baseline_sentence(state)
     if not state.certified:
         left = f"{kept} left: {_names(state)}."
         return "returned", (_reason(state, "The run ended early."), *out_of_budget(state), left)
@@ -398,7 +403,7 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
         return (_after(certificate), *_now(snapshot, certificate))
     made = fresh_runs_made(state, certificate)
     return (
-        _bar(state, certificate),
+        *(() if certificate.seeds else (_bar(state, certificate),)),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
         f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
         *_so_far(state),

@@ -48,13 +48,14 @@ def _can_be_adopted(state: RunState, trial: Trial) -> bool:
 
 
 def _under_way(state: RunState, trial: Trial) -> str:
-    most = 1 + settings(state).iterations
+    most = settings(state).most_runs
     tests = [state.tests[id - 1] for id in trial.tests if 0 < id <= len(state.tests)]
     running = next((test for test in tests if test.outcome == "running"), None)
     what = f"{trial.label} ({count(trial.size, 'model')})"
     if running is None:
         return f"{what} is the next test, before the round goes on."
-    again = f"re-run {running.run} of {most - 1}" if running.run else "first run"
+    number = tests.index(running)
+    again = f"re-run {number} of {most - 1}" if number else "first run"
     return f"{what} is being tested: {again}."
 
 

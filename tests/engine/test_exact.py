@@ -1,0 +1,135 @@
+"""Chosen runs reduced exactly: what is left fails with a chosen seed, and with none of them without any one model."""
+
+import tempfile
+from pathlib import Path
+from zlib import crc32
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.errors import UserError
+from ddenv.evidence.claims import is_minimal, promise
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import CERTIFY
+from ddenv.runfile.store import RunFile
+from ddenv.schemas import names
+from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.killing import Killed, kill_after, story
+from tests.engine.participation import MODELS, Participation, sliced_run
+from tests.tiers import examples
+
+
+def chaotic(salt):
+    """Some runs of any world show f, with no order among worlds; of the whole one, most do."""
+
+    def oracle(keep, seed):
+        draw = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10
+        return "similar" if draw < (6 if len(keep) == len(ELEMENTS) else 4) else "other" if draw < 6 else "pass"
+
+    return oracle
+
+
+def exact_run(folder, **reduction):
+    return new_run(Path(folder), accept_rate="exact", **reduction)
+
+
+def chosen_seeds(state, most):
+    baseline = [test for test in state.tests if test.phase == "baseline"]
+    return [test.seed for test in baseline if test.outcome == "similar"][:most]
+
+
+@given(
+    salt=st.integers(0, 10**6),
+    most=st.integers(1, 5),
+    algorithm=st.sampled_from(sorted(names("algorithm"))),
+    jobs=st.integers(1, 4),
+)
+def test_the_end_fails_with_a_chosen_seed_and_with_none_without_any_one_model(salt, most, algorithm, jobs):
+    oracle = chaotic(salt)
+    with tempfile.TemporaryDirectory() as folder:
+        state = drive(exact_run(folder, exact_seeds=most, algorithm=algorithm), FakePool(oracle, jobs, salt))
+    if state.baseline is None:
+        return
+    seeds, left = chosen_seeds(state, most), frozenset(state.environment)
+    certificate = state.certificate
+    assert set(certificate.seeds) <= set(seeds)
+    assert certificate.seeds
+    assert all(oracle(left, seed) == "similar" for seed in certificate.seeds)
+    assert not any(oracle(left - {name}, seed) == "similar" for name in left for seed in seeds)
+    assert state.minimal
+    assert is_minimal(certificate)
+    end, *removals = certificate.claims
+    assert [(claim.without, claim.shown, claim.runs) for claim in removals] == [
+        (name, 0, len(seeds)) for name in state.environment
+    ]
+    # Fresh runs say how often it fails with other seeds.
+    fresh = [test for test in state.tests if test.phase == CERTIFY]
+    assert len(fresh) == end.runs == 20
+    assert end.shown == sum(oracle(left, test.seed) == "similar" for test in fresh)
+    assert not {test.seed for test in fresh} & {test.seed for test in state.tests if test.phase != CERTIFY}
+
+
+@given(salt=st.integers(0, 20), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@examples(0.2)
+def test_killed_at_any_moment_and_with_any_workers_it_comes_to_the_same_end(salt, moments, jobs):
+    with tempfile.TemporaryDirectory() as folder:
+        undisturbed = drive(exact_run(folder), FakePool(chaotic(salt), 1))
+        path = exact_run(folder)
+        for moment in moments:
+            try:
+                drive(path, FakePool(chaotic(salt), jobs, moment), prepare=lambda file, after=moment: kill_after(file, after))
+            except Killed:
+                continue
+            break
+        with RunFile(path) as file:
+            state = fold(file.events())
+        if state.status != "finished":
+            state = drive(path, FakePool(chaotic(salt), jobs))
+    assert story(state) == story(undisturbed)
+
+
+NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(lambda names: tuple(sorted(names)))
+
+
+@given(salt=st.integers(0, 99), needed=NEEDED, tenths=st.sampled_from([4, 7, 10]))
+@examples(0.3)
+def test_slices_of_the_chosen_runs_save_tests_and_keep_the_promise(salt, needed, tenths):
+    simulator = Participation(salt=salt, needed=needed, tenths=tenths)
+    with tempfile.TemporaryDirectory() as folder:
+        state = drive(sliced_run(Path(folder), accept_rate="exact"), simulator.pool())
+    if state.baseline is None:
+        return
+    seeds, left = chosen_seeds(state, 4), frozenset(state.environment)
+    assert state.minimal
+    assert state.refuted is None
+    assert all(simulator.outcome(left, seed) == "similar" for seed in state.certificate.seeds)
+    assert not any(simulator.outcome(left - {name}, seed) == "similar" for name in left for seed in seeds)
+
+
+def test_a_simulator_that_does_not_repeat_is_refused(tmp_path):
+    pool = FakePool(lambda keep, seed: "similar", 2)
+    # Each run ends a hair to the side of the last one: within epsilon of f, but not the same.
+    pool.aside = lambda keep, seed: 1e-9 * len(pool.made)
+    with pytest.raises(UserError, match=r"accept_rate: exact needs runs that repeat, and run 1 of the whole world"):
+        drive(exact_run(tmp_path), pool)
+
+
+def test_that_runs_repeat_is_asked_once(tmp_path):
+    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep else "pass", 1)
+    state = drive(exact_run(tmp_path), pool)
+    assert pool.made.count((frozenset(ELEMENTS), 0)) == 2
+    assert promise(state, state.certificate).startswith(
+        "minimal means: f shows with seeds 0, 1, 2 each time; without wall it shows with none of the 3 chosen seeds; "
+    )
+
+
+def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_path):
+    def notes(tenths):
+        oracle = lambda keep, seed: "similar" if "wall" in keep and seed % 10 < tenths else "pass"  # noqa: E731
+        return dict(drive(new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 1)).notes)
+
+    assert "rare" not in notes(7)
+    words = notes(5)["rare"]
+    assert words.startswith("f shows in 5 of 10 runs: to keep its rate takes about ")
+    assert words.endswith("change accept_rate to exact, or run with --exact")
