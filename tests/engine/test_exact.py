@@ -78,7 +78,11 @@ def test_killed_at_any_moment_and_with_any_workers_it_comes_to_the_same_end(salt
         path = exact_run(folder)
         for moment in moments:
             try:
-                drive(path, FakePool(chaotic(salt), jobs, moment), prepare=lambda file, after=moment: kill_after(file, after))
+                drive(
+                    path,
+                    FakePool(chaotic(salt), jobs, moment),
+                    prepare=lambda file, after=moment: kill_after(file, after),
+                )
             except Killed:
                 continue
             break

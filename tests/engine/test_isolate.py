@@ -6,6 +6,7 @@ import time
 from contextlib import suppress
 from itertools import permutations
 from pathlib import Path
+from zlib import crc32
 
 import pytest
 from hypothesis import given
@@ -17,6 +18,7 @@ from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import FEWEST_RUNS, FIRST_RUN, isolate
 from ddenv.engine.journal import Journal
+from ddenv.evidence.claims import is_nearest
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import ISOLATE
 from ddenv.runfile.store import RunFile
@@ -306,3 +308,26 @@ def test_a_model_that_fresh_runs_show_may_stay_is_put_back(tmp_path):
     assert removed(state) == {"beam"}
     assert [claim.verdict for claim in state.isolated.checks[-1].claims] == ["passes", "needed"]
     assert len(state.isolated.checks) > 1
+
+
+@given(salt=st.integers(0, 10**6), most=st.integers(1, 4), jobs=st.integers(1, 3))
+def test_where_chosen_runs_are_reduced_they_pass_and_one_fails_with_any_one_model_put_back(salt, most, jobs):
+    def oracle(keep, seed):
+        draw = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10
+        return "pass" if not keep or draw < 4 else "similar"
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = new_run(Path(folder), accept_rate="exact", exact_seeds=most)
+        before = drive(path, FakePool(oracle, jobs, salt))
+        if before.baseline is None:
+            return
+        state = work(path, FakePool(oracle, jobs, salt))
+    one, gone = state.isolated, removed(state)
+    passing, baseline = frozenset(ELEMENTS) - gone, [test for test in state.tests if test.phase == "baseline"]
+    seeds = [test.seed for test in baseline if test.run in one.chosen]
+    assert len(seeds) == len(one.chosen) <= most
+    assert all(oracle(frozenset(ELEMENTS), seed) == "similar" for seed in seeds)
+    assert all(oracle(passing, seed) == "pass" for seed in seeds)
+    assert all(any(oracle(passing | {name}, seed) != "pass" for seed in seeds) for name in gone)
+    assert is_nearest(one)
+    assert one.checks[-1].claims[0].runs == FEWEST_RUNS

@@ -95,6 +95,7 @@ def certificate(state: RunState) -> dict[str, Any] | None:
         "keep_rate": found.keep_rate,
         "certify_rate": found.certify_rate,
         "error": found.error,
+        "seeds": list(found.seeds),
         "minimal": is_minimal(found),
         "minimal_but_for": list(helping(found)),
         "never_left_out": never_left_out(state, found),

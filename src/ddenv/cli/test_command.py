@@ -133,14 +133,18 @@ def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust
 
     path = find_run(run)
     subject = subject_in(path, folder)
-    claim = expected(subject, path)
+    certificate = expected(subject, path)
+    claim = certificate.claims[0]
     check_trusted(subject.scenario, path, asking(trust))
-    for result, so_far in reproduce(subject, claim.low, most, jobs):
+    for result, so_far in reproduce(subject, certificate, most, jobs):
         found = so_far
         if not as_json:
             print(line(result), flush=True)
     if as_json:
         print(json.dumps(asdict(found) | {"expected": {"low": claim.low, "high": claim.high}}))
     else:
-        print(f"{found}; {percent(claim.low)} to {percent(claim.high)} expected")
+        wanted = (
+            "each run with a chosen seed" if certificate.seeds else f"{percent(claim.low)} to {percent(claim.high)}"
+        )
+        print(f"{found}; {wanted} expected")
     return {True: FAILS, False: PASSES, None: CANNOT_SAY}[found.fails]

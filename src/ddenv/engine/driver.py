@@ -30,6 +30,7 @@ from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
+from ddenv.runfile.fold_decisions import exact_runs
 from ddenv.runfile.progress import Certificate, Leg, Node
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
@@ -151,7 +152,7 @@ class Driver:
     def _check_repeats(self) -> None:
         """Raises UserError if the first search that reduces chosen runs exactly begins, and one of them does not repeat."""
         journal = self._journal
-        exact, last = journal.exact_runs(), journal.state.leg
+        exact, last = exact_runs(journal.state), journal.state.leg
         if not exact or (last is not None and last.settings["accept_rate"] == "exact"):
             return
         test = journal.test(journal.whole, exact[0])
@@ -168,7 +169,7 @@ class Driver:
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        asked, exact = self._reduction, journal.exact_runs()
+        asked, exact = self._reduction, exact_runs(journal.state)
         rule = (
             Acceptance(len(exact), exact=exact)
             if exact

@@ -12,10 +12,11 @@ from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, anytime_interval
 from ddenv.reduction.chance import distances_to_failure
-from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Passing, isolation
+from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Each, Passing, isolation
 from ddenv.reduction.procedure import Judged, NamedClaim, Wants
 from ddenv.reduction.stacks import Stacks
 from ddenv.runfile import events
+from ddenv.runfile.fold_decisions import exact_runs
 from ddenv.runfile.progress import Isolation
 from ddenv.runfile.state import BROKEN, FRESH_RUNS
 from ddenv.runfile.supports import stacks_of
@@ -64,6 +65,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     least = at_least or max(FEWEST_RUNS, reduction.baseline_runs)
     last = state.isolations[-1] if state.isolations else None
     suspects, size = _suspects(world, journal, reduction)
+    chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
     journal.record(
         events.IsolationStarted(
             isolation=len(state.isolations) + 1,
@@ -77,6 +79,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
             suspects=suspects,
             size=size,
             before=before,
+            chosen=chosen,
         )
     )
 
@@ -114,7 +117,7 @@ class _Isolator:
             suspects=tuple(model for name in now.suspects for model in journal.models([name])),
             stacks=_free(journal),
             size=now.size,
-            rule=Passing(now.wanted, now.rather_than),
+            rule=Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than),
             keep_rate=now.keep_rate,
             at_least=now.at_least,
             first_run=now.first_run,
@@ -164,7 +167,7 @@ class _Isolator:
         verdict = VERDICTS[step.verdict]
         known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
         if next(known, "") != verdict:
-            tests = journal.tests(step.environment, range(step.runs), full=True)
+            tests = journal.tests(step.environment, map(self._asked.rule.run, range(step.runs)), full=True)
             journal.record(events.RemovalJudged(number, verdict, tests))
 
     def _check(self, check: Checked) -> None:
@@ -181,9 +184,9 @@ class _Isolator:
         journal.record(events.IsolationChecked(environment, claims, tuple(sorted(rests_on))))
 
     def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
-        shown = [self.shown(named.environment, first + run) for run in named.runs]
+        shown = [self.shown(named.environment, run) for run in named.exact or [first + run for run in named.runs]]
         runs, reached = sum(type(one) is bool for one in shown), sum(one is True for one in shown)
-        interval = anytime_interval(reached, runs)
+        interval = (reached / max(1, runs),) * 2 if named.exact else anytime_interval(reached, runs)
         return events.ReturnedMade(named.model, named.claim.verdict, reached, runs, *interval)
 
     def _known_checks(self) -> list[Checked]:

@@ -13,7 +13,6 @@ from ddenv.evidence.slices import Ties, implies
 from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, FIRST_FRESH_RUN, FRESH_RUNS, ISOLATE, Round, RunState, Test
 from ddenv.runfile.store import Motions, RunFile, uncollected
 from ddenv.runfile.supports import stack_with
@@ -189,14 +188,6 @@ class Journal:
             self._ties = state.ties, Ties.among(self.pairs(state.ties))
         return self._ties[1]
 
-    @property
-    def rested_on(self) -> tuple[Test, ...]:
-        """The tests that decisions rest on, without those that only ran ahead of time."""
-        state, began = self.state, self.state.baseline is not None
-        return tuple(
-            test for test in state.tests if state.rests_on >> test.id & 1 or (began and test.phase == "baseline")
-        )
-
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         whole, state = self._numbers[self.whole], self.state
@@ -211,14 +202,6 @@ class Journal:
                 tests.append(test)
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
-
-    def exact_runs(self) -> tuple[int, ...]:
-        """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
-        asked, whole = settings(self.state), self._numbers[self.whole]
-        if asked.accept_rate != "exact":
-            return ()
-        runs = (test.run for test in self.rested_on if test.environment == whole and test.outcome == "similar")
-        return tuple(sorted({run for run in runs if run < FIRST_FRESH_RUN})[: asked.exact_seeds])
 
     @property
     def fresh_run(self) -> int:

@@ -15,7 +15,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
 from ddenv.robot.oracle import Failure
-from ddenv.runfile.progress import Claim
+from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import Subject, read_subject
@@ -165,35 +165,40 @@ def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool)
     if trusted and (program := untrusted(subject.scenario)):
         trust(program)
     check_trusted(subject.scenario, run)
-    *_, (_, found) = reproduce(subject, expected(subject, run).low, most, jobs)
+    *_, (_, found) = reproduce(subject, expected(subject, run), most, jobs)
     return found
 
 
-def expected(subject: Subject, where: object) -> Claim:
-    """What the certificate says of all that is left. Raises UserError where there is none, or where it showed no failure."""
+def expected(subject: Subject, where: object) -> Certificate:
+    """The certificate of all that is left. Raises UserError where there is none, or where it showed no failure."""
     found = None if subject.state is None else current(subject.state)
     if found is None:
         raise UserError(
             f"{where}: no certificate says how often what is left fails; make one first: ddenv certify {where}"
         )
-    if not found.claims[0].low:
+    if not found.claims[0].low and not found.seeds:
         raise UserError(f"{where}: no fresh run of what is left showed f, so there is nothing to reproduce")
-    return found.claims[0]
+    return found
 
 
-def reproduce(subject: Subject, rate: float, most: int, jobs: int) -> Iterator[tuple[dict[str, Any], Reproduction]]:
-    """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at `rate`.
+def reproduce(
+    subject: Subject, certificate: Certificate, most: int, jobs: int
+) -> Iterator[tuple[dict[str, Any], Reproduction]]:
+    """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
+    expects at least. Where chosen runs were reduced it runs their seeds, of which each has to show f.
 
     Yields each run's result, and what all of them show together.
     """
     shown: list[bool] = []
-    broken = 0
-    for result in run_trials(subject, plan(subject, minimal=True, seed=FIRST_SEED, repeat=most), jobs):
+    broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
+    trials = [trial for seed in seeds for trial in plan(subject, minimal=True, seed=seed)]
+    for result in run_trials(subject, trials or plan(subject, minimal=True, seed=FIRST_SEED, repeat=most), jobs):
         if result["outcome"] in BROKEN:
             broken += 1
         else:
             shown.append(result["outcome"] == "similar")
-        fails = shows_at(shown, rate)
+        exact = None if all(shown) and len(shown) < len(seeds) else all(shown)
+        fails = exact if seeds else shows_at(shown, rate)
         yield result, Reproduction(fails, sum(shown), len(shown), broken)
         if fails is not None or broken > MOST_BROKEN:
             return

@@ -14,6 +14,7 @@ from ddenv.reduction.procedure import Test as Wanted
 from ddenv.reduction.stacks import Stacks
 from ddenv.runfile.events import Sliced, SlicesRefuted
 from ddenv.runfile.fold_claims import rests_on_slices
+from ddenv.runfile.fold_decisions import exact_runs, rested_on
 from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
 from ddenv.runfile.supports import stacks_of
 from ddenv.settings import SETTINGS, read
@@ -64,8 +65,8 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
     """
     tests: list[Test] = []
     met: dict[int, Environment] = {}
-    ties, exact = journal.ties, journal.exact_runs()
-    for test in journal.rested_on:
+    ties, exact = journal.ties, exact_runs(journal.state)
+    for test in rested_on(journal.state):
         if not test.is_finished or test.outcome in BROKEN:
             continue
         if exact and (test.run not in exact or test.outcome != "similar"):

@@ -83,7 +83,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
 def _exactly(certificate: Certificate) -> str:
     """What the chosen runs show: "f shows with seed 3 each time; without any one of these 4 models it does not"."""
     _, *removals = certificate.claims
-    shows = f"f shows with {_seeds(certificate)} each time"
+    shows = f"f shows with {seeds_of(certificate)} each time"
     if not removals:
         return f"{shows}; nothing is left that can be removed"
     names = f"any one of these {len(removals)} models" if len(removals) > 1 else removals[0].without
@@ -91,7 +91,7 @@ def _exactly(certificate: Certificate) -> str:
     return f"{shows}; without {names} it {f'shows with none of the {runs} chosen seeds' if runs > 1 else 'does not'}"
 
 
-def _seeds(certificate: Certificate) -> str:
+def seeds_of(certificate: Certificate) -> str:
     seeds = certificate.seeds
     return f"seed{'s' * (len(seeds) > 1)} {first_of([str(seed) for seed in seeds], MOST_NAMES)}"
 
@@ -226,7 +226,7 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
         else f"at most {percent(bound)} as often"
     )
     return {
-        "exact": f"f shows with {_seeds(certificate)} each time",
+        "exact": f"f shows with {seeds_of(certificate)} each time",
         "kept": f"keeps at least {percent(certificate.certify_rate if bound is None else bound)} of {rate}",
         "lost": f"keeps less than {percent(certificate.keep_rate)} of {rate}",
         "needed": f"needed: without it f shows {often}",
@@ -253,8 +253,8 @@ def of_passing(state: RunState, one: Isolation) -> str:
     gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
     names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
     if one.found is None:
-        return f"no world is shown to pass: without {names} {_reaching(first)}"
-    said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
+        return f"no world is shown to pass: without {names} {_reaching(one, first)}"
+    said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(one, first)}"
     for word, start in (
         ("unknown", "not shown that each of them has to go: tests broke with"),
         ("not shown", "not shown that each of them has to go: undecided with"),
@@ -265,6 +265,8 @@ def of_passing(state: RunState, one: Isolation) -> str:
             return f"{said}; {start} {first_of(found, MOST_NAMES)} put back"
     most = max(backs, key=lambda claim: claim.high)
     back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
+    if one.chosen:
+        return f"{said}; with {back} put back it misses its goal in a chosen run"
     return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most)}"
 
 
@@ -278,11 +280,14 @@ def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
     return frozenset(name for stack in stacks for name in stack)
 
 
-def _reaching(claim: Returned) -> str:
-    return f"the robot reaches its goal in {_share(claim)}"
+def _reaching(one: Isolation, claim: Returned) -> str:
+    chosen = f"each of {count(len(one.chosen), 'chosen run')} and in " if one.chosen else ""
+    return f"the robot reaches its goal in {chosen}{_share(claim)}"
 
 
 def _share(claim: Returned) -> str:
+    if claim.low == claim.high:
+        return f"{claim.reached} of {count(claim.runs, 'chosen run')}"
     interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
     return f"{claim.reached} of {count(claim.runs, 'fresh run')}{interval}"
 
@@ -359,7 +364,7 @@ def short(claim: Claim) -> str:
 def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
     if certificate.seeds:
-        return f"they say how often what is left shows f with other seeds than {_seeds(certificate)}"
+        return f"they say how often what is left shows f with other seeds than {seeds_of(certificate)}"
     aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
     return f"they have to show that what is left keeps {aim}, and that f is rarer without {_any_one(pinned)}"
 

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.evidence.certificate import Procedure, Terms, Wanted, error_of, falls
+from ddenv.evidence.certificate import Claim, Procedure, Terms, Wanted, error_of, falls, often
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import by_chunks
 from ddenv.reduction.guide import Search
@@ -66,6 +66,21 @@ class Passing:
 
 
 @dataclass(frozen=True)
+class Each:
+    """The rule where chosen runs are reduced exactly: a world passes if the robot reaches its goal in each of them."""
+
+    exact: tuple[int, ...]
+
+    def run(self, place: int) -> int:
+        """The number of the run at this place, from 0."""
+        return self.exact[place]
+
+    def verdict(self, shown: int, missed: int) -> Verdict:
+        """As `Passing.verdict`."""
+        return "dissimilar" if missed else "similar" if shown == len(self.exact) else ""
+
+
+@dataclass(frozen=True)
 class Checked:
     """A step: fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
 
@@ -88,7 +103,7 @@ class Asked:
     suspects: Partition
     stacks: Stacks
     size: int
-    rule: Passing
+    rule: Passing | Each
     keep_rate: float
     at_least: int
     first_run: int
@@ -145,20 +160,34 @@ def _search(
 def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step | Checked, Any, Checked]:
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing, error = asked.whole - removed, error_of(number + 1) / 2.0
-    backs = [model for model in asked.suspects if model in removed]
-    terms = Terms(asked.rule.wanted, asked.keep_rate, error)
+    backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}
+    rule, first = asked.rule, asked.first_run + number * asked.block
+    if isinstance(rule, Each):
+        claim = often(passing, asked.at_least)
+        (rate,) = yield from settled(driver, iter([(None, passing, claim)]), lambda _: False, first, "isolate")
+        # The search has made these runs.
+        named = (_exactly(driver, model, with_it, rule.exact) for model, with_it in backs.items())
+        return Checked(removed, (replace(rate, claim=replace(rate.claim, verdict="passes")), *named))
+    terms, certain = Terms(rule.wanted, asked.keep_rate, error), replace(rule, error=error)
 
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
-        yield None, passing, passes(passing, Passing(asked.rule.wanted, asked.rule.rather_than, error), asked.at_least)
-        for model in backs:
-            with_it = passing | asked.stacks.by_first[model]
+        yield None, passing, passes(passing, certain, asked.at_least)
+        for model, with_it in backs.items():
             yield model, with_it, falls(with_it, passing, terms, asked.keep_rate)
 
     def ends(claim: NamedClaim) -> bool:
         return claim.claim.verdict != "passes" if claim.model is None else claim.claim.verdict == "not needed"
 
-    first = asked.first_run + number * asked.block
     return Checked(removed, (yield from settled(driver, claims(), ends, first, "isolate")))
+
+
+def _exactly(driver: Runs, model: int, with_it: Environment, runs: tuple[int, ...]) -> NamedClaim:
+    """Whether the robot misses its goal in one of these runs once `model` is put back."""
+    known = tuple(run for run in runs if driver.shown(with_it, run, full=True) is not None)
+    missed = any(driver.shown(with_it, run, full=True) is False for run in known)
+    return NamedClaim(
+        model, with_it, Claim("needed" if missed else "not needed" if known == runs else "not shown"), known
+    )
 
 
 def isolating(suspects: Partition, first: int) -> Search:

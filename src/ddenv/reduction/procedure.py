@@ -34,8 +34,8 @@ MOST_STEPS_BACK = 14
 class Test:
     """Run number `run` of an environment. With `full` it runs to its end, even if the robot is stuck for good.
 
-    `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left), "certify" or "isolate"; "hand" and "audit" are tests that the
-    driver makes beside the procedure. `without` is the model that a fresh run leaves out.
+    `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left), "certify" or "isolate"; "hand" and
+    "audit" are tests that the driver makes beside the procedure. `without` is the model that a fresh run leaves out.
     """
 
     environment: Environment

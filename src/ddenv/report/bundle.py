@@ -13,7 +13,7 @@ from string import Template
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, rate
+from ddenv.evidence.claims import current, rate, seeds_of
 from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed
@@ -149,6 +149,7 @@ def _issue(record: Record, needs: list[str]) -> bytes:
         models="\n".join(models),
         reasons="\n".join(reasons),
         program=AGAIN,
+        how=f"with {seeds_of(found)}" if found.seeds else "with fresh seeds until they decide",
         needs=NEEDS,
         report=REPORT,
         run=RUN,

@@ -494,7 +494,8 @@ class IsolationStarted(Event):
     """The fewest models are sought that have to go from the whole world so that the robot reaches its goal.
 
     Fresh runs begin at number `run`; each check has `block` of them. A world passes at the rate `wanted` rather than `rather_than`.
-    The `suspects` go first to last, at first `size` of them. `before` is why the reduction had ended.
+    The `suspects` go first to last, at first `size` of them. `before` is why the reduction had ended. With `chosen` runs a world
+    passes if the robot reaches its goal in each of them, and fresh runs only say how often it does.
     """
 
     isolation: Number
@@ -508,6 +509,7 @@ class IsolationStarted(Event):
     suspects: tuple[Natural, ...]
     size: Natural
     before: str
+    chosen: tuple[Natural, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,6 +102,7 @@ def isolation_started(state: RunState, event: e.IsolationStarted, _: float) -> C
         suspects=tuple(map(state.elements.__getitem__, event.suspects)),
         size=event.size,
         before=event.before,
+        chosen=event.chosen,
     )
     sound = 0 < event.rather_than < event.wanted < 1
     if event.isolation != len(state.isolations) + 1 or not sound or state.baseline is None:

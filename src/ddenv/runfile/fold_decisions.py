@@ -9,7 +9,8 @@ from ddenv.environment import Environment
 from ddenv.runfile import events as e
 from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal
-from ddenv.runfile.state import RunState, Trial
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.text import count, first_of, truncated
 
 # Maximum number of models that a decision names, and maximum length of a name.
@@ -254,6 +255,21 @@ def origin(state: RunState, number: int) -> Node:
     while node.how != "instead" and node.parent is not None:
         node = state.nodes[node.parent]
     return node
+
+
+def exact_runs(state: RunState) -> tuple[int, ...]:
+    """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
+    asked, whole = settings(state), origin(state, state.node).id
+    if asked.accept_rate != "exact":
+        return ()
+    tests = (test for test in rested_on(state) if test.environment == whole and test.outcome == "similar")
+    return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
+
+
+def rested_on(state: RunState) -> tuple[Test, ...]:
+    """The tests that decisions rest on, without those that only ran ahead of time."""
+    began = state.baseline is not None
+    return tuple(test for test in state.tests if state.rests_on >> test.id & 1 or (began and test.phase == "baseline"))
 
 
 def left_round(state: RunState) -> Changes:

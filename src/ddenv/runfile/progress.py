@@ -184,8 +184,8 @@ class Returned:
     """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back.
 
     `verdict`: the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not
-    decide, "unknown" if they broke. The robot reached its goal in `reached` of `runs`; `low`..`high` is Wilson's 95 % interval of
-    that rate, 0..1 without runs.
+    decide, "unknown" if they broke. The robot reached its goal in `reached` of `runs`; `low`..`high` is the 95 % interval of that
+    rate, 0..1 without runs, or both are its share where the claim is about chosen runs.
     """
 
     back: str | None
@@ -214,7 +214,7 @@ class Isolation:
     `size` of them: what the reduction left. `before` is why the reduction had ended.
     `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: the last word is
     spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: the user
-    gave it up, or ended it by another decision.
+    gave it up, or ended it by another decision. With `chosen` runs a world passes if each of these does, and no rate is asked for.
     """
 
     number: int
@@ -228,6 +228,7 @@ class Isolation:
     suspects: tuple[str, ...]
     size: int
     before: str
+    chosen: tuple[int, ...] = ()
     checks: tuple[Check, ...] = ()
     ended: bool = False
     found: int | None = None

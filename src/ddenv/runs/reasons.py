@@ -11,8 +11,9 @@ from statistics import median
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, verdict_on
 from ddenv.evidence.rates import wilson_interval
+from ddenv.runfile.fold_decisions import exact_runs, rested_on
 from ddenv.runfile.progress import Certificate
-from ddenv.runfile.state import BROKEN, RunState, Test
+from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.text import count, percent
@@ -73,8 +74,8 @@ class Parting:
 class Reason:
     """What happens without the model `without` and what rests on it, all of `gone`.
 
-    `ends` are those of the `runs` fresh runs, the most frequent one first. `parting` is None where no pair of runs shows it;
-    `lacks` says why, if the run file does not have what it takes.
+    `ends` are those of the `runs` fresh runs (`exact`: of the chosen runs), the most frequent one first. `parting` is None where no
+    pair of runs shows it; `lacks` says why, if the run file does not have what it takes.
     """
 
     without: str
@@ -83,6 +84,7 @@ class Reason:
     ends: tuple[End, ...]
     parting: Parting | None
     lacks: str = ""
+    exact: bool = False
 
 
 def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
@@ -93,13 +95,24 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
             f"{file.path}: no certificate is finished for what is left, and only its fresh runs show why the robot fails; "
             f"make one first: ddenv certify {file.path}"
         )
-    own = (test for test in state.confirm_tests if test.node == certificate.node and test.run >= certificate.first_run)
     # Those that only ran ahead of time are not among the runs of the claims.
-    counted = (test for test in own if state.rests_on >> test.id & 1)
-    tests = [test for test in counted if test.is_finished and test.outcome not in BROKEN]
-    left = {test.run: test for test in tests if test.without is None and test.outcome == F}
-    names = [claim.without for claim in certificate.claims if claim.without is not None]
-    return tuple(_reason(file, state, certificate, name, tests, left) for name in names)
+    if certificate.seeds:
+        exact = exact_runs(state)
+        own = [test for test in rested_on(state) if test.run in exact and test.phase != CERTIFY]
+    else:
+        fresh = (test for test in state.confirm_tests if state.rests_on >> test.id & 1)
+        own = [test for test in fresh if test.node == certificate.node and test.run >= certificate.first_run]
+    runs: dict[int, dict[int, Test]] = {}
+    for test in own:
+        if test.is_finished and test.outcome not in BROKEN:
+            runs.setdefault(test.environment, {})[test.run] = test
+    end, *removals = certificate.claims
+    left = {run: test for run, test in runs.get(end.environment, {}).items() if test.outcome == F}
+    return tuple(
+        _reason(file, state, certificate, claim.without, list(runs.get(claim.environment, {}).values()), left)
+        for claim in removals
+        if claim.without is not None
+    )
 
 
 def no_reasons(certificate: Certificate) -> str:
@@ -110,16 +123,15 @@ def no_reasons(certificate: Certificate) -> str:
 
 
 def _reason(
-    file: RunFile, state: RunState, certificate: Certificate, name: str, tests: Sequence[Test], left: dict[int, Test]
+    file: RunFile, state: RunState, certificate: Certificate, name: str, mine: Sequence[Test], left: dict[int, Test]
 ) -> Reason:
-    mine = [test for test in tests if test.without == name]
     ends = _ends(mine, math.nan if state.f_position is None else state.f_position[2])
     gone = tuple(stack_with(state, state.nodes[certificate.node].environment, name))
     # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
     shown = next((end.kind for end in ends if end.kind != F), None)
     pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
     parting, _, lacks = parting_of(file, next(pairs, None), gone)
-    return Reason(name, gone, len(mine), ends, parting, lacks)
+    return Reason(name, gone, len(mine), ends, parting, lacks, bool(certificate.seeds))
 
 
 def _kind(test: Test) -> str:
@@ -177,11 +189,13 @@ def sentence(reason: Reason) -> str:
     """What happens without the models, in one sentence, from the runs that show it."""
     others = f" and what rests on it ({count(len(reason.gone) - 1, 'model')})" if len(reason.gone) > 1 else ""
     without = f"Without {reason.without}{others}"
+    kind = "chosen run" if reason.exact else "fresh run"
     if not reason.ends:
-        return f"{without}: no fresh run came to an end."
+        return f"{without}: no {kind} came to an end."
     most, *rarer = reason.ends
     low, high = wilson_interval(most.number, reason.runs)
-    share = f"{most.number} of {count(reason.runs, 'fresh run')}, {percent(low)} to {percent(high)}"
+    interval = "" if reason.exact else f", {percent(low)} to {percent(high)}"
+    share = f"{most.number} of {count(reason.runs, kind)}{interval}"
     more = "".join(f"; it {_does(end)} in {end.number}" for end in rarer)
     return f"{without} the robot {_does(most)} ({share}){more}."
 
