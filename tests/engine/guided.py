@@ -80,6 +80,8 @@ COMMANDS = st.one_of(
                         "pair": st.sampled_from(["learner/timestep", "timeseg/random", "model2model/sequential"]),
                         "iterations": st.integers(0, 2),
                         "algorithm": st.sampled_from(["ddmin", "splitting", "ddenv"]),
+                        "accept_rate": st.sampled_from(["first", "kept", "exact"]),
+                        "exact_seeds": st.integers(1, 3),
                     },
                 )
             }

@@ -15,7 +15,9 @@ from ddenv.runfile.state import CERTIFY
 from ddenv.runfile.store import RunFile
 from ddenv.schemas import names
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.guided import guided, until
 from tests.engine.killing import Killed, kill_after, story
+from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.tiers import examples
 
@@ -126,6 +128,19 @@ def test_that_runs_repeat_is_asked_once(tmp_path):
     assert promise(state, state.certificate).startswith(
         "minimal means: f shows with seeds 0, 1, 2 each time; without wall it shows with none of the 3 chosen seeds; "
     )
+
+
+def test_it_can_be_chosen_during_a_run(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+
+    def guide():
+        yield from until(lambda state: state.round is not None and state.round.number == 2)
+        yield "change", {"settings": {"accept_rate": "exact", "exact_seeds": 1}}
+
+    state = guided(new_run(tmp_path, accept_rate="kept"), needs("wall", "beam"), guide())
+    assert state.environment == ("wall", "beam")
+    assert state.certificate.seeds == (0,)
+    assert [claim.runs for claim in state.certificate.claims] == [20, 1, 1]
 
 
 def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_path):
