@@ -219,7 +219,7 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
         return f"shown to keep at least {percent(bound)} of {rate}, not {percent(certificate.certify_rate)}"
     often = (
-        "never with these seeds"
+        "with none of these seeds"
         if claim.is_exact
         else "rarer"
         if bound is None
@@ -372,7 +372,10 @@ def terms(certificate: Certificate, pinned: int = 0) -> str:
 def promise(state: RunState, certificate: Certificate) -> str:
     """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
     if certificate.seeds:
-        return f"minimal means: {_exactly(certificate)}; for other seeds fresh runs say how often f shows, and nothing more"
+        return (
+            "minimal means: a run with a chosen seed repeats to the last bit, so this is exact for these seeds; for others fresh "
+            "runs say how often f shows, and nothing more"
+        )
     kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
     most = _at_most(certificate)
     often = "rarer" if most is None else f"at most {percent(most)} as often"

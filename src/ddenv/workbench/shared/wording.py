@@ -54,7 +54,16 @@ VERDICT = {
 
 
 # The signs of the verdicts of a certificate.
-CLAIM = {"kept": "●", "lost": "✗", "needed": "●", "helps": "◐", "not needed": "○", "not shown": "?", "unknown": "✗"}
+CLAIM = {
+    "kept": "●",
+    "exact": "●",
+    "lost": "✗",
+    "needed": "●",
+    "helps": "◐",
+    "not needed": "○",
+    "not shown": "?",
+    "unknown": "✗",
+}
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
 
 

@@ -108,7 +108,7 @@ def row(one: Entry, width: int) -> Text:
     if one.claim is None:
         return Text(f"{'○' if one.name == NEAREST else ' '}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
     name, claim = padded(shortened(one.name, _name(width)), _name(width)), one.claim
-    interval = f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}" if claim.runs else ""
+    interval = f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}" if claim.runs and not claim.is_exact else ""
     figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
     return Text(f"{one.letter:<3}", "bold", no_wrap=True).append(f"{name}{figures}", "not bold")
 
