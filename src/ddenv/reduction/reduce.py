@@ -5,7 +5,7 @@ UserError, in one line.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count, takewhile
@@ -161,8 +161,10 @@ def reduce(
         "skip": skip,
         "prior": prior,
     }
-    for name, word in (variants | {"accept_rate": accept_rate}).items():
-        _check_choice(name, word)
+    for name, word in variants.items():
+        _check_choice(name, word, SETTINGS[name].choices)
+    # To repeat runs exactly takes seeds, and `test` has none.
+    _check_choice("accept_rate", accept_rate, ("first", "kept"))
     counts = {"iterations": iterations, "n_partitions": n_partitions, "seed": seed, "baseline_runs": baseline_runs}
     for name, number in counts.items():
         _check_count(name, number)
@@ -379,9 +381,8 @@ class _Caller:
 LARGEST = 1e9
 
 
-def _check_choice(name: str, value: str) -> None:
-    """Raises UserError for a word that the setting of this name cannot be."""
-    choices = SETTINGS[name].choices
+def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:
+    """Raises UserError for a word that is none of these."""
     if value not in choices:
         raise UserError(f"{name}: {value!r} is not allowed; use one of {', '.join(choices)}")
 
