@@ -99,9 +99,9 @@ def test_it_is_in_the_report(tmp_path):
 
 
 def test_what_may_change_on_the_way_is_in_the_dialog_and_nothing_else():
-    from ddenv.workbench.run.change import NUMBERS
+    from ddenv.workbench.run.change import OTHERS
 
-    assert {*(one.name for one in NUMBERS), "pair", "algorithm"} == set(CHANGEABLE)
+    assert {*(one.name for one in OTHERS), "pair", "algorithm"} == set(CHANGEABLE)
     assert set(CHANGEABLE) == {"pair", "algorithm", "iterations", "budget"}
 
 
