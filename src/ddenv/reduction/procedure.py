@@ -57,9 +57,21 @@ class Wants:
 
 @dataclass(frozen=True)
 class BaselineRan:
-    """The whole world was run so often. The answer is how many of these runs showed f, or None if there is no failure to reduce."""
+    """The whole world was run so often; the first `chose` of these runs only choose f.
+
+    The answer is what the `Baseline` shows, or None if there is no failure to reduce.
+    """
 
     runs: int
+    chose: int = 0
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """How many of the runs that give the rate showed f, and whether several failures competed to be f."""
+
+    failures: int
+    competed: bool = False
 
 
 @dataclass(frozen=True)
@@ -277,17 +289,24 @@ def procedure(
 
 
 def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Generator[Step, Any, Leg | None]:
-    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing."""
+    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing.
+
+    Where several failures competed, the most frequent one was lucky in the runs that chose it: as many others give its rate.
+    """
+    chose, usual = 0, runs
     while True:
         while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
             yield Wants(tuple(Test(whole, run, "baseline") for run in missing))
-        failures: int | None = yield BaselineRan(runs)
-        if failures is None:
+        found: Baseline | None = yield BaselineRan(runs, chose)
+        if found is None:
             return None
-        if not keeps_rate or failures >= FEWEST_SHOWN or runs >= LONGEST_BASELINE:
+        if keeps_rate and found.failures < FEWEST_SHOWN and runs < LONGEST_BASELINE:
+            runs += 1
+        elif keeps_rate and found.competed and not chose:
+            chose, runs = runs, runs + usual
+        else:
             leg: Leg = yield FailureFixed(runs)
             return leg
-        runs += 1
 
 
 def search_on(driver: Driver, leg: Leg) -> Generator[Step, Any, tuple[Environment, ...]]:

@@ -328,10 +328,10 @@ class _Caller:
         elif asked.why == "baseline":
             self._of_whole.append(shown)
 
-    def _failures(self) -> int:
+    def _failures(self) -> steps.Baseline:
         if not any(self._of_whole):
             raise UserError(NOTHING_TO_REDUCE)
-        return sum(self._of_whole)
+        return steps.Baseline(sum(self._of_whole))
 
     def leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
         """The next search, from what is left."""
