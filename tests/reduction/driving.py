@@ -140,6 +140,7 @@ class Driver:
             rate=lambda: leg.rule.rate or 1.0,
             runs=lambda: leg.rule.misses,
             broke=broke,
+            proves=leg.rule.proves,
         )
         inside = stacks.inside(leg.chain[-1])
         return stacks.expand(tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide)))

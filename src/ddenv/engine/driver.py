@@ -197,6 +197,7 @@ class Driver:
             rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
             runs=lambda: leg.rule.misses,
             broke=self._broke,
+            proves=leg.rule.proves,
         )
         return self._begin(leg, self._memory.of(self._guide))
 

@@ -191,6 +191,7 @@ def reduce(
             n_partitions=leg.n_partitions or n_partitions,
             rate=lambda: leg.rule.rate or caller.share_shown,
             runs=lambda: leg.rule.misses,
+            proves=leg.rule.proves,
             **variants,
         )
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
