@@ -8,7 +8,7 @@ dice. A resumed run drives it again through what is known.
 1. `baseline`: the whole world is run; its failure is f.
 2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
 3. `certify`: fresh runs show whether what is left keeps the rate of f, and that without each model the rate falls.
-4. `onward`: where a claim fails, the search goes back to the last environment that kept the rate, or on without a model.
+4. `onward`: where a claim fails, the search goes back to what is not shown to have lost the rate, or on without a model.
 """
 
 from __future__ import annotations
@@ -461,7 +461,10 @@ def onward(
 
 
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
-    """Back to the last environment that keeps the rate, by bisection and by all runs of the whole world."""
+    """Back to the last environment that is not shown to have lost the rate of all runs of the whole world.
+
+    Of each only runs by the seeds of this certificate count. By others it was taken, or went back to: these favour it.
+    """
     first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
     rate = driver.rate()
 
