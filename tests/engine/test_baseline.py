@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from ddenv.engine.judging import fix_failure
+from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile
+from ddenv.words.news import baseline
 from ddenv.world.scenario import FailureSpec
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import Killed
@@ -26,7 +28,7 @@ def way(*points) -> np.ndarray:
     return np.array([(float(time), *point, 0.0, 1.0, 0.0, 0.0, 0.0) for time, point in enumerate(points)])
 
 
-def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1):
+def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1, chose: int = 0):
     """What runs show; each is "pass", "error", or the way of a run that failed, with how it failed."""
     tests, ways = [], {}
     for run, one in enumerate(outcomes):
@@ -37,7 +39,7 @@ def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1):
         tests.append(Ran(run + 1, 0, "baseline", None, None, run, run, outcome, kind, end_pose=end))
         if rows is not None:
             ways[run + 1] = rows
-    return fix_failure(tests, ways, spec, 3, wanted)
+    return fix_failure(tests, ways, spec, 3, wanted, chose)
 
 
 def stuck(x: float, kind: str = "stuck"):
@@ -89,6 +91,18 @@ def test_another_failure_can_be_chosen_by_its_number():
     )
 
 
+def test_the_runs_that_chose_f_are_not_in_its_rate():
+    chosen = stuck(1), stuck(1), stuck(5), "error"
+    found = ran(*chosen, stuck(5), stuck(5), stuck(1), "pass", "error", chose=4)
+    assert (found.failure_test, found.position, found.chose) == (1, (1.0, 0.0, 0.0), 4)
+    assert (found.failures, found.runs, found.broken, found.rate) == (1, 4, 1, 0.25)
+    assert [one.runs for one in found.seen] == [2, 1]
+    assert found.judged.outcomes == {1: "similar", 2: "similar", 3: "other", 5: "other", 6: "other", 7: "similar"}
+    # Where none of the others shows f, its rate is from all.
+    found = ran(*chosen, "pass", stuck(5), chose=4)
+    assert (found.chose, found.failures, found.runs, found.broken) == (0, 2, 5, 1)
+
+
 def rare(rate: float, salt: int):
     """In this part of its runs the wall stops the robot; in others it ends elsewhere, or the simulation breaks."""
 
@@ -101,11 +115,11 @@ def rare(rate: float, salt: int):
     return oracle
 
 
-def last_baseline(folder, salt: int, jobs: int, kill_every: int):
+def last_baseline(folder, oracle, jobs: int, kill_every: int, baseline_runs: int = 4):
     """The baseline, and the runs made in it, of an engine that is killed and started again all the time."""
-    path = new_run(folder, accept_rate="kept", baseline_runs=4, iterations=1)
+    path = new_run(folder, accept_rate="kept", baseline_runs=baseline_runs, iterations=1)
     for _ in range(40):
-        pool = FakePool(rare(0.2, salt), jobs, salt)
+        pool = FakePool(oracle, jobs)
         with suppress(Killed):
             drive(path, pool, prepare=lambda file: _kill_at_end_of_baseline(file, kill_every))
             break
@@ -139,16 +153,52 @@ def _kill_at_end_of_baseline(file: RunFile, events: int) -> None:
 
 @pytest.mark.parametrize("salt", range(6))
 def test_where_few_runs_show_f_the_baseline_goes_on_in_the_same_way_for_all_engines(tmp_path, salt):
-    usual = last_baseline(tmp_path, salt, 1, 10_000)
+    oracle = rare(0.2, salt)
+    usual = last_baseline(tmp_path, oracle, 1, 10_000)
     found, status, runs = usual
-    assert last_baseline(tmp_path, salt, 3, 10_000) == last_baseline(tmp_path, salt, 2, 25) == usual
+    assert last_baseline(tmp_path, oracle, 3, 10_000) == last_baseline(tmp_path, oracle, 2, 25) == usual
     if found is None:
         assert (status, runs) == ("finished", [0, 1, 2, 3])
     else:
-        assert len(runs) == found.runs + found.broken
+        assert len(runs) == found.chose + found.runs + found.broken
         # No run more than needed.
-        assert len(runs) == 4 or (found.failures == FEWEST_SHOWN) or (len(runs) == LONGEST_BASELINE)
+        assert len(runs) - found.chose == 4 or (found.failures == FEWEST_SHOWN) or (len(runs) == LONGEST_BASELINE)
         assert found.failures >= FEWEST_SHOWN or len(runs) == LONGEST_BASELINE
+
+
+def competing(rate: float, salt: int):
+    """Two failures, each in this part of the runs."""
+
+    def oracle(keep, seed):
+        luck = random.Random(f"{salt} {seed}").random()
+        return "similar" if luck < rate else "other" if luck < 2 * rate else "pass"
+
+    return oracle
+
+
+def test_where_failures_compete_the_rate_of_the_luckiest_is_not_too_high(tmp_path):
+    oracles = [competing(0.45, salt) for salt in range(25)]
+    found = [last_baseline(tmp_path, oracle, 1, 10_000, 10) for oracle in oracles]
+    assert {one.chose for one, _, _ in found} == {10}
+    rates = sum(one.rate for one, _, _ in found), sum(seen[0][1] / 10 for _, seen, _ in found)
+    # The runs that choose show the luckier one in 0.56 of all.
+    assert [rate / len(found) for rate in rates] == [pytest.approx(0.45, abs=0.05), pytest.approx(0.56, abs=0.05)]
+    # However many work, and however often they are killed.
+    assert last_baseline(tmp_path, oracles[0], 3, 25, 10) == found[0]
+
+
+def test_a_search_judges_by_the_rate_of_the_runs_that_chose_nothing(tmp_path):
+    state = drive(
+        new_run(tmp_path, accept_rate="kept", baseline_runs=10, iterations=1), FakePool(competing(0.45, 3), 2)
+    )
+    base = state.baseline
+    shown = [test.outcome == "similar" for test in state.tests if test.phase == "baseline" and test.run >= 10]
+    assert (base.chose, base.failures, base.runs, base.rate) == (10, sum(shown), len(shown), sum(shown) / len(shown))
+    assert state.certificates[0].rate == estimated_rate(sum(shown), len(shown))
+    assert (state.nodes[0].shown, len(state.nodes[0].runs)) == (sum(shown), len(shown))
+    said = baseline(state)
+    assert f"f in {sum(shown)} of 10 runs" in said
+    assert "the first 10 runs only chose f, and showed other failures: 2. stuck at (2.00, 0.00) in 3 runs" in said
 
 
 def test_the_papers_baseline_never_goes_on(tmp_path):

@@ -5,7 +5,9 @@
 
 import os
 import random
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import pytest
 from scipy.stats import binomtest
@@ -15,6 +17,8 @@ from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, REFUTED, Terms, error_of, falls, keeps, settle
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction.isolation import Passing, passes
+from ddenv.reduction.procedure import Certified, procedure
+from tests.reduction import driving
 
 pytestmark = pytest.mark.claims
 
@@ -148,3 +152,79 @@ def test_all_claims_of_a_whole_reduction_are_rarely_false(rate):
             elif claim.verdict == "needed" and claim.without != "a":
                 false += claim.bound < rate(left - {claim.without}) / rate(left)
     check(false, ERROR)
+
+
+@dataclass(frozen=True)
+class Lucky(driving.World):
+    """A share `together` of the seeds has the same luck in all environments.
+
+    With `competes` another failure is as frequent in the whole world, and f is the luckier one of the first runs.
+    """
+
+    together: float = 0.0
+
+    def luck(self, environment, run):
+        common, own = random.Random(f"{self.seed} {run}"), random.Random(f"{self.seed} {environment.bits} {run}")
+        return (common if common.random() < self.together else own).random()
+
+    @cached_property
+    def before(self):
+        """Below this luck the other failure shows, if at all."""
+        luck = [self.luck(self.whole, run) for run in range(self.baseline_runs)]
+        first, second = (sum(low <= one < low + self.rate for one in luck) for low in (0.0, self.rate))
+        return self.rate if self.competes and second > first else 0.0
+
+    def outcome(self, environment, run):
+        return 0.0 <= self.luck(environment, run) - self.before < self.rate_in(environment)
+
+
+LUCKY = Lucky(
+    tuple(range(6)), Environment.of([0]), Environment.of([1, 2]), "ddenv", 0, 0.9, 0.79, iterations=3, baseline_runs=10
+)
+REDUCTIONS = {
+    "independent": LUCKY,
+    "the same luck": replace(LUCKY, together=0.8),
+    "competing failures": replace(LUCKY, rate=0.45, competes=True),
+    "competing failures, the same luck": replace(LUCKY, rate=0.45, competes=True, together=0.8),
+}
+
+
+@pytest.mark.parametrize("world", REDUCTIONS.values(), ids=REDUCTIONS)
+def test_what_a_whole_reduction_says_is_rarely_false(world):
+    """Where each of two models takes a bit more of the rate than a needed one has to, and than the search may lose."""
+    said, false = Counter(), Counter()
+    for seed in range(SIMULATED):
+        one = replace(world, seed=seed)
+        driver = driving.Driver(one)
+        driver.drive(procedure(driver, one.whole, one.baseline_runs, keeps_rate=True))
+        told = list(sentences(one, driver))
+        # One chance in a reduction, however many of its certificates say the same: the seeds of one are shared.
+        said += Counter({kind for kind, _ in told})
+        false += Counter({kind for kind, true in told if not true})
+    assert said["bound"] > SIMULATED / 2
+    assert said["lost"] > SIMULATED / 5
+    check(false["bound"], ERROR)
+    check(false["first lost"], 1.0 / REFUTED)
+    check(false["first interval"], 0.05)
+
+
+def sentences(world, driver):
+    """All that the certificates of a reduction say, each with whether it is true."""
+    certified = [fact for fact in driver.facts if isinstance(fact, Certified)]
+    for place, fact in enumerate(certified):
+        left = world.rate_in(fact.claims[0].environment)
+        for named in fact.claims:
+            rate, claim = world.rate_in(named.environment), named.claim
+            if named.model is None:
+                yield "bound", claim.bound <= rate / world.rate
+                lost, terms = claim.verdict == "lost", fact.certificate.terms
+                if lost:
+                    yield "lost", rate < terms.keep_rate * world.rate
+                if not place:
+                    # The others are about what the first ones left.
+                    shown = [driver.shown(named.environment, fact.certificate.first_run + run) for run in named.runs]
+                    low, high = anytime_interval(sum(shown), len(shown))
+                    yield "first interval", low <= rate <= high
+                    yield "first lost", not lost or rate < terms.keep_rate * world.rate
+            elif left:
+                yield "bound", claim.bound >= rate / left

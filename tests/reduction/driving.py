@@ -43,6 +43,7 @@ class World:
     keeps_rate: bool = True
     pinned: int | None = None
     baseline_runs: int = 5
+    competes: bool = False
 
     @property
     def whole(self) -> Environment:
@@ -139,6 +140,7 @@ class Driver:
             rate=lambda: leg.rule.rate or 1.0,
             runs=lambda: leg.rule.misses,
             broke=broke,
+            proves=leg.rule.proves,
         )
         inside = stacks.inside(leg.chain[-1])
         return stacks.expand(tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide)))
@@ -194,7 +196,7 @@ class Driver:
         now = self.now
         match step:
             case steps.BaselineRan():
-                now.of_whole |= set(range(step.runs))
+                now.of_whole = set(range(step.chose, step.runs))
             case steps.Judged(verdict="unknown"):
                 self.known.unknown.add((now.round, step.environment))
             case steps.Similar() | steps.LeftOut():
@@ -214,7 +216,9 @@ class Driver:
     def _answer(self, step):
         match step:
             case steps.BaselineRan():
-                return sum(self.shown(self.world.whole, run) is True for run in range(step.runs)) or None
+                shown = sum(self.shown(self.world.whole, run) is True for run in range(step.chose, step.runs))
+                competed = self.world.competes
+                return steps.Baseline(shown, competed) if shown or step.chose else None
             case steps.FailureFixed() | steps.LeftOut():
                 return self.leg()
             case steps.SteppedBack():

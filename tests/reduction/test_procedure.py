@@ -44,6 +44,7 @@ worlds = st.builds(
     iterations=st.integers(0, 3),
     keeps_rate=st.booleans(),
     pinned=st.sampled_from([None, None, 0]),
+    competes=st.booleans(),
 )
 
 

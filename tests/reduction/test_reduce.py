@@ -3,6 +3,7 @@
 import tomllib
 from itertools import pairwise
 from math import comb
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -221,6 +222,27 @@ def test_minimal_is_said_only_if_each_element_was_left_out(needed, algorithm):
         assert found.minimal == all(left - {name} in tested for name in left)
         assert not found.minimal or left == needed
         assert found.minimal or candidates == "partitions"
+
+
+def in_any_way(salt):
+    """Shows the failure in a third of all sets, without any order in it."""
+    return lambda kept: kept == set(ELEMENTS) or crc32(f"{salt} {sorted(kept)}".encode()) % 3 == 0
+
+
+@pytest.mark.parametrize("salt", range(8))
+def test_what_a_search_does_not_try_again_the_certificate_does(salt):
+    test = in_any_way(salt)
+    found = ddenv.reduce(ELEMENTS, test, iterations=1, accept_rate="kept", **ALL)
+    assert found.minimal
+    assert not any(test(frozenset(found.kept) - {name}) for name in found.kept)
+
+
+def test_where_a_certificate_follows_a_search_needs_fewer_tests():
+    kept, first = (
+        ddenv.reduce(ELEMENTS, needs("b", "g"), iterations=1, accept_rate=rule, **ALL) for rule in ("kept", "first")
+    )
+    assert kept.kept == first.kept
+    assert kept.search_tests < first.search_tests
 
 
 def test_partitions_alone_do_not_promise_what_they_did_not_test():

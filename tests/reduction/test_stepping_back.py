@@ -45,6 +45,23 @@ def test_the_place_does_not_depend_on_which_tests_finish_first(rates, ahead, sal
     assert now == place(shown)
 
 
+@given(rates=st.lists(st.floats(0, 1), min_size=12, max_size=12), salt=st.integers(0, 10**6))
+def test_the_next_environment_was_judged_as_well(rates, salt):
+    """However the rate goes up and down along the chain."""
+    shown, verdicts = (
+        outcomes(dict(zip(CHAIN, rates, strict=True)).__getitem__, salt),
+        {CHAIN[0]: "kept", CHAIN[-1]: "lost"},
+    )
+
+    def judged(subject):
+        claim = settle(good_enough(subject, 0.9, 0.8, 0.3), shown)
+        verdicts[subject] = claim.verdict
+        return claim
+
+    found = last_good(CHAIN, judged)
+    assert (verdicts[CHAIN[found]], verdicts[CHAIN[found + 1]]) == ("kept", "lost")
+
+
 def test_where_runs_break_nothing_shows_that_the_rate_is_kept():
     assert place(lambda *_: "broken") == 0
 

@@ -111,13 +111,11 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
         gone = removed_in_passing(state, path)
         head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"
         return world, frozenset(gone), [head, *(f"  {printable(model)}" for model in gone)]
-    times, baseline = in_whole_world(state), state.baseline
-    if not times or baseline is None:
+    times, runs = in_whole_world(state)
+    if not times or state.baseline is None:
         raise UserError(f"{path}: it is not recorded what took part in its runs of the whole world; make a new run")
     head = f"{count(len(times), 'model')} of {len(state.elements)} took part in the runs of the whole world:"
-    lines = [
-        f"  {printable(model)}: {number} of {count(baseline.runs, 'run')}" for model, number in times.most_common()
-    ]
+    lines = [f"  {printable(model)}: {number} of {count(runs, 'run')}" for model, number in times.most_common()]
     return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
 
 

@@ -217,6 +217,7 @@ class Driver:
             rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
             runs=lambda: leg.rule.misses,
             broke=self._broke,
+            proves=leg.rule.proves,
         )
         return self._begin(leg, self._memory.of(self._guide))
 
@@ -251,13 +252,13 @@ class Driver:
     def _wants(self, step: steps.Wants) -> None:
         self._bench.work(step.tests)
 
-    def _baseline_ran(self, step: steps.BaselineRan) -> int | None:
+    def _baseline_ran(self, step: steps.BaselineRan) -> steps.Baseline | None:
         journal, whole = self._journal, self._journal.state.environments[0]
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(step.runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         spec, asked = self._scenario.failure, self._reduction
-        self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure)
-        return None if isinstance(self._baseline, str) else self._baseline.failures
+        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, step.chose)
+        return None if isinstance(found, str) else steps.Baseline(found.failures, len(found.seen) > 1)
 
     def _failure_fixed(self, step: steps.FailureFixed) -> steps.Leg:
         assert not isinstance(self._baseline, str)

@@ -191,7 +191,15 @@ class Journal:
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         whole, state = self._numbers[self.whole], self.state
-        tests = [test for test in state.tests if test.environment == whole and test.phase not in (CERTIFY, ISOLATE)]
+        # In the runs that chose f it was lucky.
+        chose = 0 if state.baseline is None else state.baseline.chose
+        tests = [
+            test
+            for test in state.tests
+            if test.environment == whole
+            and test.phase not in (CERTIFY, ISOLATE)
+            and (test.phase != "baseline" or test.run >= chose)
+        ]
         for first in dict.fromkeys(certificate.first_run for certificate in state.certificates):
             # A certificate runs the whole world at first only where what is left missed f: these runs would show it as too rare.
             # Those that only ran ahead of time would make it depend on the number of workers.

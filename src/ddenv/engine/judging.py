@@ -124,15 +124,17 @@ def fix_failure(
     spec: FailureSpec,
     iterations: int,
     wanted: int = 1,
+    chose: int = 0,
 ) -> BaselineFinished | str:
     """The event that ends the baseline. `tests` are in the order of runs, `trajectories` those of the failing ones, by id.
 
     f is the failure number `wanted`, by how many runs show each; its end is that of the run which shares its failure with most
     others. If no run failed, or if there is no such number, returns a line that tells the user so. The rate counts f only, not
-    other failures; runs that broke say nothing, and are not in it.
+    other failures; runs that broke say nothing, and are not in it. With `chose` so many first runs choose f, and only the others
+    give its rate; where f shows in none of these, all do.
     """
-    sound = [test for test in tests if test.outcome not in BROKEN]
-    failing = [test for test in sound if test.outcome == "failed" and test.end_pose is not None]
+    failed = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]
+    failing = [test for test in failed if not chose or test.run < chose]
     if not failing:
         return _no_failure(tests)
     failures = [Failure(end_of(test), trajectories[test.id], spec.epsilon, spec.similarity) for test in failing]
@@ -146,15 +148,19 @@ def fix_failure(
     groups = grouped(len(failing), apart)
     seen = [_seen([failing[one] for one in group]) for group in groups]
     if wanted > len(seen):
-        return _no_such_failure(seen, wanted, len(sound))
+        return _no_such_failure(seen, wanted, sum(test.outcome not in BROKEN for test in tests))
     f = groups[wanted - 1][0]
-    judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failing}
-    similar = sum(judgement.outcome == "similar" for judgement in judged.values())
+    judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failed}
+    shown = {id for id, judgement in judged.items() if judgement.outcome == "similar"}
+    if not any(test.id in shown for test in tests if test.run >= chose):
+        chose = 0
+    sound = [test for test in tests if test.outcome not in BROKEN and test.run >= chose]
+    similar = sum(test.id in shown for test in sound)
     rate = similar / len(sound)
     low, high = wilson_interval(similar, len(sound))
     return BaselineFinished(
         runs=len(sound),
-        broken=len(tests) - len(sound),
+        broken=sum(test.outcome in BROKEN and test.run >= chose for test in tests),
         failures=similar,
         rate=rate,
         low=low,
@@ -164,6 +170,7 @@ def fix_failure(
         miss_chance=miss_chance(rate, iterations),
         iterations_95=iterations_needed(rate),
         seen=tuple(seen),
+        chose=chose,
         judged=Outcomes(
             {id: judgement.outcome for id, judgement in judged.items()},
             {id: judgement.distance for id, judgement in judged.items()},

@@ -16,10 +16,10 @@ NAMED = 2
 TEACHING = "What took no part in a run can go without changing a bit of it, so the run without it is known."
 
 
-def in_whole_world(state: RunState) -> Counter[str]:
-    """In how many of the baseline runs each model took part; empty where that is unknown."""
+def in_whole_world(state: RunState) -> tuple[Counter[str], int]:
+    """In how many of the baseline runs each model took part, empty where that is unknown; and how many runs these are."""
     runs = [test for test in state.tests if test.phase == "baseline" and test.outcome not in BROKEN]
-    return Counter(name for test in runs for name in (test.took_part or NOTHING).names(state.elements))
+    return Counter(name for test in runs for name in (test.took_part or NOTHING).names(state.elements)), len(runs)
 
 
 def in_last(state: RunState) -> Environment | None:

@@ -30,7 +30,7 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
     Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and would end one granularity early.)
     The last model is tested, too: f may need no model at all. With the guide's `growth` "steady", n grows only after rounds that
     found nothing, and a round always has n partitions; with `skip` "implied", candidates that lack everything that was missed
-    before are skipped.
+    before are skipped. The search `proves` that its end is minimal by trying to leave out each single model all the same.
     """
     environment, n = elements, guide.n_partitions
     missed: list[Environment] = []
@@ -40,7 +40,7 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
         ranked = sorted(zip(partitions, guide.rank(partitions), strict=True), key=lambda pair: pair[1])
         round = make_round(n, environment, ranked, guide.candidates, guide.complement_order)
         if guide.skip == "implied":
-            round = _without_implied(round, missed)
+            round = _without_implied(round, missed, guide.proves)
         # All candidates may be implied.
         winner = (yield round) if round.candidates else None
         missed = _missed(round, winner, missed, guide.broke)
@@ -96,14 +96,11 @@ def _missed(
     return [group for group in dict.fromkeys(found) if group]
 
 
-def _without_implied(round: Round, missed: list[Environment]) -> Round:
-    """`round` without candidates that lack a whole group of `missed`, or everything that an earlier candidate of the round lacks.
-
-    Leaving out a single model is always tried: else nothing would show that the environment is minimal.
-    """
+def _without_implied(round: Round, missed: list[Environment], proves: bool) -> Round:
+    """`round` without candidates that lack a whole group of `missed`, or all that an earlier candidate of the round lacks."""
     lacked, worth = list(missed), []
     for one in round.candidates:
-        if len(one.lacks) == 1 or not any(group <= one.lacks for group in lacked):
+        if (proves and len(one.lacks) == 1) or not any(group <= one.lacks for group in lacked):
             worth.append(one)
             lacked.append(one.lacks)
     return replace(round, candidates=tuple(worth))

@@ -37,7 +37,7 @@ class Guide:
     `n_partitions` is the granularity at the start of ddenv; `candidates` and `complement_order` are those of `make_round`,
     `growth` ("paper" or "steady") and `skip` ("known" or "implied") those of ddenv. `rate()` is the rate at which f shows in a
     single run where all that it needs is there, `runs()` how many runs a candidate has if none shows f, `broke(candidate)`
-    whether its tests say nothing about f.
+    whether its tests say nothing about f. `proves` is whether the search has to show by itself that its end is minimal.
     """
 
     split: Split
@@ -51,6 +51,7 @@ class Guide:
     rate: Callable[[], float] = lambda: 1.0
     runs: Callable[[], int] = lambda: 1
     broke: Callable[[Candidate], bool] = lambda candidate: False
+    proves: bool = True
 
 
 def make_guide(

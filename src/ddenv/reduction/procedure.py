@@ -8,7 +8,7 @@ dice. A resumed run drives it again through what is known.
 1. `baseline`: the whole world is run; its failure is f.
 2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
 3. `certify`: fresh runs show whether what is left keeps the rate of f, and that without each model the rate falls.
-4. `onward`: where a claim fails, the search goes back to the last environment that kept the rate, or on without a model.
+4. `onward`: where a claim fails, the search goes back to what is not shown to have lost the rate, or on without a model.
 """
 
 from __future__ import annotations
@@ -57,9 +57,21 @@ class Wants:
 
 @dataclass(frozen=True)
 class BaselineRan:
-    """The whole world was run so often. The answer is how many of these runs showed f, or None if there is no failure to reduce."""
+    """The whole world was run so often; the first `chose` of these runs only choose f.
+
+    The answer is what the `Baseline` shows, or None if there is no failure to reduce.
+    """
 
     runs: int
+    chose: int = 0
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """How many of the runs that give the rate showed f, and whether several failures competed to be f."""
+
+    failures: int
+    competed: bool = False
 
 
 @dataclass(frozen=True)
@@ -285,17 +297,24 @@ def procedure(
 
 
 def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Generator[Step, Any, Leg | None]:
-    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing."""
+    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing.
+
+    Where several failures competed, the most frequent one was lucky in the runs that chose it: as many others give its rate.
+    """
+    chose, usual = 0, runs
     while True:
         while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
             yield Wants(tuple(Test(whole, run, "baseline") for run in missing))
-        failures: int | None = yield BaselineRan(runs)
-        if failures is None:
+        found: Baseline | None = yield BaselineRan(runs, chose)
+        if found is None:
             return None
-        if not keeps_rate or failures >= FEWEST_SHOWN or runs >= LONGEST_BASELINE:
+        if keeps_rate and found.failures < FEWEST_SHOWN and runs < LONGEST_BASELINE:
+            runs += 1
+        elif keeps_rate and found.competed and not chose:
+            chose, runs = runs, runs + usual
+        else:
             leg: Leg = yield FailureFixed(runs)
             return leg
-        runs += 1
 
 
 def search_on(driver: Driver, leg: Leg) -> Generator[Step, Any, tuple[Environment, ...]]:
@@ -462,7 +481,10 @@ def onward(
 
 
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
-    """Back to the last environment that keeps the rate, by bisection and by all runs of the whole world."""
+    """Back to the last environment that is not shown to have lost the rate of all runs of the whole world.
+
+    Of each only runs by the seeds of this certificate count. By others it was taken, or went back to: these favour it.
+    """
     first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
     rate = driver.rate()
 

@@ -193,6 +193,7 @@ def reduce(
             n_partitions=leg.n_partitions or n_partitions,
             rate=lambda: leg.rule.rate or caller.share_shown,
             runs=lambda: leg.rule.misses,
+            proves=leg.rule.proves,
             **variants,
         )
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
@@ -330,10 +331,10 @@ class _Caller:
         elif asked.why == "baseline":
             self._of_whole.append(shown)
 
-    def _failures(self) -> int:
+    def _failures(self) -> steps.Baseline:
         if not any(self._of_whole):
             raise UserError(NOTHING_TO_REDUCE)
-        return sum(self._of_whole)
+        return steps.Baseline(sum(self._of_whole))
 
     def leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
         """The next search, from what is left."""

@@ -37,10 +37,10 @@ def tried_again(environment: Partition, groups: Sequence[Partition], search: Cal
 def last_good(
     chain: Sequence[Environment], judged: Callable[[Environment], Claim]
 ) -> int | tuple[tuple[Environment, int], ...]:
-    """The place of the last environment of `chain` that keeps the rate, or the tests (models, run) needed to know it.
+    """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
 
     `chain` begins with the whole world and ends with what has lost the rate. `judged` carries `good_enough` as far as the
-    finished runs go. By bisection: it assumes that the rate falls along the chain.
+    finished runs go. By bisection: it assumes that the rate falls along the chain. The next one has been judged, too, and lost it.
     """
     good, bad = 0, len(chain) - 1
     while bad - good > 1:

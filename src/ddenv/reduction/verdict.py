@@ -14,6 +14,8 @@ Verdict = Literal["", "similar", "dissimilar", "unknown"]
 
 # The baseline goes on to this many runs with f, for up to so many runs, where f is rare.
 FEWEST_SHOWN, LONGEST_BASELINE = 3, 60
+# Where all runs of a candidate miss f by chance no more often than this, a miss is looked at again only by a certificate.
+FEW_MISSED = 0.02
 # After this many runs the likelier side counts.
 MOST_RUNS = 40
 
@@ -68,6 +70,14 @@ class Acceptance:
     def misses(self) -> int:
         """How many runs without f, and none with it, make a candidate dissimilar."""
         return next(runs for runs in range(1, self.most_misses + 1) if self.verdict(0, runs))
+
+    @property
+    def proves(self) -> bool:
+        """Whether a search has to show by itself that its end is minimal; else the certificate alone does, with fewer runs in all.
+
+        Where many misses are chance, or models turned out to take a bit of the rate each, that would cost another certificate.
+        """
+        return not self.rate or self.steps_back > 0 or (1.0 - self.rate) ** self.misses > FEW_MISSED
 
 
 @lru_cache(maxsize=4096)

@@ -114,8 +114,9 @@ def _seen(base: BaselineFinished) -> list[Block]:
         return []
     rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
     f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
+    chose = f" The first {count(base.chose, 'run')} only chose it, and are not in its rate." if base.chose else ""
     words = "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces another one."
-    return [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
+    return [say(words + chose), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
 
 
 def _tests(state: RunState) -> list[Block]:

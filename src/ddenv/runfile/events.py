@@ -282,7 +282,8 @@ class BaselineFinished(Event):
     """f is fixed by the runs of the whole world: `failure_test` is the test whose end is f.
 
     `failures` of `runs` showed f, at a `rate` of which `low`..`high` is Wilson's 95 % interval; `broken` more broke, and say
-    nothing. `seen` are all failures, the most frequent first, in the numbers of the setting `failure`. `miss_chance` is
+    nothing. The first `chose` runs are not among these: they chose f, which was lucky in them. `seen` are all failures of the runs
+    that chose, the most frequent first, in the numbers of the setting `failure`. `miss_chance` is
     (1-p)^(1+iterations), the chance that all tests of a candidate miss f; `iterations_95` is the number of iterations for a 95 %
     chance of seeing f. `position` is f's end, x, y, z m. `wall_limit` is what a later test may take in real time by the speed
     of these runs, s, None if unknown. It is the one thing here that differs from machine to machine.
@@ -301,6 +302,7 @@ class BaselineFinished(Event):
     broken: Natural = 0
     wall_limit: Seconds | None = field(default=None, compare=False)
     seen: tuple[SeenFailure, ...] = ()
+    chose: Natural = 0
 
     @property
     def others(self) -> tuple[tuple[int, SeenFailure], ...]:

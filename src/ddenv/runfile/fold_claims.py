@@ -64,7 +64,7 @@ def _check_tests(state: RunState, tests: Sequence[int]) -> None:
 
 
 def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
-    """What is left shows f too rarely: the run goes back to the last environment that keeps the rate."""
+    """What is left shows f too rarely: the run goes back to the last environment not shown to."""
     _check_tests(state, event.tests)
     node, lost = state.nodes[event.node], state.nodes[event.lost]
     if any(model >= len(state.elements) for group in event.again for model in group):

@@ -118,7 +118,8 @@ def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
 def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
     changes, first = with_outcomes(state, event.judged), event.failure_test
     judged = state.changed(**changes)
-    runs, shown = seen(judged.tests, (test.id for test in judged.tests if test.phase == "baseline"))
+    rated = (test.id for test in judged.tests if test.phase == "baseline" and test.run >= event.chose)
+    runs, shown = seen(judged.tests, rated)
     return {
         **changes,
         "baseline": event,

@@ -320,8 +320,8 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
 def least_to_show(models: int, needed: int, misses: int, baseline_runs: int) -> int:
     """The minimum of tests for a search that ends at `needed` of `models` models, for any method, without its certificate.
 
-    After the baseline, f has to show once in what is left, and each of its models has to be left out without success, with
-    `misses` tests each.
+    After the baseline, f has to show once in what is left, and each of its models has to be left out without success, alone or with
+    others that are not left, with `misses` tests each.
     """
     return baseline_runs + (1 if needed < models else 0) + needed * misses
 

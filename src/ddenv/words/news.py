@@ -240,9 +240,10 @@ def failed_in(state: RunState, found: BaselineFinished) -> str:
 
 
 def other_failures(found: BaselineFinished) -> str:
-    """The failures of the baseline besides f, with their numbers; "" if there is none."""
+    """The failures besides f of the runs that chose f, with their numbers; "" if there is none."""
     listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
-    return f"other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
+    chose = f"the first {count(found.chose, 'run')} only chose f, and showed " if found.chose else ""
+    return f"{chose}other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
 
 
 def _endings(state: RunState, one: Candidate | Trial | Removal) -> str:

@@ -166,7 +166,7 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
         f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
-        first = "Few runs of the whole world show f: the robot runs in it until more do."
+        first = "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."
     # The last one first: that the world is slow.
     noted = tuple(_sentence(plain(words)) for _, words in reversed(state.notes))
     if not tests:
