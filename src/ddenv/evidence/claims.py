@@ -29,12 +29,16 @@ def is_minimal(certificate: Certificate) -> bool:
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
-    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much."""
+    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much.
+
+    The one without which f shows most often comes first.
+    """
     left, *removals = certificate.claims
-    others = {claim.verdict for claim in removals} - {"needed"}
-    if left.verdict != "kept" or others != {"helps"}:
+    helps = [claim for claim in removals if claim.verdict != "needed"]
+    if left.verdict != "kept" or {claim.verdict for claim in helps} != {"helps"}:
         return ()
-    return tuple(claim.without for claim in removals if claim.verdict == "helps" and claim.without is not None)
+    helps.sort(key=lambda claim: -claim.shown / max(1, claim.runs))
+    return tuple(claim.without for claim in helps if claim.without is not None)
 
 
 def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
