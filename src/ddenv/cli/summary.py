@@ -100,7 +100,9 @@ def certificate(state: RunState) -> dict[str, Any] | None:
         "never_left_out": never_left_out(state, found),
         "means": promise(state, found) if is_minimal(found) else verdict_on(found),
         "claims": claims,
-        "whole_world": None if whole is None else _share(whole.shown, whole.runs) | {"outcomes": dict(whole.outcomes)},
+        "whole_world": None
+        if whole is None
+        else _share(whole.shown, whole.runs) | {"low": whole.low, "high": whole.high, "outcomes": dict(whole.outcomes)},
     }
 
 

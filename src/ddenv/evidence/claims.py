@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import islice
 from typing import Protocol
 
 from ddenv.environment import Environment
@@ -121,6 +122,29 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     terms = terms_of(certificate)
     claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
     return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
+
+
+def shown(state: RunState) -> str:
+    """What fresh runs show of what is left, by a finished certificate or so far; one sentence without a full stop."""
+    if (found := current(state)) is not None:
+        return verdict_on(found, never_left_out(state, found))
+    said = [missing(state)]
+    if (now := state.certificate) is not None:
+        bounds = [(name, claim.bound) for name, claim in so_far(state, now).items() if claim.bound is not None]
+        said += [
+            f"so far at least {percent(share)} of {_whole_rate(now)} is kept" for name, share in bounds[:1] if share
+        ]
+        less = ((name, share) for name, share in bounds[1:] if share < 1.0)
+        said += [
+            f"without {name} f shows at most {percent(share)} as often" for name, share in islice(less, MOST_NAMES)
+        ]
+    return "; ".join(said)
+
+
+def uncertified(state: RunState, run: object) -> str:
+    """Why what needs a finished certificate cannot be had of a run, and the command that makes one."""
+    command = "certify" if state.status == "finished" else "resume"
+    return f"{run}: {shown(state)}; make a certificate first: ddenv {command} {run}"
 
 
 def terms_of(certificate: Certificate) -> Terms:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, verdict_on
-from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.claims import current, uncertified, verdict_on
+from ddenv.evidence.rates import anytime_interval
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
@@ -89,10 +89,7 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
     """A reason for each model that the current certificate left out. Raises UserError where there is none."""
     certificate = current(state)
     if certificate is None:
-        raise UserError(
-            f"{file.path}: no certificate is finished for what is left, and only its fresh runs show why the robot fails; "
-            f"make one first: ddenv certify {file.path}"
-        )
+        raise UserError(uncertified(state, file.path))
     own = (test for test in state.confirm_tests if test.node == certificate.node and test.run >= certificate.first_run)
     # Those that only ran ahead of time are not among the runs of the claims.
     counted = (test for test in own if state.rests_on >> test.id & 1)
@@ -180,7 +177,7 @@ def sentence(reason: Reason) -> str:
     if not reason.ends:
         return f"{without}: no fresh run came to an end."
     most, *rarer = reason.ends
-    low, high = wilson_interval(most.number, reason.runs)
+    low, high = anytime_interval(most.number, reason.runs)
     share = f"{most.number} of {count(reason.runs, 'fresh run')}, {percent(low)} to {percent(high)}"
     more = "".join(f"; it {_does(end)} in {end.number}" for end in rarer)
     return f"{without} the robot {_does(most)} ({share}){more}."
