@@ -14,7 +14,7 @@ START, GOAL, OFF = (-6.0, 0.0), (6.0, 0.0), 0.5
 # Where a robot off its line stops: x, m.
 GATE_STOP, CRATE_STOP = 1.8, 3.9
 # The chance to come off the line, and what oil and ramp add to it.
-BY_ITSELF, BY_OIL, BY_RAMP = 0.1, 0.5, 0.3
+BY_ITSELF, BY_OIL, BY_RAMP = 0.1, 0.4, 0.4
 
 
 def off_line(models: Iterable[str]) -> float:

@@ -52,6 +52,10 @@ def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
     assert not any(line.startswith("next:") for line in summary_lines(replace(state, status="stopped"), run.path))
 
 
+def test_what_only_helps_can_be_left_out_by_a_key(run):
+    assert "shows it, and H in it leaves crate_01 out, 'ddenv why" in told(fake_moments.helped(run))[1]
+
+
 def test_what_is_not_shown_is_not_called_minimal(run):
     found, lines = told(fake_moments.not_shown(run))
     assert (found["minimal"], found["certificate"]["minimal"]) == (False, False)

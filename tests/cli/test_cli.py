@@ -13,6 +13,7 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from ddenv.evidence.claims import shown
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import RunState
@@ -100,15 +101,21 @@ def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
     done = ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap")
     assert done.returncode == 0, done.stderr
     assert [line.split(":")[0].strip() for line in done.stdout.splitlines()[1:]] == ["/whole", "/left", "/passing"]
-    places = {}
+    places, said = {}, []
     with (tmp_path / "one.mcap").open("rb") as file:
-        for _, _, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(["/tf"]):
+        for _, channel, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+            ["/tf", "/result"]
+        ):
+            if channel.topic == "/result":
+                said.append(message.data)
+                continue
             for one in message.transforms:
                 places.setdefault(one.child_frame_id, []).append(
                     (one.transform.translation.x, one.transform.translation.y)
                 )
     with RunFile(Path(summary["run_file"])) as run:
         state = fold(run.events())
+        assert said == [shown(state)]
         trajectory = run.trajectory(state.f_test.id)
     assert places["whole/base_link"] == list(zip(trajectory[1::COLUMNS], trajectory[2::COLUMNS], strict=True))
     assert ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap").returncode == 2

@@ -1,13 +1,16 @@
-"""Figures and places of lessons, counted again from the tests and events of a run with two certificates."""
+"""Figures and places of lessons, counted again from the tests and events of a run with three certificates."""
 
 import pytest
 
+from ddenv.errors import UserError
+from ddenv.evidence.certificate import Pairs
 from ddenv.learn.attempt import read_oracle
 from ddenv.learn.lesson_figures import OF_RUN, Figures
 from ddenv.learn.reading import Places
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
+from ddenv.text import percent
 
 
 @pytest.fixture(scope="module")
@@ -25,11 +28,11 @@ def position(events):
     ("words", "kind"),
     [
         ("certificate 1", "certificate_started"),
-        ("claims 2", "certificate_finished"),
+        ("claims 3", "certificate_finished"),
         ("back 1", "rate_lost"),
-        ("test 258", "test_started"),
-        ("result 258", "test_finished"),
-        ("verdict 258", "candidate_judged"),
+        ("test 134", "test_started"),
+        ("result 134", "test_finished"),
+        ("verdict 134", "candidate_judged"),
         ("end", "finished"),
     ],
 )
@@ -47,19 +50,58 @@ def test_figures_of_a_certificate_are_those_of_its_runs(position):
         runs = [test.outcome == "similar" for test in fresh if (test.node, test.without) == (node, without)]
         return f"f in {sum(runs)} of {len(runs)} fresh runs ("
 
-    assert figures("fresh").startswith(said(state.node, None))
-    assert figures("fresh_whole").startswith(said(0, None))
     for name in state.environment:
         assert figures(f"without {name}").startswith(said(state.node, name))
-    assert {figures(f"verdict on {name}") for name in ("oil", "ramp")} == {"needed", "not shown"}
-    assert figures("certificates") == "2"
+        assert figures(f"verdict on {name}") == "needed"
+    assert figures("certificates") == "3"
+
+
+def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position):
+    """What is shown grows run by run, and is what the bets on the pairs so far say."""
+    places, before = Places(position, events), 0.0
+    for result in ("result 170", "result 180", "result 200"):
+        state = position.state(places.event(result))
+        first, ran = (
+            state.certificate.first_run,
+            {(test.node, test.run): test.outcome == "similar" for test in state.confirm_tests if test.is_finished},
+        )
+        mine = [run for node, run in ran if node == state.node and run >= first]
+        # Where what is left showed f, the whole world is taken to show it, too.
+        pairs = Pairs()
+        for run in mine:
+            pairs = pairs.after(ran[state.node, run], ran.get((0, run), True))
+        shown = pairs.keeps_at_least(state.certificate.error / 2)
+        figures = Figures(position.end, state)
+        assert figures("here_left") == f"{sum(ran[state.node, run] for run in mine)} of {len(mine)} runs"
+        assert figures("here_bound") == percent(shown) and before < shown < 2 / 3
+        before = shown
+    with pytest.raises(UserError, match="no fresh run has left 'gate' out"):
+        figures("here_bound without gate")
+    ended = Figures(position.end, position.state(places.event("claims 3")))
+    assert (ended("here_aim"), ended("here_bound")) == ("80 %", "80 %")
+    # f never showed without the gate: the pairs are those in which it showed with it.
+    last = position.end
+    without = {test.run for test in last.confirm_tests if test.without == "gate"}
+    kept = (
+        test for test in last.confirm_tests if (test.node, test.without) == (last.node, None) and test.run in without
+    )
+    pairs = Pairs(second=sum(test.outcome == "similar" for test in kept))
+    assert ended("here_bound without gate") == percent(pairs.at_most(last.certificate.error / 2)) == "77 %"
+
+
+def test_how_often_f_showed_in_the_whole_world_is_told_if_it_ran_with_all_seeds(events, position):
+    state = position.state(Places(position, events).event("claims 1"))
+    fresh = [test.outcome == "similar" for test in state.confirm_tests if test.node == 0 and test.without is None]
+    assert Figures(position.end, state)("here_fresh_whole").startswith(
+        f"f in {sum(fresh)} of {len(fresh)} fresh runs ("
+    )
 
 
 def test_figures_of_rates_are_those_of_the_oracle(position):
     oracle = read_oracle(LESSONS / "quay.oracle.json")
     figures = Figures(position.end, position.state(1), oracle)
     assert figures("whole_rate") == figures("here_rate") == "90 %"
-    assert figures("rate of gate, oil") == "60 %"
+    assert figures("rate of gate, oil") == "50 %"
     assert figures("rate of oil") == "0 %"
     # Four runs at 10 %: 1 - 0.9^4.
     assert figures("chance of gate") == "34 %"

@@ -58,7 +58,7 @@ def test_the_issue_says_what_fails_how_often_and_what_is_needed(run, tmp_path):
     write_bundle(run, tmp_path / "handed")
     issue = (tmp_path / "handed" / "ISSUE.md").read_text()
     assert issue.startswith("# 2 of 11 models are enough to make the robot fail\n")
-    assert "f in 23 of 23 fresh runs (80 % to 100 %)" in issue
+    assert "f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 77 % of the whole world's rate" in issue
     assert "- `crate_00`\n- `crate_01`\n" in issue
     assert all(f"`{shown}`" in issue for shown in ("report.html", "ddenv open run.ddenv", "ddenv test scenario.yaml"))
     assert "Without crate_00 the robot reaches its goal" in issue
@@ -72,7 +72,7 @@ def test_nothing_is_replaced_and_nothing_is_written_where_a_certificate_lacks(ru
         write_bundle(run, tmp_path / name)
     (tmp_path / name).rmdir()
     uncertified = fake_moments.uncertified(fake_run.FakeRun(tmp_path / "other.ddenv")).path
-    with pytest.raises(UserError, match="make one first: ddenv certify"):
+    with pytest.raises(UserError, match="make a certificate first: ddenv certify"):
         write_bundle(uncertified, tmp_path / name)
     assert not (tmp_path / name).exists()
 

@@ -15,6 +15,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from scipy.special import beta
+
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import parting_sentence, reasons, sentence
@@ -27,7 +29,7 @@ KINDS = {
     "runs out of time elsewhere": "out of time",
 }
 WITHOUT = re.compile(r"Without (.+?)(?: and what rests on it \(\d+ models?\))? the robot (.+)\.$")
-MOST = re.compile(r" \((\d+) of (\d+) fresh runs?, (\d+) % to (\d+) %\)")
+MOST = re.compile(r" \((\d+) of (\d+) fresh runs?, [<>]?(\d+) % to [<>]?(\d+) %\)")
 PLACE = r"\((-?[\d.]+), (-?[\d.]+)\) m"
 ENDS = re.compile(rf"(near|at most ([\d.]+) m from) {PLACE}(?:, ([\d.]+) m (higher|lower) than in f)?$")
 PART = re.compile(
@@ -89,6 +91,10 @@ def untrue(path: Path) -> tuple[int, list[str]]:
     return number, wrong
 
 
+def _wealth(shown: int, runs: int, rate: float) -> float:
+    return float(beta(shown + 0.5, runs - shown + 0.5) / beta(0.5, 0.5) / (rate**shown * (1 - rate) ** (runs - shown)))
+
+
 def _ends(rows: Rows, name: str, words: str) -> list[str]:
     said, mine = WITHOUT.fullmatch(words), rows.without(name)
     if said is None or said[1] != name:
@@ -98,11 +104,11 @@ def _ends(rows: Rows, name: str, words: str) -> list[str]:
         return ["no rate"]
     shown, runs, low, high = map(int, most.groups())
     wrong = [] if runs == len(mine) else [f"{len(mine)} runs"]
-    # Wilson's interval, from its definition.
-    z, share = 1.959964, shown / runs
-    middle, half = share + z * z / 2 / runs, z * math.sqrt(share * (1 - share) / runs + z * z / 4 / runs / runs)
-    bounds = [100 * (middle + sign * half) / (1 + z * z / runs) for sign in (-1, 1)]
-    wrong += [f"{bound:.1f} %" for bound, told in zip(bounds, (low, high), strict=True) if abs(bound - told) > 1]
+    # From its definition: outside, a bet that mixes all rates has won 20 times its stake against the rate; inside, it has not.
+    for told, sign in ((low, -1), (high, 1)):
+        inside, outside = ((told - sign) / 100, (told + sign) / 100)
+        if _wealth(shown, runs, inside) >= 20 or (0 < outside < 1 and _wealth(shown, runs, outside) < 20):
+            wrong.append(f"{told} %")
     clauses = [(MOST.sub("", said[2].split(";")[0]), shown)]
     for part in said[2].split(";")[1:]:
         does, _, count = part.strip().removeprefix("it ").rpartition(" in ")

@@ -160,6 +160,13 @@ def not_shown(run: FakeRun) -> FakeRun:
     return _claimed(run, claims)
 
 
+def helped(run: FakeRun) -> FakeRun:
+    """A run that ended with two models, one of which only helps."""
+    _rounds(run).start_certificate()
+    claims = ((None, "kept", 60 * "s"), ("crate_00", "needed", 11 * "p"), ("crate_01", "helps", 12 * "ssssp"))
+    return _claimed(run, claims)
+
+
 def rarer(run: FakeRun) -> FakeRun:
     """Round 2 in an environment that showed f in one of six runs."""
     run.created().baseline()

@@ -223,9 +223,36 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
         assert len(started) == 1
 
 
+async def test_one_key_leaves_out_the_model_that_only_helps(run, monkeypatch):
+    starts(monkeypatch)
+    fake_moments.helped(run)
+    async with Attached(run) as session:
+        assert "Minimal but for crate_01" in session.text("#happening")
+        assert "crate_01 only helps: press H to leave it out" in " ".join(session.text("#happening").split())
+        await session.press("H")
+        assert session.asked() == [("try", {"models": [0]})]
+        trial = run.try_out(["crate_00"])
+        test = run.start_hand(trial)
+        run.finish(test, "similar", 0.12, failure="stuck")
+        run.judge_trial(trial, "similar", [test])
+        await session.look()
+        await session.press("1")
+        assert session.asked() == [("adopt", {"trial": 1})]
+        # It is asked once; later the key adopts the try that there is.
+        await session.look()
+        await session.press("H")
+        assert session.asked() == [("adopt", {"trial": 1})]
+        run.adopt(trial, ["crate_00"], test)
+        await session.look()
+        await session.press("H")
+        assert session.asked() == []
+        assert "there is no model that only helps f" in session.said()
+
+
 @pytest.mark.parametrize(
     ("make", "shown"),
     [
+        (fake_moments.helped, {"leave out", "try without", "try only", "undo"}),
         (fake_moments.waiting, {"pause", "accept", "reject", "try without", "try only"}),
         (fake_moments.mid_round, {"pause", "step", "veto", "try without", "try only", "undo"}),
         (fake_moments.finished, {"try without", "try only", "undo"}),

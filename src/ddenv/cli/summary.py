@@ -101,7 +101,9 @@ def certificate(state: RunState) -> dict[str, Any] | None:
         "never_left_out": never_left_out(state, found),
         "means": promise(state, found) if is_minimal(found) else verdict_on(found),
         "claims": claims,
-        "whole_world": None if whole is None else _share(whole.shown, whole.runs) | {"outcomes": dict(whole.outcomes)},
+        "whole_world": None
+        if whole is None
+        else _share(whole.shown, whole.runs) | {"low": whole.low, "high": whole.high, "outcomes": dict(whole.outcomes)},
     }
 
 
@@ -141,12 +143,14 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
 
 def _next(state: RunState, path: Path) -> list[str]:
     """What can be done with a result that fresh runs speak of."""
-    if state.status != "finished" or current(state) is None:
+    found = current(state)
+    if state.status != "finished" or found is None:
         return []
+    out = f", and H in it leaves {helps[0]} out" if (helps := helping(found)) else ""
     run = path.stem if find_run(path.stem) == path else shlex.quote(str(path))
     bundle = shlex.quote(f"{path.stem}.zip")
     return [
-        f"next: 'ddenv open {run}' shows it, 'ddenv why {run}' says why it fails, "
+        f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, "
         f"'ddenv export {run} --bundle {bundle}' packs it for others"
     ]
 

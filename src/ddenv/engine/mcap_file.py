@@ -21,7 +21,7 @@ from mcap_ros2.writer import Writer
 from ddenv.engine.judging import rows_of
 from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current
+from ddenv.evidence.claims import current, shown
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.simulation.template import Variants
@@ -40,7 +40,7 @@ Color = tuple[float, float, float, float]
 # Topic, kind, time (s), message. Topics without a slash in front get the run's name.
 Row = tuple[str, str, float, Message]
 # All runs are in one frame, and all transforms on one topic, as tools expect; other frames begin with the run's name.
-MAP, TRANSFORMS = "map", "/tf"
+MAP, TRANSFORMS, RESULT = "map", "/tf", "/result"
 ROBOT_COLOR, LEFT_COLOR, ALWAYS_COLOR = (0.95, 0.75, 0.1, 1.0), (0.85, 0.45, 0.15, 1.0), (0.6, 0.6, 0.6, 1.0)
 # The kinds of messages.
 TF = "tf2_msgs/msg/TFMessage"
@@ -149,12 +149,14 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
             raise UserError(f"{run}: a simulator of your own made it; only runs on Drake have streams to write")
         chosen = [_named(subject, name, test) for name, test in _chosen(file)]
         stored = {one.test: rows_of(file, one.test) for one in chosen}
+        result_is = shown(fold(file.events()))
     if not chosen:
         raise UserError(f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}")
     template = Variants(subject.world, subject.robot, subject.scenario)
     said, output = [], BytesIO()
     writer = Writer(output)
     schemas = {kind: writer.register_msgdef(kind, definition(kind)) for kind in KINDS}
+    writer.write_message(RESULT, schemas[WORDS], {"data": result_is}, nanoseconds(0.0))
     for one in chosen:
         streams = Streams()
         result = template.run(one.models, one.seed, _progress(progress, one.name), one.full, streams)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import islice
 from typing import Protocol
 
 from ddenv.environment import Environment
@@ -31,12 +32,16 @@ def is_minimal(certificate: Certificate) -> bool:
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
-    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much."""
+    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much.
+
+    The one without which f shows most often comes first.
+    """
     left, *removals = certificate.claims
-    others = {claim.verdict for claim in removals} - {"needed"}
-    if left.verdict != "kept" or others != {"helps"}:
+    helps = [claim for claim in removals if claim.verdict != "needed"]
+    if left.verdict != "kept" or {claim.verdict for claim in helps} != {"helps"}:
         return ()
-    return tuple(claim.without for claim in removals if claim.verdict == "helps" and claim.without is not None)
+    helps.sort(key=lambda claim: -claim.shown / max(1, claim.runs))
+    return tuple(claim.without for claim in helps if claim.without is not None)
 
 
 def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
@@ -139,6 +144,29 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
         return {None: settle(often(left, terms.at_least), shown)}
     claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
     return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
+
+
+def shown(state: RunState) -> str:
+    """What fresh runs show of what is left, by a finished certificate or so far; one sentence without a full stop."""
+    if (found := current(state)) is not None:
+        return verdict_on(found, never_left_out(state, found))
+    said = [missing(state)]
+    if (now := state.certificate) is not None:
+        bounds = [(name, claim.bound) for name, claim in so_far(state, now).items() if claim.bound is not None]
+        said += [
+            f"so far at least {percent(share)} of {_whole_rate(now)} is kept" for name, share in bounds[:1] if share
+        ]
+        less = ((name, share) for name, share in bounds[1:] if share < 1.0)
+        said += [
+            f"without {name} f shows at most {percent(share)} as often" for name, share in islice(less, MOST_NAMES)
+        ]
+    return "; ".join(said)
+
+
+def uncertified(state: RunState, run: object) -> str:
+    """Why what needs a finished certificate cannot be had of a run, and the command that makes one."""
+    command = "certify" if state.status == "finished" else "resume"
+    return f"{run}: {shown(state)}; make a certificate first: ddenv {command} {run}"
 
 
 def terms_of(certificate: Certificate) -> Terms:

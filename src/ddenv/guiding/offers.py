@@ -6,11 +6,13 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current, helping
 from ddenv.guiding.commands import Command, refusal
 from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
 from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto, round_over
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
+from ddenv.runfile.supports import stack_with
 from ddenv.text import shortened
 
 
@@ -120,6 +122,17 @@ def _try(now: Situation, pointed: Pointed, keep: frozenset[str]) -> Command | No
     return Try(numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
 
 
+def _leave_out(now: Situation, _: Pointed) -> Command:
+    """Try the environment without the model that only helps, or adopt that where it has shown f."""
+    found = current(now.state)
+    if found is None or not (helps := helping(found)):
+        raise UserError("there is no model that only helps f")
+    gone = stack_with(now.state, now.state.environment, helps[0])
+    keep = tuple(name for name in now.state.environment if name not in gone)
+    tried = next((trial for trial in now.state.trials if trial.models == keep and trial.verdict == "similar"), None)
+    return Try(numbers_of(now.state, keep)) if tried is None else Adopt(tried.number)
+
+
 def _any(state: RunState, models: Collection[str]) -> bool:
     """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that cannot be selected."""
     elements = frozenset(state.elements)
@@ -158,6 +171,7 @@ ACTIONS: dict[str, Meaning] = {
     "pin": _pin,
     "without": lambda now, pointed: _try(now, pointed, frozenset(now.state.environment).difference(pointed.models)),
     "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
+    "leave_out": _leave_out,
     "undo": lambda now, pointed: Undo(),
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,

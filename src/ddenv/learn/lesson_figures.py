@@ -1,8 +1,8 @@
 """The figures in a lesson's texts: `{names}` from a closed set, over the recorded runs. Nothing is ever computed from a text.
 
-`{without NAME}` and `{verdict on NAME}` are a certificate's claim about a model. `{rate of NAME, NAME}` is the rate that an oracle
-knows, `{chance of NAME, NAME}` the chance that one of a candidate's runs shows f. `{OTHER.name}` is a figure of a run beside the
-lesson's own.
+`{without NAME}` and `{verdict on NAME}` are a certificate's claim about a model, `{here_bound without NAME}` is what is shown of it
+at the place of the step. `{rate of NAME, NAME}` is the rate that an oracle knows, `{chance of NAME, NAME}` the chance that one of a
+candidate's runs shows f. `{OTHER.name}` is a figure of a run beside the lesson's own.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 
 from ddenv.errors import UserError
 from ddenv.evidence import claims
-from ddenv.evidence.rates import miss_chance, wilson_interval
+from ddenv.evidence.certificate import NEEDED_SHARE
+from ddenv.evidence.rates import anytime_interval, miss_chance
 from ddenv.evidence.took_part import slice_words
 from ddenv.learn.attempt import Oracle
 from ddenv.runfile.events import deed
@@ -61,7 +62,30 @@ def _fresh_whole(state: RunState) -> str:
     if not outcomes or {test.run for test in whole} < {test.run for test in tests if test.node == found.node}:
         return "no fresh run"
     shown, runs = outcomes.count("similar"), len(outcomes)
-    return claims.rate(Claim(None, "", shown, runs, *wilson_interval(shown, runs)))
+    return claims.rate(Claim(None, "", shown, runs, *anytime_interval(shown, runs)))
+
+
+def _now(state: RunState) -> Certificate:
+    """The certificate that is made, or was made last. Raises UserError before the first."""
+    if state.certificate is None:
+        raise UserError("no certificate has begun at the place of the step")
+    return state.certificate
+
+
+def _bound(state: RunState, without: str | None = None) -> str:
+    """What it has shown by now of what is left, or of that without a model. Raises UserError if it has not left that out."""
+    claim = claims.so_far(state, _now(state)).get(without)
+    if claim is None:
+        raise UserError(f"at the place of the step no fresh run has left '{without}' out")
+    return percent(claim.bound or 0.0)
+
+
+def _left(state: RunState) -> str:
+    """How often f showed in its runs of what is left, by now."""
+    now = _now(state)
+    runs = [test for test in state.confirm_tests if test.run >= now.first_run and test.without is None]
+    ended = [test.outcome for test in runs if test.node == now.node and test.is_finished]
+    return claims.of_runs(ended.count("similar"), len(ended))
 
 
 def _error(state: RunState) -> str:
@@ -116,6 +140,7 @@ OF_RUN: dict[str, Callable[[RunState], object]] = {
         "" if state.baseline is None else percent(miss_chance(state.baseline.rate, settings(state).iterations))
     ),
     "keep_rate": lambda state: percent(settings(state).keep_rate),
+    "needed_share": lambda state: percent(NEEDED_SHARE),
     "certificates": lambda state: sum(bool(each.claims) for each in state.certificates),
     "fresh": _fresh,
     "fresh_whole": _fresh_whole,
@@ -137,6 +162,9 @@ HERE: dict[str, Callable[[RunState], object]] = {
     "here_parts": lambda state: 0 if state.round is None else len(state.round.partitions),
     "here_candidates": lambda state: 0 if state.round is None else len(state.round.candidates),
     "here_kept": lambda state: first_of(list(state.environment), _NAMED),
+    "here_aim": lambda state: percent(_now(state).certify_rate),
+    "here_left": _left,
+    "here_bound": _bound,
     "here_fresh": _fresh,
     "here_fresh_whole": _fresh_whole,
 }
@@ -152,7 +180,7 @@ OF_ORACLE: dict[str, Callable[[Oracle], object]] = {
 # The rates that the oracle knows: of the whole world, at the place of the step, and at the run's end.
 TRUE_RATES = ("whole_rate", "here_rate", "end_rate")
 # Figures about one model, or about a set of them.
-_ABOUT_CLAIM = re.compile(r"(without|verdict on) (\S.*)")
+_ABOUT_CLAIM = re.compile(r"(without|verdict on|here_bound without) (\S.*)")
 _BESIDE = re.compile(r"([\w-]+)\.(.+)")
 _OF_SET = re.compile(r"(rate|chance) of (\S.*)")
 
@@ -214,6 +242,8 @@ class Figures:
         if bare in HERE:
             return str(HERE[bare](self.here))
         if about := _ABOUT_CLAIM.fullmatch(bare):
+            if about[1] == "here_bound without":
+                return _bound(self.here, about[2])
             claim = _claim(end, about[2])
             return claims.rate(claim) if about[1] == "without" else claims.short(claim)
         if self.oracle is None:

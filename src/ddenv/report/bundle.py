@@ -13,7 +13,7 @@ from string import Template
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, rate, seeds_of
+from ddenv.evidence.claims import current, meaning, rate, seeds_of, uncertified
 from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed
@@ -88,7 +88,7 @@ def write_test(run: Path, folder: Path) -> list[Path]:
 def _certified(run: Path) -> Record:
     record = read_run(run)
     if current(record.state) is None:
-        raise UserError(f"{run}: no certificate says how often what is left fails; make one first: ddenv certify {run}")
+        raise UserError(uncertified(record.state, run))
     return record
 
 
@@ -145,7 +145,7 @@ def _issue(record: Record, needs: list[str]) -> bytes:
         ISSUE,
         verdict=printable(content(record).verdict),
         failed=f"{deed(state.failure)}{at}",
-        rate=rate(found.claims[0]),
+        rate=f"{rate(found.claims[0])}: {meaning(found.claims[0], found)}",
         models="\n".join(models),
         reasons="\n".join(reasons),
         program=AGAIN,

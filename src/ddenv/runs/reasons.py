@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, verdict_on
-from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.claims import current, uncertified, verdict_on
+from ddenv.evidence.rates import anytime_interval
 from ddenv.runfile.fold_decisions import exact_runs, rested_on
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
@@ -91,10 +91,7 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
     """A reason for each model that the current certificate left out. Raises UserError where there is none."""
     certificate = current(state)
     if certificate is None:
-        raise UserError(
-            f"{file.path}: no certificate is finished for what is left, and only its fresh runs show why the robot fails; "
-            f"make one first: ddenv certify {file.path}"
-        )
+        raise UserError(uncertified(state, file.path))
     # Those that only ran ahead of time are not among the runs of the claims.
     if certificate.seeds:
         exact = exact_runs(state)
@@ -193,7 +190,7 @@ def sentence(reason: Reason) -> str:
     if not reason.ends:
         return f"{without}: no {kind} came to an end."
     most, *rarer = reason.ends
-    low, high = wilson_interval(most.number, reason.runs)
+    low, high = anytime_interval(most.number, reason.runs)
     interval = "" if reason.exact else f", {percent(low)} to {percent(high)}"
     share = f"{most.number} of {count(reason.runs, kind)}{interval}"
     more = "".join(f"; it {_does(end)} in {end.number}" for end in rarer)

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.rates import anytime_interval
 from ddenv.page.blocks import Block, Cell, Paragraph, Part, Picture, Section, Strong, Table, named, percent, say
 from ddenv.page.step_chart import LEFT, At, axes, opening, path, scale, steps
 from ddenv.report.report_map import CORNERS, picture
@@ -264,10 +264,10 @@ def _without(cells: Sequence[Found]) -> str:
 
 
 def _rate(shown: int, runs: int) -> str:
-    """With Wilson's 95 % interval: "9 of 10 (60 % to 98 %)"."""
+    """With its 95 % interval, which holds although the runs decided how many there were: "9 of 10 (51 % to >99 %)"."""
     if not runs:
         return "–"
-    low, high = wilson_interval(shown, runs)
+    low, high = anytime_interval(shown, runs)
     return f"{shown} of {runs} ({percent(low)} to {percent(high)})"
 
 

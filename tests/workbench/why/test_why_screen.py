@@ -10,10 +10,12 @@ from click.testing import CliRunner
 from textual.widgets import OptionList
 
 from ddenv.cli.command_line import app as command_line
+from ddenv.evidence.certificate import Pairs
 from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import parting_sentence, reasons, sentence
+from ddenv.text import percent
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.why.why_screen import WhyScreen
@@ -72,6 +74,8 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
     async with Attached(run) as session:
         screen = await opened(session)
         assert "It is being made: 17 of about" in words(screen, "#why-empty")
+        kept = percent(Pairs(both=11, second=1).keeps_at_least(0.015))
+        assert f"so far at least {kept} of the whole world's rate is kept" in words(screen, "#why-empty")
         run.certify_all(2, "crate_01", "ppp")
         run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "needed", "opp"), ("crate_01", "needed", "ppp"))
         run.write("finished", minimal=True, reason="no single model can be removed")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import current, ended, fresh_runs_made, missed, of_runs, promise, terms, usual_runs
+from ddenv.evidence.claims import current, ended, fresh_runs_made, helping, missed, of_runs, promise, terms, usual_runs
 from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
@@ -331,7 +331,9 @@ def _finished(state: RunState) -> Happening:
     base = baseline_sentence(state)
     if not state.certified:
         left = f"{kept} left: {_names(state)}."
-        return "returned", (_reason(state, "The run ended early."), *out_of_budget(state), left)
+        helps = () if (found := current(state)) is None else helping(found)
+        out = (f"{plain(helps[0])} only helps: press H to leave it out, and search on.",) if helps else ()
+        return "returned", (_reason(state, "The run ended early."), *out, *out_of_budget(state), left)
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)

@@ -13,6 +13,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from ddenv.guiding.offers import Offer, Pointed, offer
+from ddenv.guiding.selections import Try
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
@@ -39,6 +40,7 @@ FIRST = (
     "run.pause",
     "run.accept",
     "run.reject",
+    "run.leave_out",
     "run.step",
     "run.veto",
     "run.pin",
@@ -147,6 +149,13 @@ _KEYS = [
         "try only",
         id="run.only",
         tooltip="try by hand: test the selected models alone, or those you name",
+    ),
+    Binding(
+        "H",
+        "guide('leave_out')",
+        "leave out",
+        id="run.leave_out",
+        tooltip="leave out the model that only helps, by the certificate: try the environment without it, and adopt it if f shows",
     ),
     Binding(
         "u", "guide('undo')", "undo", id="run.undo", tooltip="undo: take back the last reduction; it is not made again"
@@ -313,6 +322,7 @@ class KeyOffers:
             return
         command = self.offer(name).command
         if command is not None and name != "pin":
+            self._asking.adopts = command.models if name == "leave_out" and isinstance(command, Try) else ()
             self._asking.ask(command)
         elif name == "change":
             self._opening.change()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from ddenv.evidence.claims import current, in_the_making, made_of_usual, meaning, rate
+from ddenv.evidence.claims import current, in_the_making, made_of_usual, meaning, rate, shown
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
@@ -147,10 +147,15 @@ def nothing_yet(state: RunState, works: bool, run: str) -> str:
     if (certificate := current(state)) is not None:
         return no_reasons(certificate)
     if command:
-        return f"{shows}\n\nWhat is left has none. Make one, and come back: {command}   (c copies that)"
+        return f"{shows}\n\n{_sentence(shown(state))} Make one, and come back: {command}   (c copies that)"
     if making is not None:
-        return f"{shows}\n\nIt is being made: {made_of_usual(state, making)}. This page fills by itself."
+        made = made_of_usual(state, making)
+        return f"{shows}\n\nIt is being made: {made}. This page fills by itself.\n\n{_sentence(shown(state))}"
     return f"{shows}\n\nIt is made once the search has ended, and this page fills by itself. The search still goes on."
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."
 
 
 def remedy(state: RunState, works: bool, run: str) -> str:
