@@ -19,7 +19,7 @@ from ddenv.runfile.state import BROKEN, RunState, Trial
 from ddenv.runfile.supports import stack_with
 from ddenv.text import between, count, first_of, percent
 
-MOST_NAMES = 3
+MOST_NAMES, MOST_SEEDS = 3, 4
 NO_FRESH_RUNS = "no fresh runs were made"
 
 
@@ -98,7 +98,7 @@ def _exactly(certificate: Certificate) -> str:
 
 def seeds_of(certificate: Certificate) -> str:
     seeds = certificate.seeds
-    return f"seed{'s' * (len(seeds) > 1)} {first_of([str(seed) for seed in seeds], MOST_NAMES)}"
+    return f"seed{'s' * (len(seeds) > 1)} {first_of([str(seed) for seed in seeds], MOST_SEEDS)}"
 
 
 def kept(certificate: Certificate) -> str:
