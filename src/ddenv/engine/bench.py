@@ -30,7 +30,7 @@ from ddenv.runfile.events import Implied, TestFinished, TestStarted, TrialJudged
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.store import ROBOT, Motions
 from ddenv.text import count
-from ddenv.world.scenario import FailureSpec
+from ddenv.world.scenario import FailureSpec, Reduction, seed_of
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -152,7 +152,8 @@ class Bench:
             return None
         environment, state = journal.number(wanted.environment), journal.state
         # All candidates meet the same noise.
-        seed, number = state.scenario["reduction"]["seed"] + wanted.run, len(state.tests) + 1
+        reduction, number = Reduction.model_validate(state.scenario["reduction"]), len(state.tests) + 1
+        seed = seed_of(reduction, wanted.run)
         round = journal.current.number if wanted.why == "round" else None
         started = TestStarted(
             number,

@@ -6,6 +6,7 @@ Written as one YAML file, validated here. Lengths are in m, angles in rad, times
 from __future__ import annotations
 
 import math
+from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -229,6 +230,14 @@ else:
     Reduction = _section("Reduction", "reduction", _Printed)
     FailureSpec = _section("FailureSpec", "failure")
     Simulation = _section("Simulation", "simulation")
+
+
+def seed_of(reduction: Reduction, run: int) -> int:
+    """The seed of run number `run` of each environment."""
+    if reduction.seeds == "consecutive":
+        return reduction.seed + run
+    # Some simulators take no more than 31 bits.
+    return int.from_bytes(blake2b(f"{reduction.seed} {run}".encode(), digest_size=4).digest()) >> 1
 
 
 class Oracle(Section):
