@@ -20,6 +20,8 @@ from ddenv.settings import FARTHEST, TURNS, Ignorable
 LARGEST = 1e6
 Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-TURNS, le=TURNS, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Corner = tuple[Finite, Finite, Finite]
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 
@@ -252,6 +254,18 @@ class Oracle(Section):
     folder: Path | None = Field(default=None, description="where the command starts, if not in the scenario's folder")
 
 
+class Whole(Section):
+    """What a part of a world has from the whole of it, so that its runs stay the same to the last bit. `ddenv export` writes it.
+
+    What is lower than `floor` (m) has fallen out of the world. `corners` (m) are the lowest and the highest of the box around its
+    models: the ground reaches beyond it. `moving` models can move, and share the time that is spent on how piles move.
+    """
+
+    floor: Finite
+    corners: tuple[Corner, Corner] | None
+    moving: int = Field(ge=0, le=10_000_000)
+
+
 class Scenario(Section):
     """Everything one reduction needs to know. `world` is an SDF file, relative to the scenario's folder.
 
@@ -272,3 +286,4 @@ class Scenario(Section):
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()
     protected: tuple[str, ...] = Field(default=(), description="models that always stay")
+    whole: Whole | None = Field(default=None, description="of the world that this one is a part of")
