@@ -22,7 +22,7 @@ from ddenv.runfile.state import Test
 from ddenv.runs import processor
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import find_scenario, load_scenario
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Reduction, Scenario, seed_of
 
 Asked = tuple[frozenset[str], int]
 
@@ -45,8 +45,8 @@ def main() -> None:
     scenario = load_scenario(find_scenario(options.scenario))
     world, _ = load_parts(scenario)
     elements = world.elements(frozenset(scenario.protected))
-    asked = tests(elements, options.environments, options.seeds, scenario.reduction.seed)
-    whole = [(frozenset(elements), scenario.reduction.seed + run) for run in range(scenario.reduction.baseline_runs)]
+    asked = tests(elements, options.environments, options.seeds, scenario.reduction)
+    whole = [(frozenset(elements), seed_of(scenario.reduction, run)) for run in range(scenario.reduction.baseline_runs)]
     with multiprocessing.get_context("spawn").Pool(options.jobs, prepare, (scenario,)) as pool:
         failure = fixed(scenario, pool.map(full_run, whole))
         pairs = list(pool.imap_unordered(both_runs, asked))
@@ -60,11 +60,11 @@ def main() -> None:
             print(f"differs: {words(pair.early, failure)}, in full {words(pair.full, failure)}")
 
 
-def tests(elements: tuple[str, ...], environments: int, seeds: int, first: int) -> list[Asked]:
-    """Random parts of all sizes, each with some seeds from `first` on."""
+def tests(elements: tuple[str, ...], environments: int, seeds: int, reduction: Reduction) -> list[Asked]:
+    """Random parts of all sizes, each with the first seeds of the reduction."""
     chance = random.Random(0)
     parts = [frozenset(chance.sample(elements, chance.randrange(1, len(elements)))) for _ in range(environments)]
-    return [(part, first + run) for part in parts for run in range(seeds)]
+    return [(part, seed_of(reduction, run)) for part in parts for run in range(seeds)]
 
 
 def prepare(scenario: Scenario) -> None:

@@ -19,7 +19,7 @@ from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Variants
 from ddenv.runs.subject import load_parts
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Scenario, seed_of
 
 Keep = frozenset[str]
 BEGUN, SIMILAR, WITHOUT = "begun", "similar", "without"
@@ -60,7 +60,7 @@ def workers(jobs: int) -> ProcessPoolExecutor:
 def _baseline_run(run: int) -> RunResult:
     everything = frozenset(_elements)
     _write(everything, run, BEGUN)
-    result = _simulator.run(everything, _scenario.reduction.seed + run)
+    result = _simulator.run(everything, seed_of(_scenario.reduction, run))
     # Nobody asks for a verdict on the whole world.
     _write(everything, run, SIMILAR)
     return result
@@ -69,7 +69,7 @@ def _baseline_run(run: int) -> RunResult:
 def shows(keep: Keep, run: int) -> bool:
     """Whether f shows in one run of what is kept."""
     _write(keep, run, BEGUN)
-    result = _simulator.run(keep, _scenario.reduction.seed + run, full=not _scenario.reduction.early_stop)
+    result = _simulator.run(keep, seed_of(_scenario.reduction, run), full=not _scenario.reduction.early_stop)
     similar = judge(result, _failure).outcome == SIMILAR
     _write(keep, run, SIMILAR if similar else WITHOUT)
     return similar

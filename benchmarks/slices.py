@@ -41,7 +41,7 @@ FORGOTTEN = {
     "robot": lambda: setattr(Reached, "_look_around_robot", lambda *_: None),
     "models": lambda: setattr(Reached, "_look_around_models", lambda *_: None),
     "awake": lambda: setattr(Sleep, "took_part", frozenset()),
-    "lidar": lambda: setattr(Lidar, "took_part", frozenset()),
+    "lidar": lambda: setattr(Lidar, "took_part", {}),
     "unusual": lambda: setattr(Repertoire, "unusual", lambda *_: frozenset()),
     "carriers": lambda: setattr(Template, "_carriers", lambda *_: frozenset()),
     "ties": lambda: setattr(Template, "ties", lambda *_: []),

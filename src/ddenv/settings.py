@@ -156,12 +156,17 @@ class Reduction:
     )
     seed: int = setting(
         0,
-        "seed of the first run; run i of each candidate uses seed + i",
+        "number that the seeds of all runs follow from; run i has the same seed in each candidate",
         least=0,
         most=2**31 - 1,
         shown="basic",
         more="The same seed repeats the same runs.",
         cost="Costs nothing.",
+    )
+    seeds: Literal["hashed", "consecutive"] = setting(
+        "hashed",
+        "the seed of run i: a hash of the seed and i (hashed), or seed + i (consecutive)",
+        more="Consecutive is for simulators whose seeds are an index; poor generators draw much the same for seeds in a row.",
     )
     baseline_runs: int = setting(10, "runs of the whole world before the first round", least=1, most=1000, shown="more")
     failure: int = setting(

@@ -66,6 +66,8 @@ class FakePool:
         self.supports: list[tuple[str, str]] | Broken = []
         self.ties: list[tuple[str, str]] | None = None
         self.took_part: TookPart = lambda *_: None
+        # When a run of these models has each of them in view, s.
+        self.sensed: Callable[[frozenset[str], int], dict[str, float]] = lambda *_: SENSED
         # Where the robot is to the left of its way, m: runs that end alike may still differ.
         # The models that move by themselves wherever they are kept.
         self.moves: frozenset[str] = frozenset()
@@ -102,7 +104,8 @@ class FakePool:
         made = result(outcome, seed, x, bool(cut))
         made.trajectory[1, 2] = self.aside(keep, seed)
         motions = {name: made.trajectory.copy() for name in self.moves & keep}
-        return [(test, replace(made, took_part=self.took_part(keep, seed), motions=motions))]
+        more = {"took_part": self.took_part(keep, seed), "first_sensed": self.sensed(keep, seed)}
+        return [(test, replace(made, motions=motions, **more))]
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         looks = iter([None] * self.settling)
@@ -114,12 +117,10 @@ class FakePool:
 
 
 def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction) -> Path:
-    """A run file of the small world, reduced as printed: the tests know the paper's rounds."""
+    """A run file of the small world, reduced as printed: the tests know the paper's rounds, and oracles a run by its seed."""
     scenario = load_scenario(DATA / "wall.yaml")
-    changed = {
-        "world": world,
-        "reduction": scenario.reduction.model_copy(update=PRINTED | CHEAP | {"early_stop": early_stop} | reduction),
-    }
+    usual = PRINTED | CHEAP | {"early_stop": early_stop, "seeds": "consecutive"}
+    changed = {"world": world, "reduction": scenario.reduction.model_copy(update=usual | reduction)}
     scenario = scenario.model_copy(update=changed)
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
     create_run(scenario, path)

@@ -67,8 +67,15 @@ class Participation:
     def outcome(self, keep: Keep, seed: int) -> str:
         return self.run(keep, seed)[0]
 
+    def senses(self, keep: Keep, seed: int) -> dict[str, float]:
+        """When each model is in view: what others hide of those that took no part differs between worlds with the same bits."""
+        met = self.run(keep, seed)[1]
+        order = {name: crc32(f"{seed} {name} {'' if name in met else sorted(keep)}".encode()) % 100 for name in keep}
+        return {name: place / 10 for name, place in order.items() if name in met or place % 2}
+
     def told(self, pool: FakePool) -> FakePool:
         """A pool that knows who took part."""
+        pool.sensed = self.senses
         pool.took_part = lambda keep, seed: self.run(keep, seed)[1] - self.hidden
         pool.aside = lambda keep, seed: self.run(keep, seed)[2] / 2**32
         pool.ties = list(self.ties)

@@ -177,11 +177,6 @@ def test_one_worker_makes_no_test_for_nothing(tmp_path):
     assert judged == {test.id for test in state.tests if test.phase == "round"}
 
 
-def test_seeds_are_common_to_all_candidates(tmp_path):
-    state = drive(new_run(tmp_path, seed=40), FakePool(needs("wall"), 2))
-    assert {test.seed - test.run for test in state.tests} == {40}
-
-
 @every_method
 @given(salt=st.integers(0, 5), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
 @examples(0.1)

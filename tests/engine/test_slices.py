@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ddenv.runfile.events import SlicesRefuted
@@ -92,14 +92,22 @@ def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(tmp_path, 
     assert (audits, implied) == (simulated, 1 - simulated)
 
 
-@given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), algorithm=st.sampled_from(["ddenv", "splitting"]))
+METHODS = [{}, {"algorithm": "splitting"}, {"pair": "model2model/timestep"}, {"pair": "learner/timestep"}]
+HALF = Participation(salt=40, needed=(MODELS[18], MODELS[3], MODELS[7]), tenths=6)
+
+
+@given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), method=st.sampled_from(METHODS))
+# What a run has in view beside what took part in it is otherwise where it is simulated again.
+@example(made_by=HALF, jobs=3, seed=0, method=METHODS[2])
+@example(made_by=HALF, jobs=3, seed=0, method=METHODS[3])
 @examples(0.3)
-def test_workers_change_nothing(made_by, jobs, seed, algorithm):
+def test_neither_workers_nor_audits_change_anything(made_by, jobs, seed, method):
     with tempfile.TemporaryDirectory() as folder:
         alone, together = (
-            drive(sliced_run(Path(folder), accept_rate="kept", algorithm=algorithm), made_by.pool(workers, seed))
-            for workers in (1, jobs)
+            drive(sliced_run(Path(folder), accept_rate="kept", audit=audit, **method), made_by.pool(workers, seed))
+            for workers, audit in ((1, 1), (jobs, 1_000_000))
         )
+    assert together.refuted is None
     assert journey(together) == journey(alone)
 
 
@@ -220,6 +228,12 @@ def test_where_each_reduction_waits_for_the_user_none_is_made_without_a_test(tmp
     state = drive(path, pool, accept_mode="ask")
     assert {node.how for node in state.nodes[1:]} == {"reduced"}
     assert state.implied
+
+
+def test_an_audit_that_senses_what_took_part_at_another_time_is_found_out(tmp_path):
+    pool = HONEST.pool()
+    pool.sensed = lambda keep, seed: dict.fromkeys(keep, len(keep) / 10)
+    assert drive(sliced_run(tmp_path, accept_rate="kept", audit=1), pool).refuted is not None
 
 
 def test_what_went_without_a_test_is_no_evidence_of_its_rate(tmp_path):

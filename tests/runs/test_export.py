@@ -7,10 +7,12 @@ import sys
 import pytest
 import yaml
 
+from ddenv.robot.piles import rehearsal
+from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
-from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import PLAIN
 from tests.conftest import ROOT
@@ -184,6 +186,51 @@ def test_protected_models_are_called_as_they_are_in_the_exported_world(tmp_path,
     assert written(folder)["protected"] == ["box", "post"]
     world, _ = load_parts(load_scenario(folder / "m.yaml"))
     assert {model.name: model.pose.position[0] for model in world.models} == {"post": 11, "box": 14, "crate": 17}
+
+
+GROUND = (
+    box("ground", 0)
+    .replace("<box><size>1 1 1</size></box>", "<plane><normal>0 0 1</normal></plane>")
+    .replace("5 0", "0 0")
+)
+TABLE = box("table", 0).replace("0 5 0", "0 0 -0.5").replace("1 1 1", "3 3 1")
+SLOPE = box("slope", 0).replace("0 5 0 0 0", "-2 4 0 0 0.2")
+
+
+def ball(name, x):
+    """It rolls down the slope, and away for good."""
+    round = (
+        box(name, x)
+        .replace("5 0 0", "4 0.9 0")
+        .replace("<box><size>1 1 1</size></box>", "<sphere><radius>0.2</radius></sphere>")
+    )
+    return round.replace("<static>1</static>", "")
+
+
+# The models, and those of them that are left.
+PARTS = {
+    "a far one is gone": ([GROUND, box("post", 2).replace("2 5", "2 0.6"), box("far", 300)], ["post"]),
+    "a low one is gone": ([TABLE, box("low", 0).replace("5 0", "0 -9")], ["table"]),
+    "another one that moves is gone": ([GROUND, SLOPE, ball("ball", -2), ball("other", 30)], ["slope", "ball"]),
+}
+
+
+@pytest.mark.parametrize(("models", "keep"), PARTS.values(), ids=PARTS)
+def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(tmp_path, folder, monkeypatch, models, keep):
+    # How a ball rolls is found out for so long, shared by all of them.
+    monkeypatch.setattr(rehearsal, "BUDGET", 5.0)
+    run = run_of(tmp_path, models, keep=keep)
+    export_world(run, folder / "m.sdf", folder / "m.yaml")
+    with RunFile(run) as file:
+        scenario, *parts = read_parts(file)
+    there = load_scenario(folder / "m.yaml")
+    one = Variants(*parts, scenario).run(frozenset(keep), seed=1)
+    two = Variants(*load_parts(there), there).run(frozenset(keep), seed=1)
+    assert (one.failure, one.trajectory.tobytes()) == (two.failure, two.trajectory.tobytes())
+    assert {name: rows.tobytes() for name, rows in one.motions.items()} == {
+        name: rows.tobytes() for name, rows in two.motions.items()
+    }
+    assert ("ball" in keep) == bool(one.motions)
 
 
 def test_the_command_line_says_what_is_still_needed(tmp_path, folder):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddenv.world.extent import with_ground_boxes
+from ddenv.world.extent import corners, with_ground_boxes
 from ddenv.world.sdf.read import parse_world
 from tests.conftest import ROOT
 
@@ -26,14 +26,14 @@ def extent(world):
 
 
 def test_its_top_is_the_plane():
-    size, middle = extent(with_ground_boxes(world((3, 4))))
+    size, middle = extent(with_ground_boxes(made := world((3, 4)), corners(made)))
     assert size == (200, 200, 1)
     assert middle == pytest.approx((0, 0, -0.25))
 
 
 @pytest.mark.parametrize("places", [((300.0, 0.0),), ((0.0, 0.0), (-1000.0, 5000.0)), ((90.0, 0.0),)])
 def test_it_reaches_beyond_everything(places):
-    made = with_ground_boxes(world(*places), [(0.0, 150.0, 0.0)])
+    made = with_ground_boxes(world(*places), corners(world(*places)), [(0.0, 150.0, 0.0)])
     (collision,) = made.model("g").collisions
     for x, y in (*places, (0.0, 150.0)):
         local = collision.pose.inverse().rotate(

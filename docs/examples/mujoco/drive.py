@@ -21,14 +21,13 @@ from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, Truth, setup_of
 from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.world.drive import find_drive
-from ddenv.world.extent import model_bounds
 from ddenv.world.load import load_scenario
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.read import read_model, read_world
+from ddenv.world.whole import whole_of
 
 STEP = 0.002  # MuJoCo's time step at most, s: its contacts need shorter ones than Drake's
-FALL = 2.0  # so far below everything the robot has fallen out of the world, m
 
 
 class Broken(Exception):
@@ -115,8 +114,7 @@ def drive(parts: Parts, seed: int) -> bool:
         names = frozenset(model.name for model in world.models)
         moving = [model for model in world.models if not model.static]
         lidar = Lidar(scenario.sensors.lidar, Obstacles.of(world), names, moving, suite.lidar)
-    boxes = [box for box in map(model_bounds, world.models) if box is not None]
-    floor = min((float(low[2]) for low, _ in boxes), default=0.0) - FALL
+    floor = whole_of(world, scenario).floor
     speeds, before, goal = np.zeros(len(parts.drive.joints)), 0, scenario.goal
     print("t,x,y,z,qx,qy,qz,qw")
     for tick in parts.clock.ticks:

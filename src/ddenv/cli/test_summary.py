@@ -18,12 +18,12 @@ def line(result: Mapping[str, Any]) -> str:
     """A run and how it ended."""
     without = f"  without {result['without']}" if result["without"] else ""
     if result["end_pose"] is None:
-        return printable(f"seed {result['seed']:<4} {result['outcome']:<8} {result['failure']}{without}")
+        return printable(f"seed {result['seed']:<10} {result['outcome']:<8} {result['failure']}{without}")
     x, y, z = result["end_pose"][:3]
     distance = "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     failure = f"  {result['failure']}" if result["failure"] else ""
     return printable(
-        f"seed {result['seed']:<4} {result['outcome']:<8} ended at ({x:.2f}, {y:.2f}, {z:.2f}) m "
+        f"seed {result['seed']:<10} {result['outcome']:<8} ended at ({x:.2f}, {y:.2f}, {z:.2f}) m "
         f"after {result['simulated_seconds']:.1f} s{failure}{distance}{without}"
     )
 

@@ -31,7 +31,7 @@ from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT, Motions
 from ddenv.text import count
-from ddenv.world.scenario import FailureSpec
+from ddenv.world.scenario import FailureSpec, Reduction, seed_of
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -153,7 +153,8 @@ class Bench:
             return None
         environment, state = journal.number(wanted.environment), journal.state
         # All candidates meet the same noise.
-        seed, number = state.scenario["reduction"]["seed"] + wanted.run, len(state.tests) + 1
+        reduction, number = Reduction.model_validate(state.scenario["reduction"]), len(state.tests) + 1
+        seed = seed_of(reduction, wanted.run)
         round = state.round.number if state.round is not None and wanted.why == "round" else None
         started = TestStarted(
             number,

@@ -23,7 +23,7 @@ from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction
 
-# Far from all seeds of certificates, of which each has some thousands.
+# Far from all runs of certificates, of which each has some thousands.
 FIRST_RUN = 100_000_000
 # So many fresh runs of the world that passes, at least: their interval has to say something.
 FEWEST_RUNS = 20

@@ -21,7 +21,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import count
-from ddenv.world.scenario import Oracle
+from ddenv.world.scenario import Oracle, seed_of
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,9 @@ def plan(
     seed: int | None = None,
     repeat: int = 1,
     test: int | None = None,
+    first_run: int = 0,
 ) -> list[Trial]:
-    """The runs asked for. Seeds are `seed`, `seed + 1`, ... (the scenario's own by default). Raises UserError."""
+    """The runs asked for. Seeds are `seed`, `seed + 1`, ..., or the scenario's from `first_run` on. Raises UserError."""
     models = _models(subject, keep, minimal)
     if test is not None:
         if minimal or keep is not None or seed is not None:
@@ -60,11 +61,12 @@ def plan(
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
     models = tuple(name for name in models if name not in (leave_out or []))
-    base = subject.scenario.reduction.seed if seed is None else seed
+    reduction, runs = subject.scenario.reduction, range(first_run, first_run + repeat)
+    seeds = [seed_of(reduction, run) for run in runs] if seed is None else range(seed, seed + repeat)
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
     if leave_each_out:
         keeps += [(frozenset(models) - {name}, name) for name in models]
-    return [Trial(there, base + run, without) for there, without in keeps for run in range(repeat)]
+    return [Trial(there, each, without) for there, without in keeps for each in seeds]
 
 
 def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
@@ -124,8 +126,8 @@ def _failures(subject: Subject) -> tuple[Failure, ...]:
         return failures_of(file, subject.state, subject.scenario.failure)
 
 
-# Far from all seeds of a reduction and of its certificates.
-FIRST_SEED = 1_000_000_000
+# Far from all runs of a reduction, of its certificates and of isolations.
+FIRST_RUN = 1_000_000_000
 # After this number of broken runs nothing is said.
 MOST_BROKEN = 5
 
@@ -192,7 +194,7 @@ def reproduce(
     shown: list[bool] = []
     broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
     trials = [trial for seed in seeds for trial in plan(subject, minimal=True, seed=seed)]
-    for result in run_trials(subject, trials or plan(subject, minimal=True, seed=FIRST_SEED, repeat=most), jobs):
+    for result in run_trials(subject, trials or plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most), jobs):
         if result["outcome"] in BROKEN:
             broken += 1
         else:

@@ -120,16 +120,20 @@ def compare(journal: Journal, audits: Iterable[Test]) -> None:
 
 
 def repeats(journal: Journal, audit: Test) -> bool:
-    """Whether a finished audit has the bits of the run that implies it; True for one that has none, since its worker died."""
+    """Whether a finished audit has the bits of the run that implies it, and sensed what took part at the same times; True for one
+    without bits, since its worker died.
+    """
     if audit.audits is None or not (again := journal.file.motions(audit.id)):
         return True
     source, state = journal.state.tests[audit.audits - 1], journal.state
     # What took no part may have moved by itself.
     gone = (state.environments[0] - state.environments[audit.environment]).names(state.elements)
     first = {name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone}
-    same_end = _end(source) == _end(audit) and first.keys() == again.keys()
+    took_part = frozenset((source.took_part or NOTHING).names(state.elements))
+    same_end = _end(source, took_part) == _end(audit, took_part) and first.keys() == again.keys()
     return same_end and all(first[name].tobytes() == again[name].tobytes() for name in first)
 
 
-def _end(test: Test) -> tuple[bool, str, bool]:
-    return test.outcome == "pass", test.failure, test.cut
+def _end(test: Test, seen: frozenset[str]) -> tuple[bool, str, bool, dict[str, float]]:
+    sensed = {name: at for name, at in test.first_sensed if name in seen}
+    return test.outcome == "pass", test.failure, test.cut, sensed

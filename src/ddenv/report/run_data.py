@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.runfile.events import Created, RoundStarted
-from ddenv.runfile.fold import steps
+from ddenv.runfile.fold import recorded_scenario, steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
@@ -76,7 +76,7 @@ def read_run(path: Path) -> Record:
         path=path,
         state=state,
         rounds=rounds,
-        asked=first.event.scenario,
+        asked=recorded_scenario(first.event.scenario),
         started=first.time,
         alive=alive,
         world=world,

@@ -69,12 +69,18 @@ class Follower:
             yield recorded, before, after
 
 
+def recorded_scenario(scenario: dict[str, Any]) -> dict[str, Any]:
+    """A scenario as a run file has it: where it does not say so, seeds were consecutive."""
+    reduction = scenario.get("reduction")
+    return scenario | {"reduction": {"seeds": "consecutive"} | reduction} if isinstance(reduction, dict) else scenario
+
+
 def _created(state: RunState, event: e.Created, _: float) -> Changes:
     if state.tests or len(state.nodes) > 1 or state.round is not None:
         raise ValueError("a second created")
     names = event.elements
     return {
-        "scenario": event.scenario,
+        "scenario": recorded_scenario(event.scenario),
         "elements": names,
         "environments": PersistentTuple.of([Environment.whole(len(names))]),
         "environment": names,

@@ -17,6 +17,7 @@ from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import parse_model, parse_world
+from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
 
@@ -63,6 +64,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     if scenario.oracle is not None and scenario.oracle.folder is not None:
         data["oracle"]["folder"] = _name(scenario.oracle.folder, folder)
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
+    data["whole"] = whole_of(world, scenario).model_dump(mode="json")
     data["protected"] = _renamed(scenario.protected, world, removed, minimal)
     needed = (*_folders(scenario, asked, robot, documents), *_packages(scenario.robot.model, robot))
     model_path = (*scenario.reading.model_path, *needed)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ddenv.errors import UserError
-from ddenv.runfile.fold import fold
+from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import SUFFIX, find_run
@@ -243,8 +243,8 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
 def read_scenario(run: RunFile) -> Scenario:
     """The scenario of a run file. Raises UserError."""
     try:
-        return Scenario.model_validate(json.loads(run.document("scenario")))
-    except ValueError:
+        return Scenario.model_validate(recorded_scenario(json.loads(run.document("scenario"))))
+    except (AttributeError, ValueError):
         raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
 
 

@@ -137,16 +137,24 @@ DEPTH = 1.0  # of a box in place of a plane, m
 BEYOND = 20.0  # minimum width of ground beyond all models, m
 
 
-def with_ground_boxes(world: World, places: Iterable[Vector] = ()) -> World:
-    """`world` with a box for each plane, wide enough for all models and `places` (m, world frame).
+def corners(world: World) -> tuple[Vector, Vector] | None:
+    """The lowest and the highest corner of the box around all models, m; None if there are none."""
+    box = around(each for model in world.models if (each := model_bounds(model)) is not None)
+    if box is None:
+        return None
+    (x, y, z), (right, back, top) = box[0].tolist(), box[1].tolist()
+    return (x, y, z), (right, back, top)
+
+
+def with_ground_boxes(world: World, box: tuple[Vector, Vector] | None, places: Iterable[Vector] = ()) -> World:
+    """`world` with a box for each plane, wide enough for all between two corners and for `places` (m, world frame).
 
     Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).
     """
     if not any(isinstance(one.shape, Plane) for model in world.models for one in model.collisions):
         return world
-    boxes = [box for box in map(model_bounds, world.models) if box is not None]
-    corners = [corner for low, high in boxes for corner in product(*zip(low, high, strict=True))]
-    points = np.array([*corners, *places], dtype=float).reshape(-1, 3)
+    within = product(*zip(*box, strict=True)) if box else ()
+    points = np.array([*within, *places], dtype=float).reshape(-1, 3)
     return replace(world, models=tuple(_boxed(model, points) for model in world.models))
 
 

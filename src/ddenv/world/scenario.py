@@ -6,6 +6,7 @@ Written as one YAML file, validated here. Lengths are in m, angles in rad, times
 from __future__ import annotations
 
 import math
+from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -19,6 +20,8 @@ from ddenv.settings import FARTHEST, TURNS, Ignorable
 LARGEST = 1e6
 Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-TURNS, le=TURNS, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Corner = tuple[Finite, Finite, Finite]
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 
@@ -231,6 +234,14 @@ else:
     Simulation = _section("Simulation", "simulation")
 
 
+def seed_of(reduction: Reduction, run: int) -> int:
+    """The seed of run number `run` of each environment."""
+    if reduction.seeds == "consecutive":
+        return reduction.seed + run
+    # Some simulators take no more than 31 bits.
+    return int.from_bytes(blake2b(f"{reduction.seed} {run}".encode(), digest_size=4).digest()) >> 1
+
+
 class Oracle(Section):
     """A program that runs the robot in place of Drake: any simulator.
 
@@ -241,6 +252,18 @@ class Oracle(Section):
     command: str = Field(min_length=1)
     name: str = Field(default="", max_length=40, description="what results call it")
     folder: Path | None = Field(default=None, description="where the command starts, if not in the scenario's folder")
+
+
+class Whole(Section):
+    """What a part of a world has from the whole of it, so that its runs stay the same to the last bit. `ddenv export` writes it.
+
+    What is lower than `floor` (m) has fallen out of the world. `corners` (m) are the lowest and the highest of the box around its
+    models: the ground reaches beyond it. `moving` models can move, and share the time that is spent on how piles move.
+    """
+
+    floor: Finite
+    corners: tuple[Corner, Corner] | None
+    moving: int = Field(ge=0, le=10_000_000)
 
 
 class Scenario(Section):
@@ -263,3 +286,4 @@ class Scenario(Section):
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()
     protected: tuple[str, ...] = Field(default=(), description="models that always stay")
+    whole: Whole | None = Field(default=None, description="of the world that this one is a part of")

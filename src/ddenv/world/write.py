@@ -19,7 +19,7 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.world.access import write_file
-from ddenv.world.extent import with_ground_boxes
+from ddenv.world.extent import corners, with_ground_boxes
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -79,7 +79,7 @@ def convert(world: World, mesh_folder: str) -> Converted:
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
     names = _unique(model.name for model in world.models)
-    for name, model in zip(names, with_ground_boxes(world).models, strict=True):
+    for name, model in zip(names, with_ground_boxes(world, corners(world)).models, strict=True):
         _model(inside, name, model, out)
     ElementTree.indent(root)
     out.text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of, resting_corners
-from ddenv.robot.simulation.template import Template, lowest
+from ddenv.robot.simulation.template import Template
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose
+from ddenv.world.whole import whole_of
 from tests.robot.conftest import link_of, model_of, wedge
 
 CUBE = np.array([(x, y, z) for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)])
@@ -95,10 +96,10 @@ def test_a_mesh_of_many_corners_gets_32_spread_over_it():
         assert np.diff([*angles, angles[0] + 2 * np.pi]).max() < 1.0
 
 
-def test_nothing_of_a_world_is_lower_than_its_lowest_surface(world_of, add):
+def test_the_floor_is_below_the_lowest_surface_of_the_world(world_of, add, scenario_of):
     pit = model_of("pit", link_of("link", wedge(1.0, 1.0, 1.0), Pose((0.0, 0.0, -4.0)), mass=None))
-    assert lowest(add(world_of(), pit)) == pytest.approx(-4.5)
-    assert lowest(world_of()) == 0.0
+    assert whole_of(add(world_of(), pit), scenario_of()).floor == pytest.approx(-6.5)
+    assert whole_of(world_of(), scenario_of()).floor == -2.0
 
 
 def tile(across: int) -> list[Collision]:

@@ -14,6 +14,7 @@ from ddenv.errors import UserError
 from ddenv.robot.external import process, simulator
 from ddenv.world.load import load_scenario
 from ddenv.world.sdf.read import read_world
+from ddenv.world.whole import whole_of
 from tests.conftest import DATA, ROOT
 from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
 
@@ -67,6 +68,7 @@ def test_the_scenario_goes_along_in_the_reduced_world(simulator_of, tmp_path):
     assert shown.oracle is None
     assert (shown.robot, shown.goal, shown.sensors) == (own.robot, own.goal, own.sensors)
     assert shown.reading.model_path[0] == own.world.parent
+    assert shown.whole == whole_of(read_world(own.world), own)
 
 
 def test_the_log_may_be_a_file_and_its_name_works_without_one(simulator_of):

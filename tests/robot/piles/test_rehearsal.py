@@ -26,7 +26,7 @@ def script(*names: str) -> Script:
 
 
 def test_the_scripts_that_were_used_last_are_held_in_a_bounded_memory(world_of, monkeypatch):
-    repertoire = Repertoire(world_of())
+    repertoire = Repertoire(world_of(), moving=0)
     everything = frozenset({"ground"})
     first = repertoire.add(("a",), everything, script("a"), 0.1)
     monkeypatch.setattr(rehearsal, "MEMORY", 3.5 * first.size)

@@ -10,9 +10,10 @@ import pytest
 from ddenv.robot.drake.plant import MANY
 from ddenv.robot.piles import rehearsal
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import FALL, Template
+from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
+from ddenv.world.whole import FALL
 from tests.robot.conftest import box_model, joint_of, link_of, model_of, wedge
 from tests.tiers import slow
 

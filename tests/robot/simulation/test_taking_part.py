@@ -64,11 +64,19 @@ def with_ties(world: Variants, models: frozenset[str], there: frozenset[str]) ->
     return models
 
 
+def sensed(result: RunResult, names: frozenset[str]) -> dict[str, float]:
+    return {name: at for name, at in result.first_sensed.items() if name in names}
+
+
 def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1) -> bool:
-    """Whether a run of `there` has the same bits with only what took part, `more` of it, and what these are tied to."""
+    """Whether a run of `there` has the same bits with only what took part, `more` of it, and what these are tied to; and senses
+    what took part at the same times.
+    """
     whole = world.run(there, seed)
     keep = with_ties(world, (whole.took_part & there) | (more & there), there)
-    return bits(world.run(keep, seed), keep) == bits(whole, keep)
+    part = world.run(keep, seed)
+    took_part = whole.took_part & there
+    return bits(part, keep) == bits(whole, keep) and sensed(part, took_part) == sensed(whole, took_part)
 
 
 def test_every_bump_under_the_wheels_takes_part(flat):
@@ -88,6 +96,16 @@ def test_a_model_takes_part_if_a_beam_ends_on_it_that_somebody_reads(flat):
     assert names(*walls) <= sees.run(everything, 1).took_part
     blind = flat(*walls, behind, sensors={"lidar": lidar}, goal={"x": -9, "y": 0})
     assert not blind.run(everything, 1).took_part & {"wall", "behind"}
+
+
+def test_what_took_part_is_sensed_at_the_same_time_whatever_else_hides_it(flat):
+    """The robot runs into a wall, which a screen aside hides at first from a lidar that looks across. Nobody reads its scans."""
+    wall, screen = still("wall", 3.0, 0.0, (0.2, 0.4, 1.5)), still("screen", 1.2, 1.4, (0.1, 0.5, 1.5))
+    world = flat(wall, screen, sensors={"lidar": {"y": 2.0}})
+    result = world.run(names(wall, screen), 1)
+    assert result.took_part & names(wall, screen) == names(wall)
+    assert "screen" in result.first_sensed
+    assert is_implied(world, names(wall, screen))
 
 
 def test_what_the_map_cannot_hold_takes_no_part_although_beams_end_on_it(flat):
@@ -192,7 +210,7 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     assert not is_implied(worlds["robot"], everything["robot"])
     monkeypatch.setattr(taking_part.Reached, "_look_around_models", lambda *_: None)
     assert not is_implied(worlds["models"], everything["models"])
-    monkeypatch.setattr(Lidar, "took_part", frozenset())
+    monkeypatch.setattr(Lidar, "took_part", {})
     assert not is_implied(worlds["lidar"], everything["lidar"])
     monkeypatch.setattr("ddenv.robot.piles.sleep.Sleep.took_part", frozenset())
     assert not is_implied(worlds["asleep"], everything["asleep"])

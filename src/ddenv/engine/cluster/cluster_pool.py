@@ -32,7 +32,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
 from ddenv.text import count, printable
 from ddenv.world.model import Model, World
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Scenario, seed_of
 
 # What is said of the cluster: how many tests it makes at the same time now, and a sentence.
 Tell = Callable[[int, str], None]
@@ -73,7 +73,7 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = frozenset(world.elements(frozenset(scenario.protected))), scenario.reduction.seed
+        self._whole = frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0)
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.

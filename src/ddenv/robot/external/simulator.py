@@ -29,6 +29,7 @@ from ddenv.world.files.resources import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
+from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
 # The meaning of the command's exit codes; all others are errors.
@@ -42,6 +43,7 @@ class ExternalSimulator:
         """Raises UserError if the command cannot be started."""
         self._world = world
         self._scenario = scenario
+        self._of_all = {"oracle": None, "whole": whole_of(world, scenario)}
         self._words = command_words(scenario)
         self._names = frozenset(model.name for model in world.models)
         # What a test may take in real time, s.
@@ -106,7 +108,7 @@ class ExternalSimulator:
 
     def _scenario_in(self, world: Path) -> bytes:
         """The scenario in the file `world`, as YAML: for simulators that run the same robot."""
-        data = self._scenario.model_copy(update={"world": world, "oracle": None}).model_dump(mode="json")
+        data = self._scenario.model_copy(update=self._of_all | {"world": world}).model_dump(mode="json")
         # Files beside the original world are not beside the reduced one.
         data["reading"]["model_path"] = [str(self._scenario.world.parent), *data["reading"]["model_path"]]
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode()

@@ -47,14 +47,14 @@ class Known:
 
 
 class Repertoire:
-    """The scripts of one world's piles. `moving` is the number of its models that can move.
+    """The scripts of one world's piles. `moving` is the number of models that can move in the whole of it.
 
     They take at most about `MEMORY`: then those go that were not used for the longest time. A script that is rehearsed again is
     the same to the last bit.
     """
 
-    def __init__(self, world: World) -> None:
-        self.moving = sum(1 for model in world.models if not model.static and model.links)
+    def __init__(self, world: World, moving: int) -> None:
+        self.moving = moving
         self._known: dict[tuple[str, ...], list[Known]] = {}
         # With their sizes; the one that was used last comes last.
         self._by_use: dict[Known, int] = {}

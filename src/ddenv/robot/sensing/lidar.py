@@ -49,8 +49,8 @@ class Lidar:
         self._names = obstacles.names
         self.first_seen: dict[str, float] = {}
         self._unseen: Booleans = np.ones(len(obstacles.names), dtype=bool)
-        # The models on which beams of scans ended that someone read.
-        self._read: Booleans = np.zeros(len(obstacles.names), dtype=bool)
+        # When a scan was made in which a beam ended on each model, of those that someone read, s.
+        self._read: Floats = np.full(len(obstacles.names), np.inf)
 
         there = np.array([name in present for name in obstacles.names], dtype=bool)
         (rows,) = there[obstacles.owners].nonzero()
@@ -69,9 +69,9 @@ class Lidar:
         self._place: Pose | None = None
 
     @property
-    def took_part(self) -> frozenset[str]:
-        """The models without which a scan that was read would be another."""
-        return frozenset(name for name, read in zip(self._names, self._read, strict=True) if read)
+    def took_part(self) -> dict[str, float]:
+        """The models without which a scan that was read would be another, each with the time (s) of the first one."""
+        return {name: at for name, at in zip(self._names, self._read.tolist(), strict=True) if at < np.inf}
 
     def scan(self, now: float, pose: PoseRow, places: Floats, turns: Floats) -> Scan:
         """The scan at the time `now` (s).
@@ -84,7 +84,7 @@ class Lidar:
         if moved or not (self._near and self._near.has(place)):
             calm = not moved and before is not None and are_near(before, place, CALM)
             self._near = Near.of(self._fan, self._shapes, self._owners, place, calm)
-        turn = Turn(self._turns, place, self._near)
+        turn = Turn(self._turns, now, place, self._near)
         self._turns += 1
         if self._unseen[turn.near.owners].any():
             self._notice(turn, now)
@@ -94,13 +94,16 @@ class Lidar:
         """The ranges of a scan, infinite where they exceed `limits` (B,) m."""
         ranges = self._measured(turn)
         if limits is None:
-            self._read[turn.owners] = True
+            self._note(turn, turn.owners)
             return ranges
         # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
         near: Booleans = turn.measured <= limits
-        self._read[turn.owners[near[turn.beams]]] = True
+        self._note(turn, turn.owners[near[turn.beams]])
         limited: Floats = np.where(near, ranges, np.inf)
         return limited
+
+    def _note(self, turn: Turn, read: Integers) -> None:
+        self._read[read] = np.minimum(self._read[read], turn.time)
 
     def _measured(self, turn: Turn) -> Floats:
         """The ranges of `turn`, computed when they are needed first."""
@@ -148,13 +151,14 @@ class Lidar:
 
 @dataclass(slots=True, eq=False)
 class Turn:
-    """Scan `number` of a lidar: its pose and the shapes that its beams may hit.
+    """Scan `number` of a lidar: its time (s), its pose and the shapes that its beams may hit.
 
     Once computed: its ranges, the distances (B,) m that its beams measured, also too small and too large ones, and the models
     `owners` (H,) on which the beams `beams` (H,) ended.
     """
 
     number: int
+    time: float
     place: Pose
     near: Near
     ranges: Floats | None = None

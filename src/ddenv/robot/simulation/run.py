@@ -83,11 +83,12 @@ class Run:
         trajectory = self._recording.trajectory()
         if outcome == "failed":
             failure = kind_of(trajectory, fell=failure == "fell", arrived=self.autonomy.arrived)
-        sensed = self.notice.first_sensed(self.lidar.first_seen if self.lidar else {})
-        took_part = None
+        seen, took_part = self.lidar.first_seen if self.lidar else {}, None
         if self.reached and outcome != "error":
-            seen = self.lidar.took_part if self.lidar else frozenset()
-            took_part = self.reached.names | self.sleep.took_part | seen | self.unusual
+            read = self.lidar.took_part if self.lidar else {}
+            took_part = self.reached.names | self.sleep.took_part | read.keys() | self.unusual
+            # What takes no part may hide these in scans that nobody reads: their times have to follow from what takes part.
+            seen = {name: at for name, at in seen.items() if name not in took_part} | read
         return RunResult(
             outcome=outcome,
             failure=failure,
@@ -96,7 +97,7 @@ class Run:
             simulated_seconds=seconds,
             wall_seconds=self._wall_clock.look(),
             seed=self.seed,
-            first_sensed=sensed,
+            first_sensed=self.notice.first_sensed(seen),
             first_touched=self.notice.first_touched,
             cut=cut,
             took_part=took_part,

@@ -27,15 +27,14 @@ from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
 from ddenv.world.drive import Drive, find_drive
-from ddenv.world.extent import shape_bounds, with_ground_boxes
+from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
+from ddenv.world.whole import whole_of
 
 # A margin for surfaces that sink into each other, and joints that exceed their limits, m.
 YIELD = 0.1
-# A robot this far below everything that it could stand on has fallen out of the world, m.
-FALL = 2.0
 
 
 class Template:
@@ -48,8 +47,11 @@ class Template:
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
         """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
         spawn, goal = scenario.robot.spawn, scenario.goal
+        self._whole = whole_of(world, scenario)
         # Boxes in place of planes, large enough for all models, the spawn and the goal.
-        self._solid = with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
+        self._solid = with_ground_boxes(
+            world, self._whole.corners, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
+        )
         self._robot = robot
         self._scenario = scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
@@ -57,12 +59,11 @@ class Template:
         names = frozenset(model.name for model in world.models)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
         self._always = names & frozenset(scenario.protected) | grounds
-        self._floor = lowest(world) - FALL
         self._clock = Clock.of(scenario)
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
         self._models = {model.name: model for model in world.models}
-        self._repertoire = Repertoire(world)
+        self._repertoire = Repertoire(world, self._whole.moving)
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
@@ -123,7 +124,7 @@ class Template:
         boxes = [box for box in self._boxes if box[0] in names]
         self._surroundings = Surroundings.of(boxes, self._reach, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
-        self._context = RunContext.of(built, at, self._clock, self._floor, self._region if self._far else None)
+        self._context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
         self._rehearsals = Rehearsals(self._repertoire, self._context)
 
     def run(
@@ -232,12 +233,6 @@ def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Buil
             f"robot '{robot.name}': its first link must be free to move, not joined to the world or another link"
         )
     return built
-
-
-def lowest(world: World) -> float:
-    """A height (m) below which there is no surface of the world."""
-    collisions = [collision for model in world.models for collision in model.collisions]
-    return min((float(shape_bounds(one.shape, one.pose)[0][2]) for one in collisions), default=0.0)
 
 
 Result = TypeVar("Result")

@@ -21,7 +21,7 @@ from ddenv.workbench.shared.wording import outcome
 
 # The maximum number of tests in the list.
 LISTED = 200
-NUMBER, WORDS, SEED, OUTCOME = 7, 36, 8, 16
+NUMBER, WORDS, SEED, OUTCOME = 7, 36, 12, 16
 
 
 class Beside(ModalScreen[int | None]):
