@@ -229,6 +229,10 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
     words = (
         "These runs have seeds that the search did not use, and none of them ended early. Rates leave broken runs out."
     )
+    if found.seeds:
+        words = (
+            "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
+        )
     if state.certified:
         means = promise(state, found)
         words += f" {means[:1].upper()}{means[1:]}."
@@ -239,7 +243,8 @@ def _fresh_row(each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
     ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
     has_rate = each.runs and not each.is_chosen
     shown = percent(each.shown / each.runs) if has_rate else "–"
-    interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate else "–"
+    is_exact = each.claim is not None and each.claim.is_exact
+    interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
     means = "" if each.claim is None else meaning(each.claim, found)
     return _name(each), thousands(each.runs), ended, shown, interval, means
 
