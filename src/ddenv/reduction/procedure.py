@@ -26,8 +26,8 @@ from ddenv.reduction.round import Candidate, Partition, Round
 from ddenv.reduction.stepping_back import groups_again, last_good
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
 
-# After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the rate,
-# more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
+# After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
+# rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
 MOST_STEPS_BACK = 5
 
 
