@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
+from ddenv.evidence.claims import helping
 from ddenv.runfile.fold import fold
+from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import COMMANDS, Disturbed, Guided, at_once, events, guided, numbers, until  # noqa: F401
@@ -140,6 +142,25 @@ def test_a_budget_stops_the_run_and_more_of_it_goes_on(tmp_path):
     assert drive(path, FakePool(needs("wall"), 2)).minimal
 
 
+def test_a_model_that_only_helps_is_left_out_and_the_search_goes_on(tmp_path):
+    def oracle(keep, seed):
+        # In the search f is gone without the beam; with fresh seeds it is only rarer.
+        return "similar" if "wall" in keep and ("beam" in keep or (seed >= FIRST_FRESH_RUN and seed % 8)) else "pass"
+
+    path = new_run(tmp_path, accept_rate="kept")
+    before = drive(path, FakePool(oracle, 2))
+    assert (set(before.environment), before.minimal) == ({"wall", "beam"}, False)
+    assert helping(before.certificate) == ("beam",)
+    with RunFile(path) as viewer:
+        viewer.send("leave_out", model=ELEMENTS.index("beam"))
+    state = drive(path, FakePool(oracle, 2))
+    assert (state.environment, state.minimal) == (("wall",), True)
+    assert (state.here.how, state.decisions[-1].words) == ("left_out", "left out beam, which only helped")
+    # The run that it rests on is one of the certificate's.
+    test = state.tests[state.here.evidence_test - 1]
+    assert (test.without, test.outcome, test.id in range(len(before.tests))) == ("beam", "similar", True)
+
+
 def test_a_veto_is_taken_back(tmp_path):
     def guide():
         state = yield from until(lambda state: state.round is not None and len(state.round.candidates) > 3)
@@ -187,6 +208,7 @@ def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
         ("try", {"models": list(range(6))}, "the current environment"),
         ("try", {"models": [True]}, "no such models"),
         ("adopt", {"trial": 1}, "no such try"),
+        ("leave_out", {"model": 0}, "no model that only helps"),
         ("accept_other", {"test": 1}, "did not end in another failure"),
         ("accept_other", {"test": -1}, "no such test"),
         ("undo", {}, "no reduction"),

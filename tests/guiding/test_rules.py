@@ -41,6 +41,7 @@ WRITTEN = [
     ("unpin", {"models": [1]}),
     ("try", {"models": []}),
     ("adopt", {"trial": 1}),
+    ("leave_out", {"model": 1}),
     ("accept_other", {"test": 7, "instead": False}),
     ("accept_other", {"test": 7, "instead": True}),
     ("undo", {}),

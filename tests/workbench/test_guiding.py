@@ -230,23 +230,19 @@ async def test_one_key_leaves_out_the_model_that_only_helps(run, monkeypatch):
         assert "Minimal but for crate_01" in session.text("#happening")
         assert "crate_01 only helps: press H to leave it out" in " ".join(session.text("#happening").split())
         await session.press("H")
-        assert session.asked() == [("try", {"models": [0]})]
-        trial = run.try_out(["crate_00"])
-        test = run.start_hand(trial)
-        run.finish(test, "similar", 0.12, failure="stuck")
-        run.judge_trial(trial, "similar", [test])
+        assert session.asked() == [("leave_out", {"model": 1})]
+        assert "crate_01 is left out. A new search begins from 1 model; an engine starts for it" in session.said()
+        run.hold()
+        run.write("engine_started", pid=2, jobs=2, version="0", simulator="none")
+        fresh = next(
+            test for test in run.state.confirm_tests if test.without == "crate_01" and test.outcome == "similar"
+        )
+        run.write("left_out", without=1, environment=[0], evidence_test=fresh.id, by_user=True)
         await session.look()
-        await session.press("1")
-        assert session.asked() == [("adopt", {"trial": 1})]
-        # It is asked once; later the key adopts the try that there is.
-        await session.look()
-        await session.press("H")
-        assert session.asked() == [("adopt", {"trial": 1})]
-        run.adopt(trial, ["crate_00"], test)
-        await session.look()
+        assert "You went on without crate_01: 2 → 1 model." in session.text("#happening")
         await session.press("H")
         assert session.asked() == []
-        assert "there is no model that only helps f" in session.said()
+        assert "there is no model that only helps" in session.said()
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.guiding.commands import KINDS, Command, parse, refusal
 from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
-from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, LeaveOut, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import Situation, label_of, numbers_of
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import failures_at
@@ -200,6 +200,12 @@ def _adopted(journal: Journal, asked: Adopt) -> events.Event:
     return events.Adopted(asked.trial, trial.environment, trial.tests[-1])
 
 
+def _left_out(journal: Journal, asked: LeaveOut) -> events.Event:
+    test = asked.evidence(journal.state)
+    assert test is not None
+    return events.LeftOut(asked.model, test.environment, test.id, by_user=True)
+
+
 def _accepted_other(journal: Journal, asked: AcceptOther) -> events.Event:
     state = journal.state
     test = state.tests[asked.test - 1]
@@ -227,6 +233,7 @@ _EVENTS: dict[type[Command], Callable[[Journal, Any], events.Event]] = {
         len(journal.state.trials) + 1, journal.number(Environment.of(asked.models))
     ),
     Adopt: _adopted,
+    LeaveOut: _left_out,
     AcceptOther: _accepted_other,
     Change: lambda journal, asked: events.Changed(asked.new(journal.state)),
 }

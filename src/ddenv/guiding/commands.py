@@ -12,7 +12,7 @@ from typing import Any, get_args
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, SelectionCommand, Try, Unpin
+from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.state import RunState
@@ -22,7 +22,7 @@ from ddenv.text import count, snake_case
 Command = CourseCommand | SelectionCommand
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
-GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)
+GOES_ON = (Try, Adopt, LeaveOut, AcceptOther, Undo, GoBack, Change)
 # After these a new search begins, and a certificate that is being made is broken off.
 ANEW = (Pin, Unpin, Adopt, AcceptOther, Undo, GoBack)
 

@@ -9,10 +9,22 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current, helping
 from ddenv.guiding.commands import Command, refusal
 from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
-from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto, round_over
+from ddenv.guiding.selections import (
+    NONE_HELPS,
+    Accept,
+    AcceptOther,
+    Adopt,
+    LeaveOut,
+    Pin,
+    Reject,
+    Try,
+    Unpin,
+    Unveto,
+    Veto,
+    round_over,
+)
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
-from ddenv.runfile.supports import stack_with
 from ddenv.text import shortened
 
 
@@ -123,14 +135,11 @@ def _try(now: Situation, pointed: Pointed, keep: frozenset[str]) -> Command | No
 
 
 def _leave_out(now: Situation, _: Pointed) -> Command:
-    """Try the environment without the model that only helps, or adopt that where it has shown f."""
     found = current(now.state)
-    if found is None or not (helps := helping(found)):
-        raise UserError("there is no model that only helps f")
-    gone = stack_with(now.state, now.state.environment, helps[0])
-    keep = tuple(name for name in now.state.environment if name not in gone)
-    tried = next((trial for trial in now.state.trials if trial.models == keep and trial.verdict == "similar"), None)
-    return Try(numbers_of(now.state, keep)) if tried is None else Adopt(tried.number)
+    helps = () if found is None else helping(found)
+    if not helps:
+        raise UserError(NONE_HELPS)
+    return LeaveOut(numbers_of(now.state, helps[:1])[0])
 
 
 def _any(state: RunState, models: Collection[str]) -> bool:

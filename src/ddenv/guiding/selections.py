@@ -1,5 +1,5 @@
 """Candidates and models chosen by hand: accept or reject the reduction that waits, veto a candidate; pin models, try a selection,
-adopt it, count its other failure as f.
+adopt it, leave out a model that only helps, count another failure as f.
 """
 
 from __future__ import annotations
@@ -8,10 +8,13 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from ddenv.evidence.claims import current, helping
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Situation, Words, label_of, named, new_search
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.text import count, printable, shortened
+
+NONE_HELPS = "there is no model that only helps, by a certificate"
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +222,30 @@ class Adopt:
         return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
 
 
+@dataclass(frozen=True, slots=True)
+class LeaveOut:
+    """Make what is left without a model that only helps the environment, by the runs of the certificate."""
+
+    model: int
+
+    def refusal(self, now: Situation) -> str:
+        return NONE_HELPS if self.evidence(now.state) is None else ""
+
+    def words(self, state: RunState) -> Words:
+        test = self.evidence(state)
+        size = 0 if test is None else len(state.environments[test.environment])
+        names = _names_of(state, (self.model,)) or ()
+        return Words("leave out", f"{named(names)} is left out. {new_search(state, size)}")
+
+    def evidence(self, state: RunState) -> Test | None:
+        """A fresh run without the model that showed f; None if the model does not only help."""
+        found, names = current(state), _names_of(state, (self.model,)) or ()
+        if found is None or not set(names) & set(helping(found)):
+            return None
+        fresh = (test for test in state.confirm_tests if test.node == found.node and test.run >= found.first_run)
+        return next((test for test in fresh if test.without in names and test.outcome == "similar"), None)
+
+
 def _lacks_pinned(state: RunState, label: str, models: Iterable[str]) -> str:
     """Why a selection cannot become the environment, or ""."""
     pinned = state.pinned.difference(models)
@@ -264,7 +291,7 @@ class AcceptOther:
         )
 
 
-SelectionCommand = Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | AcceptOther
+SelectionCommand = Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | LeaveOut | AcceptOther
 
 
 def _question(state: RunState, test: Test, instead: bool) -> str:

@@ -29,6 +29,7 @@ HOW = {
     "accepted": "another failure, accepted by hand",
     "instead": "a branch to its failure",
     "certified": "by a certificate",
+    "left_out": "left out by hand",
     "sliced": "without a test",
 }
 

@@ -481,11 +481,12 @@ class RateLost(Event):
 
 @dataclass(frozen=True, slots=True)
 class LeftOut(Event):
-    """A certificate showed that a model is not needed."""
+    """A certificate showed that a model is not needed; `by_user`: that it only helps, and the user left it out."""
 
     without: Natural
     environment: Natural
     evidence_test: Number
+    by_user: bool = False
 
 
 # Isolation.

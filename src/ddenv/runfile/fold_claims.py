@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ddenv.runfile import events as e
-from ddenv.runfile.fold_decisions import arrived, at_node, listed, origin, searched_anew, without_open
+from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, origin, searched_anew, without_open
 from ddenv.runfile.fold_tests import Changes, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Returned
@@ -82,8 +82,9 @@ def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
 def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
     without = state.elements[event.without]
     runs = [test.id for test in state.confirm_tests if test.environment == event.environment]
-    what = f"without {listed([without])}"
-    return arrived(state, event.environment, event.evidence_test, at, "certified", what, runs)
+    what, how = f"without {listed([without])}", "left_out" if event.by_user else "certified"
+    said = decision(state, at, "leave_out", f"left out {listed([without])}, which only helped") if event.by_user else {}
+    return arrived(state, event.environment, event.evidence_test, at, how, what, runs) | said
 
 
 # Isolation.

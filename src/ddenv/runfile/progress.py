@@ -63,13 +63,14 @@ class Node:
     `id` is the number of its environment. The last round in it had `n_partitions`, None before one.
 
     `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure,
-    too), "instead" (from here on another failure is f), "certified" (its certificate showed that one more model can go) or "sliced"
-    (what went took no part in the runs `sliced_by`); `what` names the candidate, trial or test. `tests` is the number of tests
-    finished by then, `own_tests` of them were made on the way to it, not for other branches; `time` is Unix time, s, `round` the
-    round that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known. `method` is the
-    algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs showed that f is
-    too rare in it. `runs` are the tests of its environment that ended and did not break; `shown` of them showed f. Those that chose
-    a slice are not among them: they would show its rate as too high. `to_audit`: one of these is simulated in the slice, too.
+    too), "instead" (from here on another failure is f), "certified" (its certificate showed that one more model can go), "left_out"
+    (the user left out one that only helped) or "sliced" (what went took no part in the runs `sliced_by`); `what` names the
+    candidate, trial or test. `tests` is the number of tests finished by then, `own_tests` of them were made on the way to it, not
+    for other branches; `time` is Unix time, s, `round` the round that ended in it. `evidence_test` is the run in it that guides the
+    next rounds, None before f is known. `method` is the algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was
+    taken back; `lost_rate`: fresh runs showed that f is too rare in it. `runs` are the tests of its environment that ended and did
+    not break; `shown` of them showed f. Those that chose a slice are not among them: they would show its rate as too high.
+    `to_audit`: one of these is simulated in the slice, too.
     """
 
     number: int

@@ -50,6 +50,7 @@ HOW = {
     "accepted": "another failure, accepted as f, too",
     "instead": "a branch: the failure of this test is f here",
     "certified": "reduced by a certificate: fresh runs show f as often",
+    "left_out": "left out by hand: by the certificate it only helped",
     "sliced": "reduced without a test to what took part",
 }
 

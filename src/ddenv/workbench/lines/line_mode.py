@@ -44,7 +44,7 @@ GUIDES = {
     "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
     "without": ("without", "w", "try the environment without models: 'without crate_01'"),
     "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
-    "drop": ("leave_out", "H", "try the environment without the model that only helps f; again adopts that"),
+    "drop": ("leave_out", "H", "leave out the model that only helps, by the certificate"),
     "undo": ("undo", "u", "take back the last reduction"),
     "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),
     "resume": ("resume", "r", "start the engine again"),

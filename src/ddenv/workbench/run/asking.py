@@ -16,8 +16,7 @@ from textual.screen import Screen
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, question, refusal, said, send, starts_engine
 from ddenv.guiding.course import Isolate, StartEngine
-from ddenv.guiding.selections import Adopt
-from ddenv.guiding.situation import Situation, numbers_of
+from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
 from ddenv.runs import processor
 from ddenv.text import plain
@@ -45,8 +44,6 @@ class Asking:
         # The id of the last command that needs an engine, 0 once one was started for it.
         self._due = 0
         self._sender: ThreadPoolExecutor | None = None
-        # The selection that is adopted as soon as a try of it shows f.
-        self.adopts: tuple[int, ...] = ()
 
     def close(self) -> None:
         """Commands that were sent are still written."""
@@ -118,9 +115,6 @@ class Asking:
         for trial in now:
             if trial.verdict and trial.number not in judged:
                 self.say(_judged(trial, self._poll.watch))
-                if trial.verdict == "similar" and numbers_of(self._poll.snapshot.state, trial.models) == self.adopts:
-                    self.adopts = ()
-                    self.ask(Adopt(trial.number))
 
     # Sending.
 

@@ -13,6 +13,7 @@ from ddenv.workbench.shared.wording import count
 
 HOW = {
     "adopted": "You adopted {what}",
+    "left_out": "You went on {what}",
     "accepted": "You accepted the other failure of {what} as f",
     "instead": "You branched: the failure of {what} is f here",
 }
@@ -78,7 +79,7 @@ def arrival(state: RunState) -> str:
         return f"{_capital(plain(last.words))}."
     if last.kind == "change":
         return f"{_capital(plain(last.words))}, from this round on."
-    if here.how in HOW and last.kind in ("adopt", "accept_other"):
+    if here.how in HOW and last.kind in ("adopt", "leave_out", "accept_other"):
         return f"{HOW[here.how].format(what=here.what)}: {_sizes(state, here)}."
     return ""
 

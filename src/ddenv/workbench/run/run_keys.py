@@ -13,7 +13,6 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from ddenv.guiding.offers import Offer, Pointed, offer
-from ddenv.guiding.selections import Try
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
@@ -155,7 +154,7 @@ _KEYS = [
         "guide('leave_out')",
         "leave out",
         id="run.leave_out",
-        tooltip="leave out the model that only helps, by the certificate: try the environment without it, and adopt it if f shows",
+        tooltip="leave out the model that only helps, by the certificate: without it f is a little rarer; a new search begins",
     ),
     Binding(
         "u", "guide('undo')", "undo", id="run.undo", tooltip="undo: take back the last reduction; it is not made again"
@@ -322,7 +321,6 @@ class KeyOffers:
             return
         command = self.offer(name).command
         if command is not None and name != "pin":
-            self._asking.adopts = command.models if name == "leave_out" and isinstance(command, Try) else ()
             self._asking.ask(command)
         elif name == "change":
             self._opening.change()
