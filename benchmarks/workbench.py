@@ -39,8 +39,8 @@ PROBE = (
     "import atexit, os, pathlib, sys; from ddenv.cli import main;"
     f"atexit.register(lambda: pathlib.Path(os.environ['{NAMES}']).write_text(' '.join(sys.modules))); main()"
 )
-# A reduction that takes longer than all measurements beside it.
-SIMULATIONS = ("run", "ditch", "--jobs", "2", "--iterations", "200")
+# A reduction that takes longer than all measurements beside it on any machine: each candidate without f is run 1,001 times.
+SIMULATIONS = ("run", "ditch", "--jobs", "2", "--accept-rate", "first", "--iterations", "1000", "--no-slice")
 LARGE_TESTS = 10_000
 
 
