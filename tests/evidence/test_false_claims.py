@@ -15,6 +15,7 @@ import ddenv
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, REFUTED, Terms, error_of, falls, keeps, settle
 from ddenv.evidence.rates import anytime_interval
+from ddenv.evidence.took_part import _chance
 from ddenv.reduction.isolation import Passing, passes
 
 pytestmark = pytest.mark.claims
@@ -120,6 +121,17 @@ def test_an_interval_rarely_misses_the_rate_although_it_is_looked_at_after_each_
                 missed += 1
                 break
     check(missed, 0.05)
+
+
+@pytest.mark.parametrize("often", [1.1, 2.0, 3.2])
+def test_what_no_run_met_is_rarely_met_more_often_than_said(often):
+    runs, false = 20, 0
+    for salt in range(SIMULATED):
+        draw = random.Random(salt)
+        met = [Environment.of([1] if draw.random() < often / runs else []) for _ in range(runs)]
+        kind, _, most = _chance(met).removesuffix(" %").rpartition(" ")
+        false += kind == "probably below" and not any(met) and 100 * often / runs > float(most)
+    check(false, 0.05)
 
 
 # Where is f in 0.9 of the runs, and how often does it show in what is left?
