@@ -8,6 +8,7 @@ import random
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import count
 
 import pytest
 from scipy.stats import binomtest
@@ -16,6 +17,7 @@ import ddenv
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, REFUTED, Terms, error_of, falls, keeps, settle
 from ddenv.evidence.rates import anytime_interval
+from ddenv.evidence.took_part import _chance
 from ddenv.reduction.isolation import Passing, passes
 from ddenv.reduction.procedure import Certified, procedure
 from tests.reduction import driving
@@ -125,6 +127,17 @@ def test_an_interval_rarely_misses_the_rate_although_it_is_looked_at_after_each_
     check(missed, 0.05)
 
 
+@pytest.mark.parametrize("often", [1.1, 2.0, 3.2])
+def test_what_no_run_met_is_rarely_met_more_often_than_said(often):
+    runs, false = 20, 0
+    for salt in range(SIMULATED):
+        draw = random.Random(salt)
+        met = [Environment.of([1] if draw.random() < often / runs else []) for _ in range(runs)]
+        kind, _, most = _chance(met).removesuffix(" %").rpartition(" ")
+        false += kind == "probably below" and not any(met) and 100 * often / runs > float(most)
+    check(false, 0.05)
+
+
 # Where is f in 0.9 of the runs, and how often does it show in what is left?
 LOOPS = {
     "a model that halves it": lambda kept: 0.9 * 0.5 ** ("b" not in kept),
@@ -134,14 +147,16 @@ LOOPS = {
 }
 
 
+@pytest.mark.parametrize("falls_by", [0.0, 1 / 600], ids=["steady", "all rates fall"])
 @pytest.mark.parametrize("rate", LOOPS.values(), ids=LOOPS)
-def test_all_claims_of_a_whole_reduction_are_rarely_false(rate):
+def test_all_claims_of_a_whole_reduction_are_rarely_false(rate, falls_by):
+    """Also where f gets rarer with each call of the test, in all that is kept alike: down to 0.3 of its rate."""
     false = 0
     for salt in range(SIMULATED):
-        draw = random.Random(salt)
+        draw, calls = random.Random(salt), count()
 
-        def shows_f(kept, draw=draw):
-            return "a" in kept and draw.random() < rate(kept)
+        def shows_f(kept, draw=draw, calls=calls):
+            return "a" in kept and draw.random() < rate(kept) * max(0.3, 1.0 - falls_by * next(calls))
 
         found = ddenv.reduce("abcdefgh", shows_f, algorithm="ddmin", iterations=3)
         left = frozenset(found.kept)

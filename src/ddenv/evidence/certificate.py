@@ -56,12 +56,16 @@ STAKES = (0.15, 0.3, 0.5, 0.7, 0.9)
 class Terms:
     """The terms of a certificate: the share of the whole world's rate that it has to show, the share at which the search aims, the
     chance of error of a claim, and the minimum number of runs.
+
+    `at_once`: the runs of a pair are made one right after the other, and none is part of two pairs. Without seeds all rates may
+    change in the course of time, and would between two runs that are far apart.
     """
 
     certify_rate: float
     keep_rate: float
     error: float
     at_least: int = 1
+    at_once: bool = False
 
 
 def error_of(number: int) -> float:
@@ -206,7 +210,7 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     if left == whole:
         return (yield from _of_whole(left, max(1, terms.at_least)))
     # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
-    assumed, sound, bound, run, alone = Pairs(), Pairs(), 0.0, 0, True
+    assumed, sound, bound, run, alone = Pairs(), Pairs(), 0.0, 0, not terms.at_once
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
     mine: Shown
@@ -249,15 +253,17 @@ def _of_whole(whole: Environment, runs: int) -> Procedure:
     return ("kept", 1.0) if shown else ("not shown", None)
 
 
-def falls(without: Environment, left: Environment, terms: Terms, share: float = NEEDED_SHARE) -> Procedure:
-    """How often f shows in `without`, as a part of its rate in `left`; "needed" if that is at most `share`.
+def falls(
+    without: Environment, left: Environment, terms: Terms, share: float = NEEDED_SHARE, first: int = 0
+) -> Procedure:
+    """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
     The bound, and so "needed", is wrong with a probability of at most the terms' error. "helps" says that f is rarer, but not by so
     much; "not needed" that it shows about as often, which the next certificate has to show.
     """
     assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
     for run in range(MOST_REMOVAL_PAIRS):
-        mine, theirs = yield Wanted(((without, run), (left, run)), (without, left), bound)
+        mine, theirs = yield Wanted(((without, first + run), (left, first + run)), (without, left), bound)
         assumed = assumed.after(mine is not False, theirs is True)
         sound = sound.after(mine is True, theirs is not False)
         bound = assumed.at_most(terms.error, bound)

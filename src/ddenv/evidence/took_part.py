@@ -11,6 +11,8 @@ from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, RunState
 from ddenv.text import count, first_of, percent
 
+# What shows in none of n runs shows in less than this over n of all runs, with 95 % (the rule of three).
+RARE = 3.0
 # The maximum number of tests that a word on a candidate names.
 NAMED = 2
 TEACHING = "What took no part in a run can go without changing a bit of it, so the run without it is known."
@@ -65,7 +67,7 @@ def slice_in_short(state: RunState, node: Node) -> str:
 
 def _chance(met: list[Environment]) -> str:
     chance = fresh_chance(met)
-    return f"at most about {percent(chance)}" if chance else f"probably below {percent(1 / len(met))}"
+    return f"at most about {percent(chance)}" if chance else f"probably below {percent(min(1.0, RARE / len(met)))}"
 
 
 def refuted_words(state: RunState) -> str:

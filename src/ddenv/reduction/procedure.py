@@ -19,7 +19,18 @@ from itertools import islice, zip_longest
 from typing import Any, Protocol
 
 from ddenv.environment import Environment
-from ddenv.evidence.certificate import Claim, Procedure, Settling, Terms, Verdict, falls, good_enough, keeps, often
+from ddenv.evidence.certificate import (
+    MOST_PAIRS,
+    Claim,
+    Procedure,
+    Settling,
+    Terms,
+    Verdict,
+    falls,
+    good_enough,
+    keeps,
+    often,
+)
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.guide import Search
 from ddenv.reduction.round import Candidate, Partition, Round
@@ -231,9 +242,9 @@ class NamedClaim:
     exact: tuple[int, ...] = ()
 
     @property
-    def runs(self) -> range:
+    def runs(self) -> tuple[int, ...]:
         """The fresh runs of its environment on which it rests, counted from the certificate's first one."""
-        return range(sum(environment == self.environment for environment, _ in self.claim.rests_on))
+        return tuple(run for environment, run in self.claim.rests_on if environment == self.environment)
 
 
 class Runs(Protocol):
@@ -399,8 +410,8 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
 
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
-        for model, rest in () if certificate.exact else rests.items():
-            yield model, rest, falls(rest, left, terms)
+        for number, (model, rest) in enumerate(() if certificate.exact else rests.items(), 1):
+            yield model, rest, falls(rest, left, terms, first=number * MOST_PAIRS if terms.at_once else 0)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:

@@ -29,7 +29,7 @@ from ddenv.settings import SETTINGS
 
 NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothing to reduce"
 # Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
-FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 100_000
+FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 1_000_000
 
 Test = Callable[[frozenset[str]], bool]
 Value = TypeVar("Value")
@@ -368,7 +368,8 @@ class _Caller:
 
     def _certificate(self) -> steps.Certificate:
         self._certificates += 1
-        terms = Terms(self.certify_rate, self.keep_rate, error_of(self._certificates), self.baseline_runs)
+        error = error_of(self._certificates)
+        terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, at_once=True)
         return steps.Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
 
     def _claim(self, named: steps.NamedClaim, first: int) -> RateClaim:
