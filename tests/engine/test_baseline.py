@@ -177,9 +177,10 @@ def competing(rate: float, salt: int):
 
 
 def test_where_failures_compete_the_rate_of_the_luckiest_is_not_too_high(tmp_path):
-    oracles = [competing(0.45, salt) for salt in range(25)]
+    oracles = [competing(0.45, salt) for salt in range(100)]
     found = [last_baseline(tmp_path, oracle, 1, 10_000, 10) for oracle in oracles]
-    assert {one.chose for one, _, _ in found} == {10}
+    # Where one of them shows hardly ever, the other one was not chosen by luck.
+    assert sum(one.chose == 10 for one, _, _ in found) >= 80
     rates = sum(one.rate for one, _, _ in found), sum(seen[0][1] / 10 for _, seen, _ in found)
     # The runs that choose show the luckier one in 0.56 of all.
     assert [rate / len(found) for rate in rates] == [pytest.approx(0.45, abs=0.05), pytest.approx(0.56, abs=0.05)]

@@ -39,6 +39,8 @@ from ddenv.text import count
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
+# Another failure competes to be f if it shows at least once where f shows so often. Rarer ones hardly ever win by luck.
+COMPETES = 4
 CHANGED = "a decision of the user ended the certificate; resume the run to go on from there"
 
 
@@ -258,7 +260,10 @@ class Driver:
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         spec, asked = self._scenario.failure, self._reduction
         found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, step.chose)
-        return None if isinstance(found, str) else steps.Baseline(found.failures, len(found.seen) > 1)
+        if isinstance(found, str):
+            return None
+        f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)
+        return steps.Baseline(found.failures, any(COMPETES * one.runs >= f.runs for one in others))
 
     def _failure_fixed(self, step: steps.FailureFixed) -> steps.Leg:
         assert not isinstance(self._baseline, str)
