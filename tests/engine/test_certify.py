@@ -3,6 +3,7 @@
 import tempfile
 import threading
 import time
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from zlib import crc32
@@ -16,6 +17,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
+from ddenv.evidence.claims import current, missing
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
@@ -358,3 +360,19 @@ def test_what_a_certificate_rests_on_does_not_depend_on_the_workers(tmp_path):
         return [sorted((test.run, test.node, test.without or "") for test in certificate) for certificate in tests]
 
     assert rests_on(1) == rests_on(3) != []
+
+
+def test_a_certificate_that_is_broken_off_leaves_the_one_before_as_it_was(tmp_path):
+    path = kept(tmp_path)
+    drive(path, FakePool(needs("wall"), 2))
+
+    def killed(keep, seed):
+        raise Killed
+
+    with suppress(Killed):
+        certified_again(path, killed, 40)
+    with RunFile(path) as file:
+        state = fold(file.events())
+    assert [bool(one.claims) for one in state.certificates] == [True, False]
+    assert current(state) == state.certificates[0]
+    assert not missing(state)

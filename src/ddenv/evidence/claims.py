@@ -337,9 +337,9 @@ def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence
 
 
 def current(state: RunState) -> Certificate | None:
-    """The finished certificate of the current environment, if there is one."""
-    last = state.certificate
-    return last if last is not None and last.claims else None
+    """The last finished certificate of the current environment, if there is one; a later one may not be finished."""
+    here = (one for one in reversed(state.certificates) if one.node == state.node and not one.past)
+    return next((one for one in here if one.claims), None)
 
 
 def in_the_making(state: RunState) -> Certificate | None:

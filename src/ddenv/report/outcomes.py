@@ -245,7 +245,7 @@ def _fresh_row(each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
     shown = percent(each.shown / each.runs) if has_rate else "–"
     is_exact = each.claim is not None and each.claim.is_exact
     interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
-    means = "" if each.claim is None else meaning(each.claim, found)
+    means = each.shows if each.claim is None else meaning(each.claim, found)
     return _name(each), thousands(each.runs), ended, shown, interval, means
 
 
@@ -260,7 +260,9 @@ def _name(each: FreshRuns) -> Cell:
 
 def _earlier(state: RunState, found: Certificate) -> list[Block]:
     """Other certificates of the same environment: each stands for itself."""
-    others = [one for one in state.certificates if one.node == found.node and one.claims and one is not found]
+    others = [
+        one for one in state.certificates if one.node == found.node and one.claims and one is not state.certificate
+    ]
     return [
         say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
         for one in others

@@ -274,8 +274,7 @@ def rested_on(state: RunState) -> tuple[Test, ...]:
 
 def left_round(state: RunState) -> Changes:
     """The current search and its round are over."""
-    last = state.certificates[-1:]
-    past = (*state.certificates[:-1], *(replace(certificate, past=True) for certificate in last))
+    past = tuple(replace(certificate, past=True) for certificate in state.certificates)
     changes: Changes = {
         "confirming": False,
         "certificates": past,
