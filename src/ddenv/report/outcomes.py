@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ddenv.evidence.claims import current, drift, meaning, missed, missing, never_left_out, promise, verdict_on
-from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
+from ddenv.evidence.claims import current, never_left_out
+from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
+from ddenv.evidence.took_part import why_sliced
 from ddenv.page.blocks import (
     Block,
     Cell,
@@ -26,9 +27,10 @@ from ddenv.runfile.events import DEEDS, BaselineFinished
 from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.text import count, plain
-from ddenv.words.news import failed_in
+from ddenv.words.baseline import failed_in, missed
+from ddenv.words.claims import drift, meaning, missing, promise, verdict_on
+from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, ended, for_everyone
+from ddenv.evidence.claims import current
 from ddenv.page.blocks import (
     Name,
     Paragraph,
@@ -35,6 +35,7 @@ from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
 from ddenv.text import count, plain
+from ddenv.words.claims import ended, for_everyone
 from ddenv.world.access import write_file
 
 KINDS = (".html", ".htm", ".md")

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, moment, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
@@ -15,6 +14,7 @@ from ddenv.runfile import branches
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import REFUSED, Candidate, Round, RunState, Trial
 from ddenv.text import count, plain
+from ddenv.words.claims import seen
 
 # The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
 MOST_ROUNDS = 60

@@ -14,22 +14,21 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen, Screen
 from textual.widgets import DataTable, Static
 
-from ddenv.evidence.claims import of_runs, seen
-from ddenv.evidence.took_part import slice_in_short
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile import branches
 from ddenv.runfile.progress import Decision, Node
 from ddenv.runfile.state import RunState
-from ddenv.text import first_of, plain, shortened
+from ddenv.text import count, first_of, plain, shortened
+from ddenv.words.claims import of_runs, seen
+from ddenv.words.slices import slice_in_short
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 

@@ -12,22 +12,21 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import drift
+from ddenv.evidence.fresh_runs import fresh_runs
 from ddenv.guiding.commands import Command, question, said, send, starts_engine
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
-from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.runs.tests_left import remaining
-from ddenv.text import first_of, plain, printable, rounded
+from ddenv.text import about, count, first_of, percent, plain, printable, rounded
+from ddenv.words.claims import drift
+from ddenv.words.explain import explain
 from ddenv.words.news import headline, news
 from ddenv.workbench.run.candidate_rows import name_of
-from ddenv.workbench.run.explain import explain
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine
-from ddenv.workbench.shared.wording import about, count, percent
 
 # The maximum number of models that a line names.
 NAMED = 50

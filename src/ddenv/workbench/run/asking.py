@@ -19,10 +19,10 @@ from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
 from ddenv.runs import processor
-from ddenv.text import plain
+from ddenv.runs.folder import attach_name
+from ddenv.text import count, duration, plain
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine
-from ddenv.workbench.shared.wording import attach_name, count, duration
 
 # After this time without an answer the screen says that there is none, s.
 PATIENCE = 5

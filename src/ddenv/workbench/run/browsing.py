@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from array import array
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import Implied, TestFinished, TestLost, TestStarted
 from ddenv.runfile.fold import spent
 from ddenv.runfile.position import Moment, Position, Step
-from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.tested import pointed, purpose
-from ddenv.text import plain
-from ddenv.words.news import news
+from ddenv.runfile.tested import pointed
+from ddenv.words.news import happened
 from ddenv.workbench.shared.poll import Poll, Snapshot
-from ddenv.workbench.shared.wording import count, outcome
 
 # Why no key guides the run meanwhile.
 NOT_NOW = "this is an earlier moment of the run: escape comes back to now"
@@ -105,29 +101,3 @@ class Moments:
 def _spent(state: RunState) -> int:
     """Time that engines had worked by then, s."""
     return int(spent(state, state.updated_at))
-
-
-def happened(moment: Moment) -> str:
-    """What happened in a moment, with its time of day."""
-    at = time.strftime("%H:%M:%S", time.localtime(moment.recorded.time))
-    return f"{at}, after {count(moment.after.tests_done, 'test')}: {what_happened(moment)}."
-
-
-def what_happened(moment: Moment) -> str:
-    """The same in a few words, without the time."""
-    kind, event, state = moment.recorded.kind, moment.recorded.event, moment.after
-    if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
-        return _of_test(state, state.tests[event.test - 1])
-    if kind == "created":
-        return "the run was made"
-    if kind == "finished":
-        # With what result is explained beside it.
-        return "the run ended"
-    return plain(news(kind, moment.before, state, attached=True)).rstrip(".") or kind.replace("_", " ")
-
-
-def _of_test(state: RunState, test: Test) -> str:
-    what = f"test {test.id} ({purpose(state, test)}, seed {test.seed})"
-    if test.implied_by is not None:
-        return f"{what} follows from test {test.implied_by}: {outcome(test)}"
-    return f"{what} starts" if test.outcome == "running" else f"{what}: {outcome(test) or test.outcome}"

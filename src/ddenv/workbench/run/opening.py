@@ -10,12 +10,13 @@ from rich.text import Text
 from textual.screen import Screen
 
 from ddenv.errors import UserError
+from ddenv.evidence.fresh_runs import FreshRuns
 from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
-from ddenv.runs.fresh_runs import FreshRuns
+from ddenv.runs.folder import attach_name
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
@@ -24,7 +25,6 @@ from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.shared.background import is_open
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Scene
-from ddenv.workbench.shared.wording import attach_name
 
 
 class Opening:

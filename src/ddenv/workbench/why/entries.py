@@ -7,18 +7,19 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from ddenv.evidence.claims import current, in_the_making, made_of_usual, meaning, rate, shown
+from ddenv.evidence.claims import current, in_the_making
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, reasons, sentence
-from ddenv.text import padded, plain, shortened
+from ddenv.text import padded, percent, plain, shortened
+from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
+from ddenv.words.signs import CLAIM
 from ddenv.workbench.playback.moving import snapshot_with
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import CLAIM, percent
 
 # The maximum number of models in the list.
 LISTED = 200
