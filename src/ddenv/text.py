@@ -58,7 +58,7 @@ def count(number: int, word: str) -> str:
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
-def sentence(words: str) -> str:
+def as_sentence(words: str) -> str:
     """`words` with a capital letter and a full stop."""
     return words[:1].upper() + words[1:] + ("" if words.endswith(".") else ".")
 

@@ -14,7 +14,7 @@ from ddenv.runfile.progress import Claim, Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
-from ddenv.words.claims import drift, meaning, missing, promise, rate, seen, short, smaller_known, verdict_on
+from ddenv.words.claims import drift, meaning, missing, promise, rate, seen, short, smaller_known, verdict_on, what_ran
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12
@@ -158,12 +158,8 @@ def _certificate_lines(state: RunState) -> list[str]:
 
 def _shown_so_far(state: RunState) -> list[str]:
     """What an unfinished certificate has shown, which holds whenever it is stopped."""
-    rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows]
-    names = [f"without {one.without}" if one.without else "what is left" for one in rows]
-    return [
-        f"  {name}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}"
-        for name, one in zip(names, rows, strict=True)
-    ]
+    rows = (one for one in fresh_runs(state)[:MOST_NAMES] if one.shows)
+    return [f"  {what_ran(one)}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}" for one in rows]
 
 
 def _removal(claim: Claim) -> str:

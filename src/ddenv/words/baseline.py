@@ -6,7 +6,7 @@ from ddenv.evidence.rates import miss_chance
 from ddenv.runfile.events import BaselineFinished, deed
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.text import count, first_of, percent, sentence
+from ddenv.text import as_sentence, count, first_of, percent
 
 # A line names so many failures.
 MOST_FAILURES = 3
@@ -34,9 +34,9 @@ def baseline_sentence(state: RunState) -> str:
     broke = f"; {count(found.broken, 'more run')} broke" if found.broken else ""
     said = [f"Baseline: the robot {failed_in(state, found)} in {how_often(found)}{broke}."]
     if also := other_failures(found):
-        said.append(sentence(also))
+        said.append(as_sentence(also))
     if found.rate < 1.0:
-        said.append(sentence(missed(state)))
+        said.append(as_sentence(missed(state)))
     return " ".join(said)
 
 

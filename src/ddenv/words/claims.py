@@ -16,6 +16,7 @@ from ddenv.evidence.claims import (
     never_left_out,
     so_far,
 )
+from ddenv.evidence.fresh_runs import FreshRuns
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState, Trial
@@ -125,6 +126,18 @@ def uncertified(state: RunState, run: object) -> str:
 def _stayed(pinned: int) -> str:
     """That nothing is claimed of models that were never left out."""
     return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
+
+
+def environment_named(node: int) -> str:
+    """An environment by its number in the history."""
+    return "the whole world" if node == 0 else f"the environment of step {node}"
+
+
+def what_ran(one: FreshRuns) -> str:
+    """What was run with fresh seeds: "what is left", "without crate_00" or "the whole world"."""
+    if one.without is not None:
+        return f"without {one.without}"
+    return "what is left" if one.is_left else environment_named(one.node)
 
 
 class Counted(Protocol):

@@ -7,7 +7,7 @@ from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, Trial
-from ddenv.text import count, first_of, plain, sentence, shortened
+from ddenv.text import as_sentence, count, first_of, plain, shortened
 from ddenv.words.claims import drift
 
 # The maximum number of pinned models that a sentence names, and the maximum width of each name in cells.
@@ -86,9 +86,9 @@ def arrival(state: RunState) -> str:
     if here is None or last is None or last.tests != state.tests_done:
         return ""
     if last.kind in ("go_back", "undo"):
-        return sentence(plain(last.words))
+        return as_sentence(plain(last.words))
     if last.kind == "change":
-        return sentence(f"{plain(last.words)}, from this round on")
+        return as_sentence(f"{plain(last.words)}, from this round on")
     if here.how in _DECIDED and last.kind in ("adopt", "leave_out", "accept_other"):
         return f"{_DECIDED[here.how].format(what=here.what)}: {_sizes(state, here)}."
     return ""

@@ -13,9 +13,9 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.text import count, first_of, percent, plain, sentence
+from ddenv.text import as_sentence, count, first_of, percent, plain
 from ddenv.words.baseline import baseline_sentence
-from ddenv.words.claims import ended, of_runs, promise, terms, usual_runs
+from ddenv.words.claims import ended, environment_named, of_runs, promise, terms, usual_runs
 from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
 from ddenv.words.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
 from ddenv.words.news import isolating
@@ -144,7 +144,7 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."
     # The last one first: that the world is slow.
-    noted = tuple(sentence(plain(words)) for _, words in reversed(state.notes))
+    noted = tuple(as_sentence(plain(words)) for _, words in reversed(state.notes))
     if not tests:
         return (*noted, first)
     return (*noted, first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
@@ -315,7 +315,7 @@ def _finished(state: RunState) -> Happening:
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
     stays = ("p unpins.",) if state.pinned.intersection(state.environment) else ()
     certificate = current(state)
-    means = () if certificate is None else (sentence(promise(state, certificate)),)
+    means = () if certificate is None else (as_sentence(promise(state, certificate)),)
     return "returned", (
         f"Minimal: {kept} left. {_reason(state, '')}",
         f"Kept: {first_of([plain(name) for name in state.environment], NAMED)}.",
@@ -326,7 +326,7 @@ def _finished(state: RunState) -> Happening:
 
 
 def _reason(state: RunState, otherwise: str) -> str:
-    return sentence(plain(ended(state)) or otherwise)
+    return as_sentence(plain(ended(state)) or otherwise)
 
 
 def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> Test | None:
@@ -354,7 +354,7 @@ def implied(state: RunState) -> tuple[str, ...]:
 def refuted(state: RunState) -> tuple[str, ...]:
     """That slices are wrong here."""
     words = refuted_words(state)
-    return (sentence(words),) if words else ()
+    return (as_sentence(words),) if words else ()
 
 
 def certifying(snapshot: Snapshot) -> tuple[str, ...]:
@@ -389,7 +389,7 @@ def _so_far(state: RunState) -> tuple[str, ...]:
     left, whole = rows[0], rows[-1]
     beside = ""
     if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
-        beside = f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
+        beside = f", and in {of_runs(whole.shown, whole.runs)} of {environment_named(whole.node)}"
     return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
 
 
@@ -413,15 +413,10 @@ def _what(test: Test, certificate: Certificate) -> str:
         return f"all that is left except {plain(test.without)}"
     if test.node == certificate.node:
         return "all that is left"
-    return named(test.node)
+    return environment_named(test.node)
 
 
 def _after(certificate: Certificate) -> str:
     if certificate.claims[0].verdict == "lost":
         return "What is left keeps too little of the rate. Earlier environments run, to find the last one not shown to lose it."
     return "The certificate is finished."
-
-
-def named(node: int) -> str:
-    """An environment by its number in the history."""
-    return "the whole world" if node == 0 else f"the environment of step {node}"

@@ -20,11 +20,12 @@ from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
 from ddenv.runs.tests_left import remaining
-from ddenv.text import about, count, first_of, percent, plain, printable, rounded
-from ddenv.words.claims import drift
+from ddenv.text import about, count, first_of, plain, printable, rounded
+from ddenv.words.baseline import how_often
+from ddenv.words.claims import drift, what_ran
 from ddenv.words.explain import explain
 from ddenv.words.news import headline, news
-from ddenv.workbench.run.candidate_rows import name_of
+from ddenv.workbench.shared.log import NOTHING_DECIDED
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine
 
@@ -82,7 +83,7 @@ def table(snapshot: Snapshot) -> Iterator[str]:
         yield _said_of(state, trial)
     if state.certificate is not None:
         for fresh in fresh_runs(state):
-            yield f"{plain(name_of(fresh))}: f in {fresh.shown} of {count(fresh.runs, 'run')}"
+            yield f"{plain(what_ran(fresh))}: f in {fresh.shown} of {count(fresh.runs, 'run')}"
     elif state.round is not None:
         yield from (_said_of(state, candidate) for candidate in state.round.candidates)
     else:
@@ -108,17 +109,13 @@ def decisions(snapshot: Snapshot) -> Iterator[str]:
     """What the user decided."""
     yield from (plain(each.words) for each in snapshot.state.decisions)
     if not snapshot.state.decisions:
-        yield "you decided nothing yet"
+        yield NOTHING_DECIDED
 
 
 def baseline(snapshot: Snapshot) -> Iterator[str]:
     """How often the whole world fails."""
     base = snapshot.state.baseline
-    yield (
-        "the baseline is not finished"
-        if base is None
-        else f"f in {base.failures} of {base.runs} runs, {percent(base.rate)}"
-    )
+    yield ("the baseline is not finished" if base is None else f"f in {how_often(base)}")
 
 
 QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
