@@ -8,7 +8,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile
 from ddenv.words.explain import explain
 from ddenv.words.news import what_happened
-from ddenv.workbench.run.browsing import Moments
+from ddenv.workbench.run.snapshot import Moments
 from tests.learn.lessons import RUNS
 from tests.tiers import slow
 

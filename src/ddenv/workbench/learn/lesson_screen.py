@@ -33,8 +33,8 @@ from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.browsing import Moments
 from ddenv.workbench.run.happening import Happening
+from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
 

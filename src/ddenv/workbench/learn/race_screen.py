@@ -20,7 +20,7 @@ from ddenv.text import count, plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.world_maps import read_world, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.browsing import Moments
+from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
 
