@@ -15,11 +15,8 @@ from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name
-from ddenv.workbench.export.export_dialog import ExportScreen
 from ddenv.workbench.help.signs import SignsDialog
-from ddenv.workbench.history.history_screen import History
 from ddenv.workbench.map.place import LAYERS
-from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
@@ -27,14 +24,16 @@ from ddenv.workbench.run.dialogs import Method, Quit, Rounds, SceneDialog
 from ddenv.workbench.run.facts import FactsDialog
 from ddenv.workbench.run.failures_dialog import FailuresMet
 from ddenv.workbench.shared.background import is_open
-from ddenv.workbench.why.why_screen import Look, WhyScreen
 
 if TYPE_CHECKING:
     from ddenv.workbench.run.run_screen import RunScreen
 
 
 class Opening:
-    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names."""
+    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names.
+
+    Other screens are loaded when they open: the first paint of a run waits for none of them.
+    """
 
     def __init__(self, screen: RunScreen) -> None:
         self._screen = screen
@@ -67,6 +66,7 @@ class Opening:
 
     def history(self) -> None:
         """Shows the tree of reductions, to go back to one of them."""
+        from ddenv.workbench.history.history_screen import History
 
         def chosen(node: int | None) -> None:
             if node is not None:
@@ -114,6 +114,8 @@ class Opening:
 
     def play_test(self, test: int, beside: int | None = None) -> str:
         """Plays a test back. Returns why it cannot be, or ""."""
+        from ddenv.workbench.playback.playback_screen import Playback
+
         position, place = self._screen.browsing.position, self._screen.world.place
         try:
             self._screen.app.push_screen(Playback(self._poll.file, position, place, test, beside))
@@ -123,6 +125,8 @@ class Opening:
 
     def why(self) -> None:
         """Shows what happens without each model that is left."""
+        from ddenv.workbench.why.why_screen import Look, WhyScreen
+
         position, place = self._screen.browsing.position, self._screen.world.place
 
         def look() -> Look:
@@ -150,6 +154,8 @@ class Opening:
 
     def export(self) -> None:
         """Asks what to export."""
+        from ddenv.workbench.export.export_dialog import ExportScreen
+
         self._screen.app.push_screen(ExportScreen(self._poll.path))
 
     def method(self) -> None:
