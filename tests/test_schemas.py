@@ -5,7 +5,7 @@ import pytest
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.runs.tests_left import SCALE
-from ddenv.workbench.run.methods import LISTINGS, SMALLER
+from ddenv.words.methods import LISTINGS, SMALLER
 from tests.command import loaded, python
 
 KINDS = ("partitioning", "prioritization", "algorithm")

@@ -58,6 +58,11 @@ def count(number: int, word: str) -> str:
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
+def as_sentence(words: str) -> str:
+    """`words` with a capital letter and a full stop."""
+    return words[:1].upper() + words[1:] + ("" if words.endswith(".") else ".")
+
+
 def snake_case(name: str) -> str:
     """The name of a class as kinds are named in run files: "go_back" for GoBack."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

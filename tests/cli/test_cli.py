@@ -13,12 +13,12 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from ddenv.evidence.claims import shown
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
 from ddenv.schemas import names
+from ddenv.words.claims import shown
 from tests.command import ddenv, in_process
 from tests.conftest import DATA
 from tests.waiting import PATIENCE, wait_until

@@ -16,7 +16,7 @@ from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile
-from ddenv.words.news import baseline
+from ddenv.words.baseline import baseline
 from ddenv.world.scenario import FailureSpec
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import Killed

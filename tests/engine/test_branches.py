@@ -2,8 +2,8 @@
 
 import random
 
-from ddenv.evidence.claims import ended, meaning, smaller_known
 from ddenv.runfile.failures import atlas
+from ddenv.words.claims import ended, meaning, smaller_known
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.guided import Guided, at_once, guided, numbers, until  # noqa: F401
 from tests.engine.oracles import needs

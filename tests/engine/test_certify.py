@@ -17,11 +17,12 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
-from ddenv.evidence.claims import current, missing
+from ddenv.evidence.claims import current
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import read_parts
+from ddenv.words.claims import missing
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run
 from tests.engine.killing import Killed, kill_after, models_in, story
 from tests.engine.oracles import needs

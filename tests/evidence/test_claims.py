@@ -6,13 +6,14 @@ from dataclasses import replace
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
-from ddenv.evidence.claims import never_left_out, promise, verdict_on
+from ddenv.evidence.claims import never_left_out
 from ddenv.page.markdown import markdown
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
+from ddenv.words.claims import promise, verdict_on
+from ddenv.words.explain import explain
 from ddenv.words.news import news
-from ddenv.workbench.run.explain import explain
 from ddenv.workbench.shared.poll import Snapshot
 from tests.workbench import fake_run
 

@@ -17,9 +17,9 @@ import ddenv
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, REFUTED, Terms, error_of, falls, keeps, settle
 from ddenv.evidence.rates import anytime_interval
-from ddenv.evidence.took_part import _chance
 from ddenv.reduction.isolation import Passing, passes
 from ddenv.reduction.procedure import Certified, procedure
+from ddenv.words.slices import _chance
 from tests.reduction import driving
 
 pytestmark = pytest.mark.claims

@@ -6,15 +6,16 @@ import re
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
-from ddenv.evidence.took_part import slice_in_short, why_sliced
+from ddenv.evidence.took_part import why_sliced
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.words.explain import explain
 from ddenv.words.news import news
+from ddenv.words.slices import slice_in_short
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
-from ddenv.workbench.run.explain import explain
 from ddenv.workbench.run.models import FREE, Course, steps
 from ddenv.workbench.shared.poll import Snapshot
 from tests.command import in_process

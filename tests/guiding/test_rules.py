@@ -172,10 +172,9 @@ def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engi
             SimpleNamespace(selection=models, has_focus=False),
             SimpleNamespace(snapshot=SimpleNamespace(state=state)),
         )
-        keys, said = (
-            KeyOffers(SimpleNamespace(is_past=False), poll, table, world, SimpleNamespace(situation=now), None),
-            {},
-        )
+        browsing, asking = SimpleNamespace(is_past=False), SimpleNamespace(situation=now)
+        screen = SimpleNamespace(browsing=browsing, poll=poll, table=table, world=world, asking=asking)
+        keys, said = KeyOffers(screen), {}
         keys.show(SimpleNamespace(say=said.__setitem__))
         for action, binding in GUIDING.items():
             offered = keys.offer(action)

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import yaml
 
-from ddenv.evidence.claims import is_minimal, verdict_on
+from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.fold import fold
 from ddenv.study.plan import Cell, Plan, make_plan
 from ddenv.study.results import Found, read_cell
 from ddenv.study.study_folder import run_path
+from ddenv.words.claims import verdict_on
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.workbench import fake_run

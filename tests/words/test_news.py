@@ -4,7 +4,8 @@ from ddenv.cli.summary import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded
-from ddenv.words.news import baseline, headline, news
+from ddenv.words.baseline import baseline
+from ddenv.words.news import headline, news
 from tests.shorthand import typed
 
 
@@ -64,7 +65,7 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
     more["seen"] = [f, *others]
     state = states(*happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}})[-1]
     assert baseline(state) == (
-        "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 2 more runs broke; "
+        "baseline: f in 1 of 3 runs (33 %, 95 % interval 10 % to 70 %), 2 more runs broke; "
         "f: stuck at (1.00, 2.00, 0.50) m; other failures: 2. fell or lost at (3.00, 0.00) in 1 run "
         "(--failure reduces another one); the chance that 4 runs of a candidate miss f is 20 % (at most 66 %); "
         "a 95 % chance to see f needs --iterations 7"

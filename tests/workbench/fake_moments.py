@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ddenv.evidence.claims import is_minimal, verdict_on
+from ddenv.evidence.claims import is_minimal
+from ddenv.words.claims import verdict_on
 from tests.workbench.fake_run import FakeRun
 
 

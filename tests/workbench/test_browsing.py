@@ -9,6 +9,7 @@ from attached import Attached
 from textual.widgets import OptionList
 
 from ddenv.runs.wanted import Wanted, read
+from ddenv.words.signs import CLAIM, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.signs import SignsDialog, signs
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
@@ -16,7 +17,6 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidate_rows import COLUMNS, FRESH_COLUMNS, MEANINGS
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.facts import FactsDialog
-from ddenv.workbench.shared.wording import CLAIM, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.widgets.lines import Lines
 from tests.waiting import eventually
 

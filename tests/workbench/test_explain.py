@@ -7,7 +7,8 @@ import fake_run
 import pytest
 
 from ddenv.runfile.fold import fold
-from ddenv.workbench.run.explain import baseline_sentence, explain
+from ddenv.words.baseline import baseline_sentence
+from ddenv.words.explain import explain
 from ddenv.workbench.run.status import facts
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from tests.shorthand import raw
@@ -337,7 +338,7 @@ def test_a_file_that_is_gone_and_another_engine_are_named(run):
     found = snapshot(run)
     gone = replace(found, gone=True, error="x.ddenv: the run file was deleted", engine="absent")
     assert explain(gone).sentences[0] == "x.ddenv: the run file was deleted."
-    other = replace(found, state=found.state.changed(engine_version="0.0.1"))
+    other = replace(found, state=found.state.changed(engine_version="0.0.1"), version="0.1.0")
     assert explain(other).sentences[0].startswith("Another version of ddenv works on this run (0.0.1)")
 
 

@@ -4,8 +4,8 @@ import fake_run
 import pytest
 
 from ddenv.schemas import names
-from ddenv.workbench.run.explain import explain
-from ddenv.workbench.run.methods import ANY, LISTINGS, listing
+from ddenv.words.explain import explain
+from ddenv.words.methods import ANY, LISTINGS, listing
 from tests.workbench.test_explain import snapshot, told
 
 

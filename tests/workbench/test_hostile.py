@@ -22,12 +22,12 @@ from ddenv.runfile.reading import plain
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile, recorded
 from ddenv.runs.tests_left import remaining
+from ddenv.words.explain import explain
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import read_config
 from ddenv.workbench.export.export_dialog import Wanted, suggested, write
 from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.candidate_rows import listed
-from ddenv.workbench.run.explain import explain
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment

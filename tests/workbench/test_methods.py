@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.schemas import names, uses
-from ddenv.workbench.run.methods import KINDS, labels, note, paragraph
+from ddenv.words.methods import KINDS, labels, note, paragraph
 
 EVERY = [(kind, name) for kind in KINDS for name in names(kind)]
 

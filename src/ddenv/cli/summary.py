@@ -6,28 +6,15 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ddenv.evidence.claims import (
-    current,
-    drift,
-    helping,
-    is_minimal,
-    meaning,
-    missing,
-    never_left_out,
-    promise,
-    rate,
-    seen,
-    short,
-    smaller_known,
-    verdict_on,
-)
+from ddenv.evidence.claims import current, helping, is_minimal, never_left_out
+from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.took_part import simulated
 from ddenv.runfile.progress import Claim, Node
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.runs.folder import find_run
-from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
+from ddenv.words.claims import drift, meaning, missing, promise, rate, seen, short, smaller_known, verdict_on, what_ran
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12
@@ -147,8 +134,7 @@ def _next(state: RunState, path: Path) -> list[str]:
     if state.status != "finished" or found is None:
         return []
     out = f", and H in it leaves {helps[0]} out" if (helps := helping(found)) else ""
-    run = path.stem if find_run(path.stem) == path else shlex.quote(str(path))
-    bundle = shlex.quote(f"{path.stem}.zip")
+    run, bundle = attach_name(path), shlex.quote(f"{path.stem}.zip")
     return [
         f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, "
         f"'ddenv export {run} --bundle {bundle}' packs it for others"
@@ -172,12 +158,8 @@ def _certificate_lines(state: RunState) -> list[str]:
 
 def _shown_so_far(state: RunState) -> list[str]:
     """What an unfinished certificate has shown, which holds whenever it is stopped."""
-    rows = [one for one in fresh_runs(state)[:MOST_NAMES] if one.shows]
-    names = [f"without {one.without}" if one.without else "what is left" for one in rows]
-    return [
-        f"  {name}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}"
-        for name, one in zip(names, rows, strict=True)
-    ]
+    rows = (one for one in fresh_runs(state)[:MOST_NAMES] if one.shows)
+    return [f"  {what_ran(one)}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}" for one in rows]
 
 
 def _removal(claim: Claim) -> str:

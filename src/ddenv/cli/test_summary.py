@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ddenv.evidence.claims import in_another_simulator
 from ddenv.evidence.rates import shows_at, wilson_interval
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 from ddenv.text import count, percent, printable
+from ddenv.words.claims import in_another_simulator
 
 
 def line(result: Mapping[str, Any]) -> str:

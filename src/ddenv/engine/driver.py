@@ -18,7 +18,7 @@ from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import RUNS_BESIDE, Terms, error_of
-from ddenv.evidence.claims import current, is_minimal, verdict_on
+from ddenv.evidence.claims import current, is_minimal
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Trial
@@ -36,6 +36,7 @@ from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
 from ddenv.text import count
+from ddenv.words.claims import verdict_on
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 

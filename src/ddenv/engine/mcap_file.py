@@ -21,7 +21,7 @@ from mcap_ros2.writer import Writer
 from ddenv.engine.judging import rows_of
 from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, shown
+from ddenv.evidence.claims import current
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.simulation.template import Variants
@@ -30,6 +30,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import GOAL, F, reasons
 from ddenv.runs.subject import Subject, read_subject
+from ddenv.words.claims import shown
 from ddenv.world import scenario
 from ddenv.world.access import write_file
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere, Visual

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
 
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
+from ddenv.runfile.snapshot import EngineIs
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose
 from ddenv.text import count, first_of, shortened
 
-EngineIs = Literal["alive", "starting", "absent"]
 Row = Candidate | Trial
 
 # Maximum number of models that a line names, and maximum width of each name in cells.

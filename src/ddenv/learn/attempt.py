@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import of_all_parts
+from ddenv.words.claims import of_all_parts
 from ddenv.world.access import read_bytes
 
 OUTCOMES = ("similar", "other", "pass")

@@ -13,10 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ddenv.errors import UserError
-from ddenv.evidence import claims
 from ddenv.evidence.certificate import NEEDED_SHARE
+from ddenv.evidence.claims import so_far
 from ddenv.evidence.rates import anytime_interval, miss_chance
-from ddenv.evidence.took_part import slice_words
 from ddenv.learn.attempt import Oracle
 from ddenv.runfile.events import deed
 from ddenv.runfile.progress import Certificate, Claim, Node
@@ -24,6 +23,8 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState
 from ddenv.schemas import nearest
 from ddenv.text import first_of, percent
+from ddenv.words import claims
+from ddenv.words.slices import slice_words
 
 # Terms that contain a digit.
 TERMS = ("1-minimal", "Algorithm 1", "(1 − rate)")
@@ -74,7 +75,7 @@ def _now(state: RunState) -> Certificate:
 
 def _bound(state: RunState, without: str | None = None) -> str:
     """What it has shown by now of what is left, or of that without a model. Raises UserError if it has not left that out."""
-    claim = claims.so_far(state, _now(state)).get(without)
+    claim = so_far(state, _now(state)).get(without)
     if claim is None:
         raise UserError(f"at the place of the step no fresh run has left '{without}' out")
     return percent(claim.bound or 0.0)

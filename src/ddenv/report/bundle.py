@@ -13,7 +13,7 @@ from string import Template
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, meaning, rate, seeds_of, uncertified
+from ddenv.evidence.claims import current
 from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed
@@ -22,6 +22,7 @@ from ddenv.runs.folder import BUNDLED_RUN
 from ddenv.runs.programs import how_to_install
 from ddenv.runs.reasons import sentence
 from ddenv.text import count, printable
+from ddenv.words.claims import meaning, rate, seeds_of, uncertified
 from ddenv.world.access import write_file
 
 RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ddenv.evidence.claims import current, drift, meaning, missed, missing, never_left_out, promise, verdict_on
-from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
+from ddenv.evidence.claims import current, never_left_out
+from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
+from ddenv.evidence.took_part import why_sliced
 from ddenv.page.blocks import (
     Block,
     Cell,
@@ -26,9 +27,10 @@ from ddenv.runfile.events import DEEDS, BaselineFinished
 from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.text import count, plain
-from ddenv.words.news import failed_in
+from ddenv.text import as_sentence, count, plain
+from ddenv.words.baseline import failed_in, missed
+from ddenv.words.claims import drift, meaning, missing, promise, verdict_on
+from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200
@@ -103,7 +105,7 @@ def _baseline(state: RunState) -> list[Block]:
     return [
         say(words),
         Picture("interval", interval(base), "The failure rate with its interval."),
-        *([say(f"{missed(state)[:1].upper()}{missed(state)[1:]}.")] if base.rate < 1 else []),
+        *([say(as_sentence(missed(state)))] if base.rate < 1 else []),
         *_seen(base),
     ]
 
@@ -213,7 +215,7 @@ def _without(state: RunState) -> list[Block]:
     so_far, words = drift(state), missing(state)
     rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
     claimed = "what its runs have shown by now holds all the same" if rows else "nothing is claimed of what is left"
-    first = f"{words[:1].upper()}{words[1:]}: {claimed}."
+    first = as_sentence(f"{words}: {claimed}")
     block = say(first, f" From all runs so far: {so_far[0]}." if so_far else "")
     shown = ((_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows)
     table = Table(("environment", "runs", "with f", "shown"), tuple(shown), frozenset({1, 2}))
@@ -235,7 +237,7 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         )
     if state.certified:
         means = promise(state, found)
-        words += f" {means[:1].upper()}{means[1:]}."
+        words += f" {as_sentence(means)}"
     return [table, say(words), *_earlier(state, found)]
 
 

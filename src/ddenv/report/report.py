@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, ended, for_everyone
+from ddenv.evidence.claims import current
 from ddenv.page.blocks import (
     Name,
     Paragraph,
@@ -34,7 +34,8 @@ from ddenv.runfile.events import DEEDS, Place, deed
 from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
-from ddenv.text import count, plain
+from ddenv.text import as_sentence, count, plain
+from ddenv.words.claims import ended, for_everyone
 from ddenv.world.access import write_file
 
 KINDS = (".html", ".htm", ".md")
@@ -123,7 +124,7 @@ def _failure(state: RunState) -> list[Paragraph]:
 
 def _noted(state: RunState) -> list[Paragraph]:
     """What is wrong with the world."""
-    return [say(f"{words[:1].upper()}{words[1:]}.", notice=True) for words in (plain(each) for _, each in state.notes)]
+    return [say(as_sentence(words), notice=True) for words in (plain(each) for _, each in state.notes)]
 
 
 def _short_of(state: RunState, position: Place) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, moment, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
@@ -15,6 +14,8 @@ from ddenv.runfile import branches
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import REFUSED, Candidate, Round, RunState, Trial
 from ddenv.text import count, plain
+from ddenv.words.claims import seen
+from ddenv.words.decisions import CAME_BY
 
 # The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
 MOST_ROUNDS = 60
@@ -22,16 +23,6 @@ MOST_ROUNDS = 60
 MOST = 120
 # The maximum number of steps in the line about a history without branches.
 MOST_STEPS = 40
-HOW = {
-    "start": "",
-    "reduced": "",
-    "adopted": "adopted by hand",
-    "accepted": "another failure, accepted by hand",
-    "instead": "a branch to its failure",
-    "certified": "by a certificate",
-    "left_out": "left out by hand",
-    "sliced": "without a test",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +196,7 @@ def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:
     marks += ["f too rare"] if node.lost_rate else []
     marks += ["minimal"] if node.minimal else []
     marks += ["here"] if node.number == state.node else []
-    how = HOW.get(node.how, "")
+    how, _ = CAME_BY[node.how]
     came = f"{plain(node.what)}, {how}" if how else plain(node.what)
     round = "" if node.round is None else str(node.round)
     return (

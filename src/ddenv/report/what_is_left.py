@@ -8,7 +8,7 @@ from array import array
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ddenv.evidence.claims import current, rate
+from ddenv.evidence.claims import current
 from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, place, say
 from ddenv.report.report_map import CORNERS, close_up, picture
 from ddenv.report.run_data import Record
@@ -17,6 +17,7 @@ from ddenv.runfile.supports import drops_without
 from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, sentence
 from ddenv.text import count, first_of, plain
+from ddenv.words.claims import rate
 from ddenv.world.model import World, is_ground
 
 if TYPE_CHECKING:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
@@ -144,6 +145,15 @@ class RunState:
     def models_of(self, test: Test) -> tuple[str, ...]:
         """The names of the models in the world of a test, collected at each call."""
         return self.environments[test.environment].names(self.elements)
+
+    def tests_of(self, numbers: Iterable[int]) -> list[Test]:
+        """The tests with these numbers, as far as the file has them."""
+        return [self.tests[number - 1] for number in numbers if 0 < number <= len(self.tests)]
+
+    @property
+    def evidence(self) -> Test | None:
+        """The last similar run; None before the first."""
+        return next(iter(self.tests_of((self.evidence_test or 0,))), None)
 
     @property
     def f_test(self) -> Test | None:

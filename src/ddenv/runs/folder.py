@@ -12,6 +12,7 @@ from urllib.parse import unquote, urlsplit
 import platformdirs
 
 from ddenv.errors import UserError
+from ddenv.text import plain
 
 SUFFIX = ".ddenv"
 # The run in the folder of a bundle.
@@ -34,6 +35,11 @@ def find_run(name: str) -> Path:
     stored = path if len(path.parts) > 1 else runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
     bundled = path / BUNDLED_RUN
     return bundled if not stored.is_file() and bundled.is_file() else stored
+
+
+def attach_name(run: Path) -> str:
+    """A run's name if it is in the runs folder, else its path, quoted for a shell."""
+    return shlex.quote(plain(run.stem if find_run(run.stem) == run else run))
 
 
 def dropped_run(text: str) -> Path | None:

@@ -10,11 +10,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import is_nearest, of_passing
+from ddenv.evidence.claims import is_nearest
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_unknown, where_they_part
 from ddenv.text import first_of
+from ddenv.words.claims import of_passing
 
 # Instants at which the two runs are compared, from where they part to the end of the shorter one.
 INSTANTS = 8

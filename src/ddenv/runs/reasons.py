@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, uncertified, verdict_on
+from ddenv.evidence.claims import current
 from ddenv.evidence.rates import anytime_interval
 from ddenv.runfile.fold_decisions import exact_runs, rested_on
 from ddenv.runfile.progress import Certificate
@@ -17,6 +17,7 @@ from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.text import count, percent
+from ddenv.words.claims import uncertified, verdict_on
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
 F, GOAL = "similar", "pass"

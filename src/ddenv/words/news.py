@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections import Counter
 
-from ddenv.evidence.claims import (
-    in_the_making,
-    made_of_usual,
-    missed,
-    never_left_out,
-    of_passing,
-    smaller_known,
-    usual_runs,
-    verdict_on,
-)
-from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
-from ddenv.runfile.events import DEEDS, BaselineFinished, deed
+from ddenv.evidence.claims import in_the_making, never_left_out
+from ddenv.runfile.events import DEEDS, Implied, TestFinished, TestLost, TestStarted
+from ddenv.runfile.position import Moment
 from ddenv.runfile.progress import Removal
-from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
-from ddenv.text import count, first_of
+from ddenv.runfile.state import ISOLATE, Candidate, RunState, Test, Trial
+from ddenv.runfile.tested import purpose
+from ddenv.text import count, first_of, plain
+from ddenv.words.baseline import baseline
+from ddenv.words.claims import made_of_usual, of_passing, smaller_known, usual_runs, verdict_on
+from ddenv.words.signs import SETTLING, outcome
+from ddenv.words.slices import implied_words, refuted_words, slice_words
 
-SETTLING = "finding which models rest on which"
 ISOLATING = "finding the nearest world that passes"
 CONFIRMING = "certifying what is left with fresh runs"
-# A line names so many failures of the baseline.
-MOST_FAILURES = 3
+# A line names so many of the models that a removal leaves out.
+MOST_NAMES = 3
 # Events whose text is always the same.
 SAID = {
     "paused": "paused",
@@ -184,9 +180,8 @@ def _isolation(kind: str, before: RunState, after: RunState) -> str:
 
 
 def _removal(state: RunState, one: Removal) -> str:
-    tests, implied = count(len(one.tests), "test"), implied_words(state, one.tests)
-    what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_FAILURES)})"
-    return f"  {what}: {one.verdict} after {tests}{_endings(state, one)}{f', {implied}' if implied else ''}"
+    what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
+    return f"  {what}: {_verdict(state, one)}"
 
 
 def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
@@ -213,41 +208,38 @@ def _supports(state: RunState) -> str:
 
 
 def _judged(state: RunState, one: Candidate | Trial) -> str:
-    tests, implied = count(len(one.tests), "test"), implied_words(state, one.tests)
-    ended = f"{_endings(state, one)}{f', {implied}' if implied else ''}"
-    return f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {tests}{ended}"
+    return f"  {one.label} ({count(one.size, 'model')}): {_verdict(state, one)}"
 
 
-def baseline(state: RunState) -> str:
-    """The result of the baseline, and how likely re-runs are to show f; "" before it is finished."""
-    found = state.baseline
-    if found is None:
-        return ""
-    x, y, z = found.position
-    failure = state.failure or "ending"
-    broke = f", {count(found.broken, 'more run')} broke" if found.broken else ""
-    others = f"; {also} (--failure reduces another one)" if (also := other_failures(found)) else ""
-    return (
-        f"baseline: f in {found.failures} of {found.runs} runs ({found.rate:.0%}, 95 % interval {found.low:.0%} to "
-        f"{found.high:.0%}){broke}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m{others}; {missed(state)}"
-    )
+def _verdict(state: RunState, one: Candidate | Trial | Removal) -> str:
+    """A verdict, and how its tests ended: "dissimilar after 4 tests (2 pass, 1 stuck, 1 tipped over), implied by test 3"."""
+    tests, implied = [test for test in state.tests_of(one.tests) if test.is_finished], implied_words(state, one.tests)
+    endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests)
+    ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
+    return f"{one.verdict} after {count(len(one.tests), 'test')}{ways}{f', {implied}' if implied else ''}"
 
 
-def failed_in(state: RunState, found: BaselineFinished) -> str:
-    """What the robot did in the f of the baseline; on a branch another failure is f."""
-    known = 0 < found.failure_test <= len(state.tests)
-    return deed(state.tests[found.failure_test - 1].failure if known else "")
+def happened(moment: Moment) -> str:
+    """What happened in a moment, with its time of day."""
+    at = time.strftime("%H:%M:%S", time.localtime(moment.recorded.time))
+    return f"{at}, after {count(moment.after.tests_done, 'test')}: {what_happened(moment)}."
 
 
-def other_failures(found: BaselineFinished) -> str:
-    """The failures besides f of the runs that chose f, with their numbers; "" if there is none."""
-    listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
-    chose = f"the first {count(found.chose, 'run')} only chose f, and showed " if found.chose else ""
-    return f"{chose}other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
+def what_happened(moment: Moment) -> str:
+    """The same in a few words, without the time."""
+    kind, event, state = moment.recorded.kind, moment.recorded.event, moment.after
+    if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
+        return _of_test(state, state.tests[event.test - 1])
+    if kind == "created":
+        return "the run was made"
+    if kind == "finished":
+        # With what result is explained beside it.
+        return "the run ended"
+    return plain(news(kind, moment.before, state, attached=True)).rstrip(".") or kind.replace("_", " ")
 
 
-def _endings(state: RunState, one: Candidate | Trial | Removal) -> str:
-    """How the tests of a candidate, a try or a removal ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
-    tests = (state.tests[id - 1] for id in one.tests if 0 < id <= len(state.tests))
-    endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
-    return f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
+def _of_test(state: RunState, test: Test) -> str:
+    what = f"test {test.id} ({purpose(state, test)}, seed {test.seed})"
+    if test.implied_by is not None:
+        return f"{what} follows from test {test.implied_by}: {outcome(test)}"
+    return f"{what} starts" if test.outcome == "running" else f"{what}: {outcome(test) or test.outcome}"

@@ -6,8 +6,9 @@ from ddenv.learn.variables import variables
 from ddenv.runfile.position import position_in
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile
-from ddenv.workbench.run.browsing import Moments, what_happened
-from ddenv.workbench.run.explain import explain
+from ddenv.words.explain import explain
+from ddenv.words.news import what_happened
+from ddenv.workbench.run.snapshot import Moments
 from tests.learn.lessons import RUNS
 from tests.tiers import slow
 

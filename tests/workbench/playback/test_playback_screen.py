@@ -183,7 +183,7 @@ async def test_models_move_where_their_motion_is_stored(runs):
         motion.extend((time, x, -2.0, 0.15, 1, 0, 0, 0))
     put(run, 1, motion, "crate_03")
     async with Attached(run) as session:
-        session.app.screen._opening.play(session.screen.browsing.position, run.state.tests[0])
+        session.app.screen.opening.play_row(run.state.tests[0])
         screen = await settled(session)
         assert "1 model that moved" in str(screen.query_one("#playback-world").border_title)
         centre = lambda: next(each.center for each in screen.map.place.prints if each.name == "crate_03")  # noqa: E731

@@ -7,9 +7,9 @@ from textual.worker import WorkerCancelled
 
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import read_parts
+from ddenv.words.methods import KINDS
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.methods import KINDS
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import Explained
 from ddenv.workbench.setup.setup_screen import SetupScreen

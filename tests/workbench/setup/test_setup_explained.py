@@ -6,7 +6,7 @@ import yaml
 from textual.widgets import Select, Static
 
 from ddenv.schemas import explanation
-from ddenv.workbench.run.methods import KINDS
+from ddenv.words.methods import KINDS
 from ddenv.workbench.setup.fields import Explained
 from tests.workbench.setup.setup_session import Opened
 

@@ -7,9 +7,9 @@ import yaml
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.schemas import names
+from ddenv.words.methods import KINDS
 from ddenv.workbench.help.shortcuts import Help
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.methods import KINDS
 from ddenv.workbench.run.run_screen import RunScreen
 from tests.tiers import slow
 from tests.workbench.setup.setup_session import Opened

@@ -16,10 +16,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
-from ddenv.text import plain
+from ddenv.text import count, plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 # What can be written: its id, its label, and the endings that its name may have.

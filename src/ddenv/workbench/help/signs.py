@@ -13,9 +13,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from ddenv.runfile import branches
+from ddenv.words.signs import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, OF_WAYS
-from ddenv.workbench.shared.wording import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
 
 Signs = tuple[tuple[str, str], ...]
 

@@ -14,22 +14,22 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen, Screen
 from textual.widgets import DataTable, Static
 
-from ddenv.evidence.claims import of_runs, seen
-from ddenv.evidence.took_part import slice_in_short
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile import branches
 from ddenv.runfile.progress import Decision, Node
 from ddenv.runfile.state import RunState
-from ddenv.text import first_of, plain, shortened
+from ddenv.text import count, first_of, plain, shortened
+from ddenv.words.claims import of_runs, seen
+from ddenv.words.decisions import CAME_BY
+from ddenv.words.slices import slice_in_short
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 
@@ -43,16 +43,6 @@ TREE = 15
 MARK = "marked"
 # Where the words of a decision begin, after its time.
 INDENT = 10
-HOW = {
-    "start": "where the run began",
-    "reduced": "reduced to what shows f",
-    "adopted": "a try by hand that showed f",
-    "accepted": "another failure, accepted as f, too",
-    "instead": "a branch: the failure of this test is f here",
-    "certified": "reduced by a certificate: fresh runs show f as often",
-    "left_out": "left out by hand: by the certificate it only helped",
-    "sliced": "reduced without a test to what took part",
-}
 
 
 class Tree(DataTable[Text]):
@@ -181,8 +171,7 @@ class History(Screen[int | None]):
         if node is None:
             return
         names = first_of([plain(shortened(name, 40)) for name in node.environment], 12)
-        how = HOW.get(node.how, node.how)
-        text = Text(f"{place(node)}: {how}", "bold")
+        text = Text(f"{place(node)}: {CAME_BY[node.how][1]}", "bold")
         text.append(f", f in {of_runs(node.shown, len(node.runs))}" if node.runs else "")
         text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
         sliced = f"\n{slice_in_short(self._look_at().state, node)}" if node.how == "sliced" else ""

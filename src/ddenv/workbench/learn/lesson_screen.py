@@ -24,6 +24,7 @@ from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
 from ddenv.text import plain
+from ddenv.words.news import what_happened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
@@ -32,8 +33,8 @@ from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.browsing import Moments, what_happened
 from ddenv.workbench.run.happening import Happening
+from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
 

@@ -16,14 +16,13 @@ from textual.widgets import Static
 from ddenv.learn.race import Play, Race, Turn, plays_of_runs, result, tally
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
-from ddenv.text import plain, shortened, truncated
+from ddenv.text import count, plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.world_maps import read_world, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.browsing import Moments
+from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count
 
 IN, OUT, GONE = "■", "□", "·"
 SMALLEST = (64, 20)

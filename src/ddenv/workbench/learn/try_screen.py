@@ -17,12 +17,11 @@ from ddenv.errors import UserError
 from ddenv.learn.attempt import Attempt, Tried
 from ddenv.learn.race import BOUND, Line, Play, comparison, in_one_sentence
 from ddenv.learn.variables import SIGNS
-from ddenv.text import plain, shortened, truncated
+from ddenv.text import count, plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.world_maps import read_world, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count
 
 SMALLEST = (64, 20)
 NAME = 16

@@ -12,22 +12,22 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import drift
+from ddenv.evidence.fresh_runs import fresh_runs
 from ddenv.guiding.commands import Command, question, said, send, starts_engine
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
-from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.runs.tests_left import remaining
-from ddenv.text import first_of, plain, printable, rounded
+from ddenv.text import about, count, first_of, plain, printable, rounded
+from ddenv.words.baseline import how_often
+from ddenv.words.claims import drift, what_ran
+from ddenv.words.explain import explain
 from ddenv.words.news import headline, news
-from ddenv.workbench.run.candidate_rows import name_of
-from ddenv.workbench.run.explain import explain
+from ddenv.workbench.shared.log import NOTHING_DECIDED
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine
-from ddenv.workbench.shared.wording import about, count, percent
 
 # The maximum number of models that a line names.
 NAMED = 50
@@ -83,7 +83,7 @@ def table(snapshot: Snapshot) -> Iterator[str]:
         yield _said_of(state, trial)
     if state.certificate is not None:
         for fresh in fresh_runs(state):
-            yield f"{plain(name_of(fresh))}: f in {fresh.shown} of {count(fresh.runs, 'run')}"
+            yield f"{plain(what_ran(fresh))}: f in {fresh.shown} of {count(fresh.runs, 'run')}"
     elif state.round is not None:
         yield from (_said_of(state, candidate) for candidate in state.round.candidates)
     else:
@@ -109,17 +109,13 @@ def decisions(snapshot: Snapshot) -> Iterator[str]:
     """What the user decided."""
     yield from (plain(each.words) for each in snapshot.state.decisions)
     if not snapshot.state.decisions:
-        yield "you decided nothing yet"
+        yield NOTHING_DECIDED
 
 
 def baseline(snapshot: Snapshot) -> Iterator[str]:
     """How often the whole world fails."""
     base = snapshot.state.baseline
-    yield (
-        "the baseline is not finished"
-        if base is None
-        else f"f in {base.failures} of {base.runs} runs, {percent(base.rate)}"
-    )
+    yield ("the baseline is not finished" if base is None else f"f in {how_often(base)}")
 
 
 QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {

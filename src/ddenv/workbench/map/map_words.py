@@ -12,9 +12,9 @@ from textual.widget import Widget
 from ddenv.evidence.took_part import in_last
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import Names, drops
-from ddenv.text import shortened
+from ddenv.text import count, shortened
+from ddenv.words.signs import DROPS, dropping
 from ddenv.workbench.map.place import Shown
-from ddenv.workbench.shared.wording import DROPS, count, dropping
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint

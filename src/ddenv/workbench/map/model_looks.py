@@ -16,6 +16,7 @@ from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import Candidate, RunState, Trial, partition_letter
 from ddenv.runfile.supports import drops
+from ddenv.words.signs import DROPS
 from ddenv.workbench.map.map_colors import (
     FLOOR,
     FLOOR_OUT,
@@ -31,7 +32,6 @@ from ddenv.workbench.map.map_colors import (
     Tone,
     mixed,
 )
-from ddenv.workbench.shared.wording import DROPS
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint

@@ -16,8 +16,8 @@ from textual.widgets.option_list import Option
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
 from ddenv.text import padded, shortened
+from ddenv.words.signs import outcome
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.shared.wording import outcome
 
 # The maximum number of tests in the list.
 LISTED = 200

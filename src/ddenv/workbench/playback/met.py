@@ -10,8 +10,8 @@ from textual.widget import Widget
 
 from ddenv.runfile.state import Test
 from ddenv.text import plain, shortened
+from ddenv.words.signs import OUTCOME
 from ddenv.workbench.playback.timeline import ROBOTS
-from ddenv.workbench.shared.wording import OUTCOME
 
 HERE = "▸"
 # The maximum number of lines of a test.

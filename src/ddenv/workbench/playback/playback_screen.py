@@ -20,7 +20,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
-from ddenv.text import plain
+from ddenv.text import count, plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
@@ -31,7 +31,6 @@ from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import Moving, RobotWay, snapshot_with, without
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
 from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.wording import count
 
 # Simulated seconds in a second.
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)

@@ -10,8 +10,8 @@ from textual.message import Message
 from textual.widget import Widget
 
 from ddenv.runfile.state import Test
+from ddenv.words.signs import outcome
 from ddenv.workbench.map.map_words import PARTING
-from ddenv.workbench.shared.wording import outcome
 
 GONE, COMING, NOW, END, TOUCH = "━", "─", "●", "┤", "▾"
 ROBOTS = "→⇒"

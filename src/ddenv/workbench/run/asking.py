@@ -19,10 +19,11 @@ from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
 from ddenv.runs import processor
-from ddenv.text import plain
+from ddenv.runs.folder import attach_name
+from ddenv.text import count, duration, plain
+from ddenv.words.decisions import shows_f
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine
-from ddenv.workbench.shared.wording import attach_name, count, duration
 
 # After this time without an answer the screen says that there is none, s.
 PATIENCE = 5
@@ -124,7 +125,7 @@ class Asking:
         if why := refusal(command, now):
             self.refuse(why)
         elif isinstance(command, StartEngine):
-            self._start_engine()
+            self._once_trusted(self._start)
         elif isinstance(command, Isolate):
             self._once_trusted(lambda: self._start(isolate=0))
         elif sure or not (asked := question(command, now.state)):
@@ -170,26 +171,20 @@ class Asking:
             if self._screen.is_attached:
                 self._changed()
 
+        def write(loop: asyncio.AbstractEventLoop, context: contextvars.Context) -> None:
+            id, error = 0, ""
+            try:
+                id = send(self._poll.file, command)
+            except UserError as trouble:
+                error = str(trouble)
+            # The screen may be gone by now.
+            with suppress(RuntimeError):
+                loop.call_soon_threadsafe(sent, id, error, context=context)
+
         if self._sender is None:
             # One thread: commands arrive in the order they were sent.
             self._sender = ThreadPoolExecutor(1, "send")
-        self._sender.submit(self._write, command, sent, asyncio.get_running_loop(), contextvars.copy_context())
-
-    def _write(
-        self,
-        command: Command,
-        sent: Callable[[int, str], None],
-        loop: asyncio.AbstractEventLoop,
-        context: contextvars.Context,
-    ) -> None:
-        id, error = 0, ""
-        try:
-            id = send(self._poll.file, command)
-        except UserError as trouble:
-            error = str(trouble)
-        # The screen may be gone by now.
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(sent, id, error, context=context)
+        self._sender.submit(write, asyncio.get_running_loop(), contextvars.copy_context())
 
     # The engine.
 
@@ -198,10 +193,7 @@ class Asking:
         snapshot = self._poll.snapshot
         if self._due > snapshot.state.last_command and snapshot.engine == "absent" and not snapshot.error:
             self._due = 0
-            self._start_engine()
-
-    def _start_engine(self) -> None:
-        self._once_trusted(self._start)
+            self._once_trusted(self._start)
 
     def _once_trusted(self, then: Callable[[], None]) -> None:
         """Calls `then` if the user trusts what an engine starts for this run, or says that nothing was done."""
@@ -227,7 +219,6 @@ class Asking:
 
 def _judged(trial: Trial, watch: bool) -> str:
     if trial.verdict == "similar":
-        then = "" if watch else ": a on its row adopts it"
-        return f"{trial.label} shows f with {count(trial.size, 'model')}{then}"
+        return f"{shows_f(trial)}{'' if watch else ': a on its row adopts it'}"
     known = ", known from before" if trial.known and trial.known == len(trial.tests) else ""
     return f"{trial.label} does not show f in {count(len(trial.tests), 'test')}{known}"

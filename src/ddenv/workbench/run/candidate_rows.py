@@ -9,27 +9,16 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.evidence.claims import fresh_runs_made, in_the_making, made_of_usual, short
-from ddenv.evidence.took_part import implied_words
+from ddenv.evidence.claims import fresh_runs_made, in_the_making
+from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
-from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.text import plain, shortened
+from ddenv.text import count, percent, plain, shortened
+from ddenv.words.claims import made_of_usual, short
+from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
+from ddenv.words.slices import implied_words
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import (
-    CLAIM,
-    DROPS,
-    VERDICT,
-    brief,
-    count,
-    dropping,
-    metres,
-    outcome,
-    percent,
-    signs,
-    simulated,
-)
 
 # Maximum width of a model's name, in cells.
 NAME = 8

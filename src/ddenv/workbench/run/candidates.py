@@ -16,8 +16,8 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from ddenv.evidence.fresh_runs import FreshRuns
 from ddenv.runfile.state import Candidate, Test, Trial
-from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.text import first_of, plain
 from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
 from ddenv.workbench.shared.poll import Snapshot

@@ -20,8 +20,8 @@ from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.settings import Setting, Value
 from ddenv.text import plain
+from ddenv.words.methods import KINDS, note, paragraph
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.run.methods import KINDS, note, paragraph
 from ddenv.workbench.widgets.entry import Entry
 
 # Beside the pair and the algorithm, which have lists.

@@ -13,10 +13,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.text import plain, shortened, truncated
+from ddenv.text import count, plain, shortened, truncated
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.wording import count
 
 # Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
 LISTED, WIDTH = 100, 58

@@ -18,10 +18,9 @@ from textual.widgets import Button, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.runfile.position import Chapter
-from ddenv.text import plain
+from ddenv.text import count, plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.processes import Scene
-from ddenv.workbench.shared.wording import count
 
 if TYPE_CHECKING:
     from ddenv.schemas import Kind
@@ -46,13 +45,13 @@ class Method(ModalScreen[None]):
             yield Static(self._words(), markup=False)
 
     def _words(self) -> Text:
-        from ddenv.workbench.run.methods import chosen
+        from ddenv.words.methods import chosen
 
         names = chosen(self._algorithm, self._pair)
         return Text("\n\n").join(self._paragraph(kind, name) for kind, name in names.items())
 
     def _paragraph(self, kind: Kind, name: str) -> Text:
-        from ddenv.workbench.run.methods import note, paragraph
+        from ddenv.words.methods import note, paragraph
 
         text = Text(f"{kind} ").append(plain(name), "bold").append("\n")
         unused = note(kind, self._algorithm)

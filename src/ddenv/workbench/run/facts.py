@@ -18,10 +18,10 @@ from ddenv.errors import UserError
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
-from ddenv.text import first_of, plain
+from ddenv.text import count, first_of, plain
+from ddenv.words.signs import metres
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.playback.met import how_it_ended, met
-from ddenv.workbench.shared.wording import count, metres
 
 # The maximum number of models to name.
 NAMED = 12

@@ -20,9 +20,8 @@ from ddenv.guiding.situation import Situation
 from ddenv.runfile.events import named
 from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.state import RunState
-from ddenv.text import first_of, plain, shortened
+from ddenv.text import count, first_of, plain, shortened
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.question import Question
 
 # Time between two looks at the run, s.

@@ -9,7 +9,7 @@ from rich.containers import Lines
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.workbench.run.explain import Explanation, explain
+from ddenv.words.explain import Explanation, explain
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.widgets.lines import changed_lines
 

@@ -17,9 +17,8 @@ from textual.widgets import Static
 
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import RunState, partition_letter
-from ddenv.text import padded, shortened
+from ddenv.text import count, padded, shortened
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.terminal.themes import ink
 from ddenv.workbench.widgets.lines import Lines, changed_lines
 

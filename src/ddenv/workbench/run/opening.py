@@ -4,34 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.text import Text
-from textual.screen import Screen
 
 from ddenv.errors import UserError
+from ddenv.evidence.fresh_runs import FreshRuns
 from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
-from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
-from ddenv.runs.fresh_runs import FreshRuns
+from ddenv.runs.folder import attach_name
+from ddenv.workbench.help.signs import SignsDialog
 from ddenv.workbench.map.place import LAYERS
-from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidate_rows import Item
-from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
+from ddenv.workbench.run.change import Change
+from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
+from ddenv.workbench.run.dialogs import Method, Quit, Rounds, SceneDialog
+from ddenv.workbench.run.facts import FactsDialog
+from ddenv.workbench.run.failures_dialog import FailuresMet
 from ddenv.workbench.shared.background import is_open
-from ddenv.workbench.shared.poll import Poll
-from ddenv.workbench.shared.processes import Scene
-from ddenv.workbench.shared.wording import attach_name
+
+if TYPE_CHECKING:
+    from ddenv.workbench.run.run_screen import RunScreen
 
 
 class Opening:
-    """Opens dialogs above `screen`, and acts on their answers."""
+    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names.
 
-    def __init__(self, screen: Screen[Any], poll: Poll, asking: Asking, world: WorldMap, scene: Scene) -> None:
-        self._screen, self._poll, self._asking, self._world, self._scene = screen, poll, asking, world, scene
+    Other screens are loaded when they open: the first paint of a run waits for none of them.
+    """
+
+    def __init__(self, screen: RunScreen) -> None:
+        self._screen = screen
+        self._poll, self._asking, self._scene = screen.poll, screen.asking, screen.scene
 
     def choose(
         self,
@@ -42,34 +48,35 @@ class Opening:
         chosen: Sequence[str] = (),
     ) -> None:
         """Asks for models by their names; those that are `chosen` already come first."""
-        from ddenv.workbench.run.choose import ChooseModels
-
         if not names:
             self._asking.refuse("there are no models to choose from")
             return
         dialog = ChooseModels(title, names, several=several, pinned=self._poll.snapshot.state.pinned, chosen=chosen)
         self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
 
+    def find(self) -> None:
+        """Asks for a model, and shows it on the map."""
+        names = [each.name for each in self._screen.world.place.prints]
+        self.choose("Find a model on the map", names, False, lambda chosen: self._screen.find(chosen[0]))
+
     def change(self) -> None:
         """Asks for other settings."""
-        from ddenv.workbench.run.change import Change
-
-        ask = self._asking.ask
         dialog = Change(self._poll.snapshot.state)
-        self._screen.app.push_screen(dialog, lambda command: None if command is None else ask(command))
+        self._screen.app.push_screen(dialog, lambda command: self._asking.ask(command) if command else None)
 
     def history(self) -> None:
         """Shows the tree of reductions, to go back to one of them."""
         from ddenv.workbench.history.history_screen import History
 
-        history = History(lambda: self._asking.situation, self._world.place)
-        ask = self._asking.ask
-        # The history asked the question already.
-        self._screen.app.push_screen(history, lambda node: None if node is None else ask(GoBack(node), sure=True))
+        def chosen(node: int | None) -> None:
+            if node is not None:
+                # The history asked the question already.
+                self._asking.ask(GoBack(node), sure=True)
+
+        self._screen.app.push_screen(History(lambda: self._asking.situation, self._screen.world.place), chosen)
 
     def failures(self) -> None:
         """Lists the other failures that the tests met, to reduce one of them in a branch."""
-        from ddenv.workbench.run.failures_dialog import FailuresMet
 
         def chosen(test: int | None) -> None:
             if test is not None:
@@ -78,90 +85,75 @@ class Opening:
 
         self._screen.app.push_screen(FailuresMet(lambda: self._asking.situation), chosen)
 
-    def rounds(self, position: Position, then: Callable[[int], None]) -> None:
-        """Lists the rounds so far; `then` takes the event that ends the chosen one."""
-        from ddenv.workbench.run.dialogs import Rounds
-
+    def rounds(self) -> None:
+        """Lists the rounds so far, to go to the end of one."""
+        position = self._screen.browsing.position
         dialog = Rounds(tuple(position.chapters), position.at)
-        self._screen.app.push_screen(dialog, lambda chapter: then(chapter.last) if chapter else None)
+        self._screen.app.push_screen(dialog, lambda chapter: self._screen.go(chapter.last) if chapter else None)
 
-    def facts(self, position: Position, item: Item | None) -> None:
-        """Shows the raw facts of the test that tells most of a row, or of the last one of all."""
-        from ddenv.workbench.run.facts import FactsDialog
-
-        test, _ = of_row(position.now, item)
+    def facts(self) -> None:
+        """Shows the raw facts of the test that tells most of the row under the cursor, or of the last one of all."""
+        position = self._screen.browsing.position
+        test, _ = of_row(position.now, self._screen.table.item)
         if test is None:
             self._asking.refuse("there are no tests yet")
-            return
-        self._screen.app.push_screen(
-            FactsDialog(position, test, attach_name(self._poll.path), lambda number: self._play(position, number))
-        )
+        else:
+            self._screen.app.push_screen(FactsDialog(position, test, attach_name(self._poll.path), self.play_test))
 
-    def play(self, position: Position, item: Item | None) -> None:
+    def play(self) -> None:
+        """Plays back the finished test that tells most of the row under the cursor."""
+        self.play_row(self._screen.table.item)
+
+    def play_row(self, item: Item | None) -> None:
         """Plays back the finished test that tells most of a row; of a certificate's row without a model, the one with it, too."""
-        test, beside = of_row(position.now, item, finished=True)
+        test, beside = of_row(self._screen.browsing.position.now, item, finished=True)
         if test is None:
             self._asking.refuse("no test is finished yet: only a finished test can be played back")
-        elif why := self._play(position, test, beside):
+        elif why := self.play_test(test, beside):
             self._asking.refuse(why)
 
-    def _play(self, position: Position, test: int, beside: int | None = None) -> str:
-        """Returns why a test cannot be played back, or ""."""
+    def play_test(self, test: int, beside: int | None = None) -> str:
+        """Plays a test back. Returns why it cannot be, or ""."""
         from ddenv.workbench.playback.playback_screen import Playback
 
+        position, place = self._screen.browsing.position, self._screen.world.place
         try:
-            self._screen.app.push_screen(Playback(self._poll.file, position, self._world.place, test, beside))
+            self._screen.app.push_screen(Playback(self._poll.file, position, place, test, beside))
         except UserError as error:
             return str(error)
         return ""
 
-    def why(self, position: Position) -> None:
+    def why(self) -> None:
         """Shows what happens without each model that is left."""
         from ddenv.workbench.why.why_screen import Look, WhyScreen
+
+        position, place = self._screen.browsing.position, self._screen.world.place
 
         def look() -> Look:
             return Look(position.now, self._poll.snapshot.engine != "absent", self._asking.trouble)
 
-        screen = WhyScreen(self._poll.file, position, self._world.place, look, self._asking.ask)
-        self._screen.app.push_screen(screen)
-
-    def open(self, what: str) -> None:
-        """A dialog or another screen, by its name in the keys."""
-        {
-            "signs": self.signs,
-            "history": self.history,
-            "failures": self.failures,
-            "export": self.export,
-            "method": self.method,
-            "scene": self.scene,
-        }[what]()
+        self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, look, self._asking.ask))
 
     def signs(self) -> None:
         """Shows what the signs mean."""
-        from ddenv.workbench.help.signs import SignsDialog
-
         self._screen.app.push_screen(SignsDialog())
 
-    def layers(self, then: Callable[[], None]) -> None:
-        """Asks what the map shows; `then` is called when that is chosen."""
-        from ddenv.workbench.run.choose import Layers
+    def layers(self) -> None:
+        """Asks what the map shows."""
+        self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())
 
-        self._screen.app.push_screen(Layers(self._world, LAYERS), lambda _: then())
-
-    def copy(self, selected: Sequence[str]) -> None:
+    def copy(self) -> None:
         """Lists what can be copied: names, and the commands that come back to this run."""
-        from ddenv.workbench.run.choose import Copy
-
-        path = self._poll.path
+        path, name = self._poll.path, attach_name(self._poll.path)
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
-        if selected:
+        if selected := self._screen.keys.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
-        name = attach_name(path)
         texts += [("to come back", f"ddenv open {name}"), ("to go on without screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]
         self._screen.app.push_screen(Copy(texts))
 
     def export(self) -> None:
+        """Asks what to export."""
         from ddenv.workbench.export.export_dialog import ExportScreen
 
         self._screen.app.push_screen(ExportScreen(self._poll.path))
@@ -244,7 +236,7 @@ def _tests(state: RunState, item: Item | None) -> list[Test]:
         return [item]
     if isinstance(item, FreshRuns):
         return _fresh(state, item.node, item.without)
-    return [] if item is None else [state.tests[id - 1] for id in item.tests if 0 < id <= len(state.tests)]
+    return [] if item is None else state.tests_of(item.tests)
 
 
 def _fresh(state: RunState, node: int, without: str | None) -> list[Test]:

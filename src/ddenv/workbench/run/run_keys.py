@@ -7,77 +7,37 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
 
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.asking import Asking
-from ddenv.workbench.run.browsing import NOT_NOW, Browsing
-from ddenv.workbench.run.candidates import Candidates
-from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.shared.poll import Poll
+from ddenv.workbench.run.snapshot import NOT_NOW
+
+if TYPE_CHECKING:
+    from ddenv.workbench.run.run_screen import RunScreen
+
+
+def _ids(names: str) -> tuple[str, ...]:
+    return tuple(name if "." in name else f"run.{name}" for name in names.split())
+
 
 # The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
-MORE = (
-    "run.signs",
-    "run.facts",
-    "run.play",
-    "run.rounds",
-    "run.find",
-    "run.layers",
-    "run.copy",
-    "run.scene",
-    "run.runs",
+MORE = _ids("signs facts play rounds find layers copy scene runs")
+SHOWN = (
+    *_ids("pause step accept reject veto pin without only leave_out undo history change export why"),
+    *MORE,
+    *_ids("help quit"),
 )
 FIRST = (
-    "run.help",
-    "run.quit",
-    "run.pause",
-    "run.accept",
-    "run.reject",
-    "run.leave_out",
-    "run.step",
-    "run.veto",
-    "run.pin",
-    "run.without",
-    "run.undo",
-    "run.history",
-    "run.export",
-    "run.why",
-    "run.change",
-    "run.only",
+    *_ids("help quit pause accept reject leave_out step veto pin without undo history export why change only"),
     *MORE,
 )
-# While an earlier moment is shown, and while the map has the focus.
-BROWSING = (
-    *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
-    *("run.quit", "run.play", "run.signs"),
-)
-ON_MAP = (
-    *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
-    *("run.without", "run.only", "run.signs", "run.pause", "run.quit"),
-)
-# The footer of a screen that only watches.
-LOOKING = (
-    *(
-        "run.history",
-        "run.rounds",
-        "run.facts",
-        "run.play",
-        "run.why",
-        "run.export",
-        "run.find",
-        "run.copy",
-        "run.layers",
-        "run.signs",
-        "run.help",
-    ),
-    "run.quit",
-)
+# While an earlier moment is shown, while the map has the focus, and on a screen that only watches.
+BROWSING = _ids("back on round_before next_round rounds facts follow help quit play signs")
+ON_MAP = _ids("help map.pick map.next closer farther fit find layers pin without only signs pause quit")
+LOOKING = _ids("history rounds facts play why export find copy layers signs help quit")
 # What the pointer shows over the parts that take no keys, by their ids.
 TOOLTIPS = {
     "header": "scenario and method; the round, and how many models are left",
@@ -93,244 +53,186 @@ TITLES = {
 }
 
 
-def _hidden(key: str, action: str, words: str, id: str, tooltip: str, display: str | None = None) -> Binding:
-    return Binding(key, action, words, id=id, tooltip=tooltip, show=False, key_display=display)
+def _key(keys: str, action: str, words: str, name: str, tooltip: str, display: str | None = None) -> Binding:
+    return Binding(keys, action, words, id=f"run.{name}", tooltip=tooltip, show=False, key_display=display)
+
+
+def _guide(key: str, action: str, words: str, tooltip: str, name: str = "") -> Binding:
+    return _key(key, f"guide('{action}')", words, name or action, tooltip)
 
 
 _KEYS = [
-    Binding(
-        "space",
-        "guide('pause')",
-        "pause",
-        id="run.pause",
-        tooltip="pause: start no new test; again to go on; starts an engine if none is running",
-    ),
-    Binding("s", "guide('step')", "step", id="run.step", tooltip="run one test, then pause"),
-    Binding(
+    _guide("space", "pause", "pause", "pause: start no new test; again to go on; starts an engine if none is running"),
+    _guide("s", "step", "step", "run one test, then pause"),
+    _guide(
         "a",
-        "guide('accept')",
         "accept",
-        id="run.accept",
-        tooltip="accept the reduction that waits; or adopt the try under the cursor that shows f; or count another failure of the "
-        "candidate or try under the cursor as f, too",
+        "accept",
+        "accept the reduction that waits; or adopt the try under the cursor that shows f; or count another failure of "
+        "the candidate or try under the cursor as f, too",
     ),
-    Binding(
-        "x",
-        "guide('reject')",
-        "reject",
-        id="run.reject",
-        tooltip="reject the reduction that waits, and go on with the round",
-    ),
-    Binding(
-        "v",
-        "guide('veto')",
-        "veto",
-        id="run.veto",
-        tooltip="leave out the candidate under the cursor; again takes that back",
-    ),
-    Binding(
+    _guide("x", "reject", "reject", "reject the reduction that waits, and go on with the round"),
+    _guide("v", "veto", "veto", "leave out the candidate under the cursor; again takes that back"),
+    _guide(
         "p",
-        "guide('pin')",
+        "pin",
         "pins",
-        id="run.pin",
-        tooltip="choose the models that always stay, from a list in which the selected ones are marked; pinned ones are unpinned",
+        "choose the models that always stay, from a list in which the selected ones are marked; pinned ones are unpinned",
     ),
-    Binding(
+    _guide(
         "w",
-        "guide('without')",
+        "without",
         "try without",
-        id="run.without",
-        tooltip="try by hand: test the environment without the selected models; asks for their names if none is selected",
+        "try by hand: test the environment without the selected models; asks for their names if none is selected",
     ),
-    Binding(
-        "o",
-        "guide('only')",
-        "try only",
-        id="run.only",
-        tooltip="try by hand: test the selected models alone, or those you name",
-    ),
-    Binding(
+    _guide("o", "only", "try only", "try by hand: test the selected models alone, or those you name"),
+    _guide(
         "H",
-        "guide('leave_out')",
+        "leave_out",
         "leave out",
-        id="run.leave_out",
-        tooltip="leave out the model that only helps, by the certificate: without it f is a little rarer; a new search begins",
+        "leave out the model that only helps, by the certificate: without it f is a little rarer; a new search begins",
     ),
-    Binding(
-        "u", "guide('undo')", "undo", id="run.undo", tooltip="undo: take back the last reduction; it is not made again"
-    ),
-    Binding(
+    _guide("u", "undo", "undo", "undo: take back the last reduction; it is not made again"),
+    _key(
         "h",
         "open('history')",
         "history",
-        id="run.history",
-        tooltip="history: the tree of reductions; go back to any, branch from there, compare two",
+        "history",
+        "history: the tree of reductions; go back to any, branch from there, compare two",
     ),
-    Binding(
-        "c",
-        "guide('change')",
-        "settings",
-        id="run.change",
-        tooltip="change pair, algorithm, iterations or budget, from the next round on",
+    _guide("c", "change", "settings", "change pair, algorithm, iterations or budget, from the next round on"),
+    _key(
+        "E", "open('export')", "export", "export", "export: the world that is left, a scenario that runs it, the report"
     ),
-    Binding(
-        "E",
-        "open('export')",
-        "export",
-        id="run.export",
-        tooltip="export: the world that is left, a scenario that runs it, the report",
-    ),
-    Binding(
+    _key(
         "W",
+        "open('why')",
         "why",
         "why",
-        id="run.why",
-        tooltip="why the robot fails: what happens without each model that is left, in words and on the map",
+        "why the robot fails: what happens without each model that is left, in words and on the map",
     ),
-    Binding("question_mark,f1", "app.help", "help", id="run.help", tooltip="show every key", key_display="?"),
-    Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks whether to stop the engine"),
-    _hidden("S", "guide('step_round')", "round", "run.round", "run to the end of the round, then pause"),
-    _hidden("t", "guide('mode')", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
-    _hidden(
+    _key("question_mark,f1", "app.help", "help", "help", "show every key", "?"),
+    _key("q", "quit", "quit", "quit", "leave; asks whether to stop the engine"),
+    _guide("S", "step_round", "round", "run to the end of the round, then pause", "round"),
+    _guide("t", "mode", "ask", "accept reductions automatically, or ask before each one"),
+    _key(
         "f",
         "open('failures')",
         "failures",
-        "run.failures",
+        "failures",
         "other failures that the tests met: each with its smallest environment; reduce one in a branch",
     ),
-    _hidden("slash", "find", "find", "run.find", "find a model by its name, and show it on the map", "/"),
-    _hidden("l", "layers", "layers", "run.layers", "choose what the map shows"),
-    _hidden("y", "copy", "copy", "run.copy", "copy the names of the models left, or the command to come back"),
-    _hidden("m", "open('scene')", "scene", "run.scene", "start the 3-D scene and show its address"),
-    _hidden("e", "open('method')", "explain", "run.method", "explain how this run is reduced"),
-    _hidden("1", "pane('map')", "map", "run.map", "the map"),
-    _hidden("2", "pane('round')", "round", "run.table", "the table of candidates and tries"),
-    _hidden("3", "pane('chart')", "chart", "run.chart", "the chart of models left by test"),
-    _hidden("4", "pane('now')", "what is happening", "run.now", "what is happening, in words"),
-    _hidden("5,L", "pane('log')", "log", "run.log", "the log: what happened so far, with the time of day"),
-    _hidden("g", "next_pane", "next pane", "run.next_pane", "the next pane"),
-    _hidden(
-        "escape", "follow", "follow", "run.follow", "back to now; select nothing; cursor and map follow the run again"
+    _key("slash", "open('find')", "find", "find", "find a model by its name, and show it on the map", "/"),
+    _key("l", "open('layers')", "layers", "layers", "choose what the map shows"),
+    _key("y", "open('copy')", "copy", "copy", "copy the names of the models left, or the command to come back"),
+    _key("m", "open('scene')", "scene", "scene", "start the 3-D scene and show its address"),
+    _key("e", "open('method')", "explain", "method", "explain how this run is reduced"),
+    _key("1", "pane('map')", "map", "map", "the map"),
+    _key("2", "pane('round')", "round", "table", "the table of candidates and tries"),
+    _key("3", "pane('chart')", "chart", "chart", "the chart of models left by test"),
+    _key("4", "pane('now')", "what is happening", "now", "what is happening, in words"),
+    _key("5,L", "pane('log')", "log", "log", "the log: what happened so far, with the time of day"),
+    _key("g", "next_pane", "next pane", "next_pane", "the next pane"),
+    _key("escape", "follow", "follow", "follow", "back to now; select nothing; cursor and map follow the run again"),
+    _key("plus,equals_sign", "zoom(1.25)", "closer", "closer", "map: closer", "+"),
+    _key("minus", "zoom(0.8)", "farther", "farther", "map: farther away", "-"),
+    _key("0", "fit", "fit", "fit", "map: show all that matters"),
+    _key("comma", "browse('moment', -1)", "back", "back", "back in the run: to the moment before this one", ","),
+    _key("full_stop", "browse('moment', 1)", "on", "on", "on to the next moment; after the last one comes now", "."),
+    _key(
+        "less_than_sign", "browse('round', -1)", "round before", "round_before", "to the end of the round before", "<"
     ),
-    _hidden("plus,equals_sign", "zoom(1.25)", "closer", "run.closer", "map: closer", "+"),
-    _hidden("minus", "zoom(0.8)", "farther", "run.farther", "map: farther away", "-"),
-    _hidden("0", "fit", "fit", "run.fit", "map: show all that matters"),
-    _hidden("comma", "browse('moment', -1)", "back", "run.back", "back in the run: to the moment before this one", ","),
-    _hidden(
-        "full_stop", "browse('moment', 1)", "on", "run.on", "on to the next moment; after the last one comes now", "."
-    ),
-    _hidden(
-        "less_than_sign",
-        "browse('round', -1)",
-        "round before",
-        "run.round_before",
-        "to the end of the round before",
-        "<",
-    ),
-    _hidden(
+    _key(
         "greater_than_sign",
         "browse('round', 1)",
         "next round",
-        "run.next_round",
+        "next_round",
         "to the end of this or the next round",
         ">",
     ),
-    _hidden(
-        "left_parenthesis",
-        "browse('decision', -1)",
-        "",
-        "run.decision_before",
-        "to the verdict or decision before",
-        "(",
-    ),
-    _hidden(
-        "right_parenthesis", "browse('decision', 1)", "", "run.next_decision", "to the next verdict or decision", ")"
-    ),
-    _hidden(
-        "left_curly_bracket", "browse('reduction', -1)", "", "run.reduction_before", "to the reduction before", "{"
-    ),
-    _hidden("right_curly_bracket", "browse('reduction', 1)", "", "run.next_reduction", "to the next reduction", "}"),
-    _hidden("b", "rounds", "rounds", "run.rounds", "the list of all rounds so far: go to the end of any"),
-    _hidden("i", "facts", "facts", "run.facts", "the raw facts of a test, and the command that makes it again"),
-    _hidden("P", "play", "play", "run.play", "play a finished test of the row under the cursor back on the map"),
-    _hidden("k", "open('signs')", "signs", "run.signs", "what the signs and letters on this screen mean"),
-    _hidden("r", "guide('resume')", "resume", "run.resume", "start the engine again"),
-    _hidden("R", "app.runs", "runs", "run.runs", "the list of all runs"),
-    _hidden("d", "detach", "detach", "run.detach", "leave the workbench; the engine goes on"),
+    _key("left_parenthesis", "browse('decision', -1)", "", "decision_before", "to the verdict or decision before", "("),
+    _key("right_parenthesis", "browse('decision', 1)", "", "next_decision", "to the next verdict or decision", ")"),
+    _key("left_curly_bracket", "browse('reduction', -1)", "", "reduction_before", "to the reduction before", "{"),
+    _key("right_curly_bracket", "browse('reduction', 1)", "", "next_reduction", "to the next reduction", "}"),
+    _key("b", "open('rounds')", "rounds", "rounds", "the list of all rounds so far: go to the end of any"),
+    _key("i", "open('facts')", "facts", "facts", "the raw facts of a test, and the command that makes it again"),
+    _key("P", "open('play')", "play", "play", "play a finished test of the row under the cursor back on the map"),
+    _key("k", "open('signs')", "signs", "signs", "what the signs and letters on this screen mean"),
+    _guide("r", "resume", "resume", "start the engine again"),
+    _key("R", "app.runs", "runs", "runs", "the list of all runs"),
+    _key("d", "detach", "detach", "detach", "leave the workbench; the engine goes on"),
 ]
 KEYS: list[BindingType] = [*_KEYS]
-# The names of the actions that guide the run, and their bindings by these names.
-GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
-GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
-SHOWN = tuple(
-    id
-    for binding in _KEYS
-    if binding.show
-    for id in ((*MORE, "run.help") if binding.id == "run.help" else (binding.id or "",))
-)
+
+
+def _name(binding: Binding) -> str:
+    """The name of what a key does to guide the run, or ""."""
+    return binding.action[7:-2] if binding.action.startswith("guide(") else ""
+
+
+# The bindings that guide the run, by these names.
+GUIDING = {_name(each): each for each in _KEYS if _name(each)}
 
 
 class KeyOffers:
-    """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in `table` and `world`."""
+    """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in the table and on the map."""
 
-    def __init__(
-        self, browsing: Browsing, poll: Poll, table: Candidates, world: WorldMap, asking: Asking, opening: Opening
-    ) -> None:
-        self._browsing = browsing
-        self._poll, self._table, self._world, self._asking, self._opening = poll, table, world, asking, opening
+    def __init__(self, screen: RunScreen) -> None:
+        self._screen = screen
 
     def offer(self, name: str) -> Offer:
         """What a key does now."""
-        return Offer(why_not=NOT_NOW) if self._browsing.is_past else offer(name, self._asking.situation, self.pointed)
+        if self._screen.browsing.is_past:
+            return Offer(why_not=NOT_NOW)
+        return offer(name, self._screen.asking.situation, self.pointed)
 
     @property
     def pointed(self) -> Pointed:
         """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
-        names, elements = self._selection(), self._poll.snapshot.state.elements
+        names, elements, table = self._selection(), self._screen.poll.snapshot.state.elements, self._screen.table
         known = tuple(name for name in elements if name in names) if names else ()
-        models = (*known, *sorted(names.difference(known)))
-        row = self._table.under_cursor if self._table.is_attached and self._table.is_on_screen else None
-        return Pointed(row, self._table.following, models)
+        row = table.under_cursor if table.is_attached and table.is_on_screen else None
+        return Pointed(row, table.following, (*known, *sorted(names.difference(known))))
 
     def _selection(self) -> frozenset[str]:
         """The models that were selected by hand, or the one that the crosshair is on."""
-        if self._world.selection:
-            return frozenset(self._world.selection)
-        name = self._world.model_at_cursor if self._world.has_focus else None
+        world = self._screen.world
+        if world.selection:
+            return frozenset(world.selection)
+        name = world.model_at_cursor if world.has_focus else None
         return frozenset() if name is None else frozenset((name,))
 
     def show(self, footer: KeyFooter) -> None:
         """Shows in the footer what is possible."""
-        now, pointed = self._asking.situation, self.pointed
+        now, pointed = self._screen.asking.situation, self.pointed
         for name, binding in GUIDING.items():
             offered = offer(name, now, pointed)
             footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
-    def pressed(self, screen: Screen[Any], key: str) -> None:
-        """Shows why a key does nothing, if it guides the run on `screen` and is not possible now."""
+    def pressed(self, key: str) -> None:
+        """Shows why a key does nothing, if it guides the run and is not possible now."""
         # To list what all keys do now takes longer than most keys take.
-        if any(each.action in GUIDES for each in screen._bindings.key_to_bindings.get(key, ())):
-            active = screen.active_bindings.get(key)
-            if active is not None and not active.enabled and active.node is screen:
-                self._asking.refuse(self.offer(GUIDES[active.binding.action]).why_not)
+        if any(each in GUIDING.values() for each in self._screen._bindings.key_to_bindings.get(key, ())):
+            active = self._screen.active_bindings.get(key)
+            if active is not None and not active.enabled and active.node is self._screen:
+                self._screen.asking.refuse(self.offer(_name(active.binding)).why_not)
 
     def use(self, name: str) -> None:
         """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
-        if self._browsing.is_past:
-            self._asking.refuse(NOT_NOW)
-            return
-        command = self.offer(name).command
-        if command is not None and name != "pin":
-            self._asking.ask(command)
+        offered, asking, opening = self.offer(name), self._screen.asking, self._screen.opening
+        if self._screen.browsing.is_past:
+            asking.refuse(offered.why_not)
+        elif offered.command is not None and name != "pin":
+            asking.ask(offered.command)
         elif name == "change":
-            self._opening.change()
+            opening.change()
         elif name in TITLES:
-            environment = self._poll.snapshot.state.environment
-            self._opening.choose(TITLES[name], environment, True, partial(self._chosen, name), self.pointed.models)
+            environment = self._screen.poll.snapshot.state.environment
+            opening.choose(TITLES[name], environment, True, partial(self._chosen, name), self.pointed.models)
 
     def _chosen(self, name: str, models: Collection[str]) -> None:
-        now = offer(name, self._asking.situation, Pointed(models=tuple(models)))
+        now = offer(name, self._screen.asking.situation, Pointed(models=tuple(models)))
         if now.command is None:
-            self._asking.refuse(now.why_not)
+            self._screen.asking.refuse(now.why_not)
         else:
-            self._asking.ask(now.command)
+            self._screen.asking.ask(now.command)

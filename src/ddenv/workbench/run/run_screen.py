@@ -27,14 +27,13 @@ from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
-from ddenv.workbench.run.browsing import Browsing
 from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
-from ddenv.workbench.run.following import Following
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
+from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
@@ -75,13 +74,12 @@ class RunScreen(Screen[None]):
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
-        self._table, self._map, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
+        self.table, self.world, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
         shown, first = (LOOKING, LOOKING) if watch else (SHOWN, FIRST)
         self._footer = KeyFooter(shown, first, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
-        self._opening = Opening(self, self.poll, self.asking, self._map, self.scene)
-        self._keys = KeyOffers(self.browsing, self.poll, self._table, self._map, self.asking, self._opening)
+        self.opening, self.keys = Opening(self), KeyOffers(self)
         self._pane = "map"
         self._title: tuple[str, str] = ("", "")
 
@@ -97,10 +95,10 @@ class RunScreen(Screen[None]):
             with Vertical(id="run-main"):
                 with Horizontal(id="top"):
                     with _panel("world", "World"):
-                        yield self._map
+                        yield self.world
                         yield self._legend
                     with _panel("round", "Round"):
-                        yield self._table
+                        yield self.table
                 with Horizontal(id="bottom"):
                     with _panel("left", "Models left by test"):
                         yield Chart(id="chart")
@@ -135,7 +133,7 @@ class RunScreen(Screen[None]):
         width, height = self.size
         words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
         self.query_one("#small", Static).update(words)
-        self._table.set_narrow(width < WIDE and self._pane != "round")
+        self.table.set_narrow(width < WIDE and self._pane != "round")
         self.call_after_refresh(self._show_models)
 
     # The world is read beside the screen, since it can be large.
@@ -149,7 +147,7 @@ class RunScreen(Screen[None]):
         call_if_open(self, self._placed, place, notice)
 
     def _placed(self, place: Place, notice: str) -> None:
-        self._map.set_place(place, notice)
+        self.world.set_place(place, notice)
         self._show_models()
 
     def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
@@ -184,7 +182,7 @@ class RunScreen(Screen[None]):
 
     def _show_run(self) -> None:
         snapshot = self.snapshot
-        self._table.show(snapshot)
+        self.table.show(snapshot)
         self.query_one(Chart).show(snapshot)
         self.query_one(Header).show(snapshot)
         self._show_map()
@@ -213,9 +211,9 @@ class RunScreen(Screen[None]):
     def _show_map(self) -> None:
         snapshot = self.snapshot
         focus = snapshot.focus if snapshot.past else self.following.candidate
-        self._map.show(snapshot, self._table.chosen or focus)
-        self._show_legend()
-        self._show_scene(self._table.chosen or (focus if snapshot.past else None))
+        self.world.show(snapshot, self.table.chosen or focus)
+        self.show_legend()
+        self._show_scene(self.table.chosen or (focus if snapshot.past else None))
 
     def _show_scene(self, row: Candidate | Trial | None) -> None:
         """The scene shows the same moment and the row that the user chose."""
@@ -227,38 +225,39 @@ class RunScreen(Screen[None]):
         else:
             self.scene.show(Wanted(at))
 
-    def _show_legend(self) -> None:
-        selection, candidate, state = self._map.selection, self._map.candidate, self._map.snapshot.state
+    def show_legend(self) -> None:
+        """Shows what the signs on the map mean."""
+        selection, candidate, state = self.world.selection, self.world.candidate, self.world.snapshot.state
         fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
-        self._legend.show(len(selection), candidate, fallen, self._map.legend)
+        self._legend.show(len(selection), candidate, fallen, self.world.legend)
 
     def _show_models(self) -> None:
-        self.query_one(ModelsLeft).show(self.snapshot.state, self._map.place.prints)
+        self.query_one(ModelsLeft).show(self.snapshot.state, self.world.place.prints)
 
     # The keys that guide the run.
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action != "guide":
             return True
-        return None if self._keys.offer(str(parameters[0])).why_not else True
+        return None if self.keys.offer(str(parameters[0])).why_not else True
 
     def action_guide(self, name: str) -> None:
-        self._keys.use(name)
+        self.keys.use(name)
 
     def on_key(self, event: events.Key) -> None:
         """A key that is not possible now says why."""
-        self._keys.pressed(self, event.key)
+        self.keys.pressed(event.key)
 
     @on(WorldMap.Pointed)
     def _show_keys(self) -> None:
         if not self.poll.watch and self._footer.is_attached:
-            self._keys.show(self._footer)
+            self.keys.show(self._footer)
 
     def _keys_here(self) -> tuple[str, ...]:
         """The keys of what has the focus, if the footer shows them in place of the screen's."""
         if self.browsing.is_past:
             return BROWSING
-        return ON_MAP if self._map.has_focus else ()
+        return ON_MAP if self.world.has_focus else ()
 
     # Earlier moments of the run.
 
@@ -269,10 +268,11 @@ class RunScreen(Screen[None]):
     def action_browse(self, what: Step, by: int) -> None:
         self._browse(lambda: self.browsing.step(what, by))
 
-    def action_rounds(self) -> None:
-        self._opening.rounds(self.browsing.position, lambda id: self._browse(lambda: self.browsing.go(id)))
+    def go(self, id: int | None) -> None:
+        """Shows the moment of an event, or the end of the run for None."""
+        self._browse(lambda: self.browsing.position.go(id))
 
-    def _browse(self, move: Callable[[], str]) -> None:
+    def _browse(self, move: Callable[[], str | None]) -> None:
         """Shows another moment, or why there is none."""
         try:
             if why := move():
@@ -280,9 +280,9 @@ class RunScreen(Screen[None]):
                 return
             self.browsing.snapshot  # noqa: B018  (it is read here, where an error has somewhere to go)
         except UserError as error:
-            self.browsing.go(None)
+            self.browsing.position.go(None)
             self.asking.refuse(str(error))
-        self._table.follow()
+        self.table.follow()
         self._show(True)
         self._footer.say("run.follow", "now" if self.browsing.is_past else "follow")
         self._footer.renew()
@@ -290,32 +290,13 @@ class RunScreen(Screen[None]):
     # Dialogs and other screens.
 
     def action_open(self, what: str) -> None:
-        self._opening.open(what)
-
-    def action_facts(self) -> None:
-        self._opening.facts(self.browsing.position, self._table.item)
-
-    def action_play(self) -> None:
-        self._opening.play(self.browsing.position, self._table.item)
-
-    def action_why(self) -> None:
-        self._opening.why(self.browsing.position)
-
-    def action_find(self) -> None:
-        names = [each.name for each in self._map.place.prints]
-        self._opening.choose("Find a model on the map", names, False, lambda chosen: self._find(chosen[0]))
-
-    def action_layers(self) -> None:
-        self._opening.layers(self._show_legend)
-
-    def action_copy(self) -> None:
-        self._opening.copy(self._keys.pointed.models)
+        getattr(self.opening, what)()
 
     def action_detach(self) -> None:
-        self._opening.detach()
+        self.opening.detach()
 
     def action_quit(self) -> None:
-        self._opening.quit()
+        self.opening.quit()
 
     # Panes and the map.
 
@@ -326,18 +307,18 @@ class RunScreen(Screen[None]):
 
     @on(WorldMap.SelectionChanged)
     def _selected(self) -> None:
-        self._show_legend()
+        self.show_legend()
         self._show_keys()
 
     @on(Lines.Clicked, "#models")
     def _model_clicked(self, event: Lines.Clicked) -> None:
-        self._find(event.item.name)
+        self.find(event.item.name)
 
-    def _find(self, name: str) -> None:
+    def find(self, name: str) -> None:
         """Brings a model into sight, with the crosshair on it."""
         self._show_pane("map")
-        self._map.go_to(name)
-        self._map.focus()
+        self.world.go_to(name)
+        self.world.focus()
 
     @on(Panes.Chosen)
     def _pane_clicked(self, event: Panes.Chosen) -> None:
@@ -353,7 +334,7 @@ class RunScreen(Screen[None]):
             self.add_class(f"-pane-{pane}")
         self._pane = pane
         self.query_one(Panes).mark(pane)
-        self._table.set_narrow(self.size.width < WIDE and pane != "round")
+        self.table.set_narrow(self.size.width < WIDE and pane != "round")
         focus = {"map": "#map", "log": "#log"}.get(pane, "#candidates")
         self.query_one(focus).focus()
         self.call_after_refresh(self._show_keys)
@@ -363,17 +344,17 @@ class RunScreen(Screen[None]):
 
     def action_follow(self) -> None:
         if self.browsing.is_past:
-            self._browse(lambda: self.browsing.go(None))
+            self.go(None)
             return
-        self._map.select(())
-        self._table.follow()
-        self._table.show(self.snapshot)
+        self.world.select(())
+        self.table.follow()
+        self.table.show(self.snapshot)
 
     def action_zoom(self, factor: float) -> None:
-        self._map.zoom(factor)
+        self.world.zoom(factor)
 
     def action_fit(self) -> None:
-        self._map.fit()
+        self.world.fit()
 
 
 def _panel(id: str, title: str, hints: str = "") -> Framed:

@@ -10,16 +10,17 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv import __version__
-from ddenv.evidence.claims import drift, ended, has_dropped
+from ddenv.evidence.claims import has_dropped
 from ddenv.runfile.branches import path
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
-from ddenv.text import between, percent, plain, rounded, shortened, truncated
-from ddenv.workbench.run.methods import GROUPS, labels
+from ddenv.text import about, between, count, duration, percent, plain, rounded, shortened, truncated
+from ddenv.words.claims import drift, ended
+from ddenv.words.methods import GROUPS, labels
+from ddenv.words.signs import STATUS
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import STATUS, about, count, duration
 from ddenv.workbench.terminal.themes import ink
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")

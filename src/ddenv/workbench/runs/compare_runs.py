@@ -14,10 +14,10 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from ddenv.text import first_of, plain, truncated
+from ddenv.text import count, first_of, plain, truncated
+from ddenv.words.signs import brief
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
-from ddenv.workbench.shared.wording import brief, count
 
 # The maximum number of models to name, and width of a value.
 NAMED, LONGEST = 20, 60

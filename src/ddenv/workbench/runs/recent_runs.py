@@ -13,8 +13,8 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
+from ddenv.words.signs import STATUS
 from ddenv.workbench.shared.observed import Busy, Observed
-from ddenv.workbench.shared.wording import STATUS
 
 # The maximum number of runs in the list of the setup screen.
 SHOWN = 40

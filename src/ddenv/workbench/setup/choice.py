@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.text import plain
+from ddenv.text import count, plain
 from ddenv.workbench.setup.remedies import Missing, read_with_remedies
-from ddenv.workbench.shared.wording import count
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, World

@@ -13,8 +13,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.events import BaselineFinished, TestFinished
 from ddenv.runfile.store import RunFile
 from ddenv.runs.tests_left import rough_run
-from ddenv.text import about, between, rounded
-from ddenv.workbench.shared.wording import count
+from ddenv.text import about, between, count, rounded
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

@@ -19,12 +19,11 @@ from textual.widgets import Button, Input, Label, OptionList, Select, Static
 from ddenv.errors import UserError
 from ddenv.runs import processor
 from ddenv.schemas import OURS, Kind, names, uses
-from ddenv.text import plain
-from ddenv.workbench.run.methods import chosen, note, paragraph
+from ddenv.text import count, plain
+from ddenv.words.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.form import Field
 from ddenv.workbench.setup.places import remembered_jobs
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:

@@ -15,10 +15,9 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
-from ddenv.text import plain
+from ddenv.text import count, plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.remedies import Missing, remedy
-from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 OPEN, DONE = "?", "✓"

@@ -7,15 +7,16 @@ import time
 from array import array
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.guiding.situation import EngineIs
 from ddenv.runfile.fold import Follower, spent
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.state import Candidate, RunState, Test
+from ddenv.runfile.snapshot import EngineIs
+from ddenv.runfile.snapshot import Snapshot as Snapshot
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.workbench.shared.observed import Busy, Gone, Observed
 
@@ -31,72 +32,6 @@ SOME_EVENTS = 50
 def now() -> float:
     """Unix time, s."""
     return time.time()
-
-
-@dataclass(frozen=True, slots=True)
-class Snapshot:
-    """All that the run screen shows at one moment.
-
-    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path in f
-    itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the run file
-    cannot be read. `gone` says that it was deleted or replaced: the rest is what was read last.
-    `behind` says that not all of it was read yet. `past`: it is an earlier moment of the run, `pointed` the candidate of that
-    moment, and `happened` says what happened there.
-    """
-
-    state: RunState = field(default_factory=RunState)
-    live: tuple[Live, ...] = ()
-    engine: EngineIs = "absent"
-    evidence: array[float] | None = None
-    spent: int = 0
-    error: str = ""
-    original: array[float] | None = None
-    gone: bool = False
-    behind: bool = False
-    past: bool = False
-    pointed: Candidate | None = None
-    happened: str = ""
-
-    @property
-    def older_engine(self) -> str:
-        """The version of the run's last engine, if it is another version than this program's; otherwise "", or if unknown."""
-        version = self.state.engine_version
-        return "" if version == __version__ else version
-
-    @property
-    def status(self) -> str:
-        """The state's status, or "starting" or "lost" if the engine's lock says so."""
-        if self.engine == "starting":
-            return "starting"
-        if self.state.ended or self.behind or self.past or self.engine == "alive" or self.state.status == "created":
-            return self.state.status
-        return "lost"
-
-    @property
-    def running(self) -> tuple[Test, ...]:
-        """The tests that run now, in the order they were started; none when no engine is there to run them."""
-        if self.engine != "alive" and not self.past:
-            return ()
-        return self.state.running_tests
-
-    @property
-    def focus(self) -> Candidate | None:
-        """The current candidate: the one that waits, or else the first one that is being tested."""
-        if self.past:
-            return self.pointed
-        current = self.state.round
-        if current is None or current.done or self.status in ("finished", "lost"):
-            return None
-        if self.state.waiting_candidate is not None:
-            return current.candidates[self.state.waiting_candidate]
-        for test in self.running:
-            if test.phase == "round" and test.round == current.number and test.candidate is not None:
-                return current.candidates[test.candidate]
-        return None
-
-    def seconds(self, test: int) -> float | None:
-        """How far a running test is, simulated s."""
-        return next((live.time for live in self.live if live.test == test), None)
 
 
 class Poll:
@@ -185,7 +120,7 @@ class Poll:
             snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
         self._behind = more or not due
         self._catching_up = more
-        return replace(snapshot, behind=more)
+        return replace(snapshot, behind=more, version=__version__)
 
     def _left(self, why: str) -> Snapshot:
         """What was read last of a file that is gone."""

@@ -7,18 +7,19 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from ddenv.evidence.claims import current, in_the_making, made_of_usual, meaning, rate, shown
+from ddenv.evidence.claims import current, in_the_making
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, reasons, sentence
-from ddenv.text import padded, plain, shortened
+from ddenv.text import as_sentence, padded, percent, plain, shortened
+from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
+from ddenv.words.signs import CLAIM
 from ddenv.workbench.playback.moving import snapshot_with
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import CLAIM, percent
 
 # The maximum number of models in the list.
 LISTED = 200
@@ -147,15 +148,11 @@ def nothing_yet(state: RunState, works: bool, run: str) -> str:
     if (certificate := current(state)) is not None:
         return no_reasons(certificate)
     if command:
-        return f"{shows}\n\n{_sentence(shown(state))} Make one, and come back: {command}   (c copies that)"
+        return f"{shows}\n\n{as_sentence(shown(state))} Make one, and come back: {command}   (c copies that)"
     if making is not None:
         made = made_of_usual(state, making)
-        return f"{shows}\n\nIt is being made: {made}. This page fills by itself.\n\n{_sentence(shown(state))}"
+        return f"{shows}\n\nIt is being made: {made}. This page fills by itself.\n\n{as_sentence(shown(state))}"
     return f"{shows}\n\nIt is made once the search has ended, and this page fills by itself. The search still goes on."
-
-
-def _sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."
 
 
 def remedy(state: RunState, works: bool, run: str) -> str:

@@ -21,6 +21,7 @@ from ddenv.guiding.course import Isolate, Stop
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
 from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
@@ -32,7 +33,6 @@ from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.observed import Observed
-from ddenv.workbench.shared.wording import attach_name
 from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
 
 SMALLEST = (64, 18)

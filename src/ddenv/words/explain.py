@@ -5,28 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import current, ended, fresh_runs_made, helping, missed, of_runs, promise, terms, usual_runs
-from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words
+from ddenv.evidence.claims import current, fresh_runs_made, helping
+from ddenv.evidence.fresh_runs import fresh_runs
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.runs.fresh_runs import fresh_runs
-from ddenv.text import plain
-from ddenv.words.news import failed_in, isolating, other_failures
-from ddenv.workbench.run.explain_decisions import (
-    arrival,
-    by_hand,
-    last_reduction,
-    older_engine,
-    out_of_budget,
-    rarer,
-    to_adopt,
-)
-from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
-from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import bar, count, metres, percent
+from ddenv.text import as_sentence, count, first_of, percent, plain
+from ddenv.words.baseline import baseline_sentence
+from ddenv.words.claims import ended, environment_named, of_runs, promise, terms, usual_runs
+from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
+from ddenv.words.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
+from ddenv.words.news import isolating
+from ddenv.words.signs import bar, metres
+from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8
@@ -90,24 +84,6 @@ def _happening(snapshot: Snapshot) -> Happening:
     return _with_pause(state, _testing(snapshot, state.round, options))
 
 
-def baseline_sentence(state: RunState) -> str:
-    """How often the whole world fails, with Wilson's interval, and what that means for flaky candidates."""
-    base = state.baseline
-    if base is None:
-        return ""
-    broke = f"; {count(base.broken, 'more run')} broke" if base.broken else ""
-    sentence = (
-        f"Baseline: the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')} "
-        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){broke}."
-    )
-    if also := other_failures(base):
-        sentence += f" {also[:1].upper()}{also[1:]}."
-    if base.rate >= 1.0:
-        return sentence
-    words = missed(state)
-    return f"{sentence} {words[:1].upper()}{words[1:]}."
-
-
 def _with_pause(state: RunState, happening: Happening) -> Happening:
     step, sentences = happening
     if state.needs_room and not state.ended:
@@ -168,7 +144,7 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."
     # The last one first: that the world is slow.
-    noted = tuple(_sentence(plain(words)) for _, words in reversed(state.notes))
+    noted = tuple(as_sentence(plain(words)) for _, words in reversed(state.notes))
     if not tests:
         return (*noted, first)
     return (*noted, first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
@@ -287,7 +263,7 @@ def _enough(options: Settings) -> str:
 def _shown_of(state: RunState, candidate: Candidate) -> str:
     """How often f showed in a candidate that has no verdict yet although f showed in it; "" if it did not."""
     _, shown = seen(state.tests, candidate.tests)
-    done = sum(state.tests[id - 1].is_finished for id in candidate.tests if 0 < id <= len(state.tests))
+    done = sum(test.is_finished for test in state.tests_of(candidate.tests))
     return f"f showed in {of_runs(shown, done)} so far" if shown else ""
 
 
@@ -330,7 +306,7 @@ def _finished(state: RunState) -> Happening:
         return None, (_reason(state, "The run ended in the baseline."),)
     base = baseline_sentence(state)
     if not state.certified:
-        left = f"{kept} left: {_names(state)}."
+        left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else helping(found)
         out = (f"{plain(helps[0])} only helps: press H to leave it out, and search on.",) if helps else ()
         return "returned", (_reason(state, "The run ended early."), *out, *out_of_budget(state), left)
@@ -339,31 +315,23 @@ def _finished(state: RunState) -> Happening:
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
     stays = ("p unpins.",) if state.pinned.intersection(state.environment) else ()
     certificate = current(state)
-    means = () if certificate is None else (_sentence(promise(state, certificate)),)
-    return "returned", (f"Minimal: {kept} left. {_reason(state, '')}", f"Kept: {_names(state)}.", *means, *stays, base)
+    means = () if certificate is None else (as_sentence(promise(state, certificate)),)
+    return "returned", (
+        f"Minimal: {kept} left. {_reason(state, '')}",
+        f"Kept: {first_of([plain(name) for name in state.environment], NAMED)}.",
+        *means,
+        *stays,
+        base,
+    )
 
 
 def _reason(state: RunState, otherwise: str) -> str:
-    return _sentence(plain(ended(state)) or otherwise)
-
-
-def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:] + ("" if words.endswith(".") else ".")
-
-
-def _names(state: RunState) -> str:
-    names = [plain(name) for name in state.environment]
-    if len(names) <= NAMED:
-        return ", ".join(names)
-    return f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more"
+    return as_sentence(plain(ended(state)) or otherwise)
 
 
 def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> Test | None:
-    tests = [state.tests[id - 1] for id in candidate.tests if 0 < id <= len(state.tests)]
-    for test in reversed(tests):
-        if test.outcome == outcome or (outcome is None and test.is_finished):
-            return test
-    return None
+    tests = reversed(state.tests_of(candidate.tests))
+    return next((test for test in tests if test.outcome == outcome or (outcome is None and test.is_finished)), None)
 
 
 def sliced(state: RunState) -> tuple[str, ...]:
@@ -386,7 +354,7 @@ def implied(state: RunState) -> tuple[str, ...]:
 def refuted(state: RunState) -> tuple[str, ...]:
     """That slices are wrong here."""
     words = refuted_words(state)
-    return (f"{words[:1].upper()}{words[1:]}.",) if words else ()
+    return (as_sentence(words),) if words else ()
 
 
 def certifying(snapshot: Snapshot) -> tuple[str, ...]:
@@ -421,7 +389,7 @@ def _so_far(state: RunState) -> tuple[str, ...]:
     left, whole = rows[0], rows[-1]
     beside = ""
     if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
-        beside = f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
+        beside = f", and in {of_runs(whole.shown, whole.runs)} of {environment_named(whole.node)}"
     return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
 
 
@@ -445,15 +413,10 @@ def _what(test: Test, certificate: Certificate) -> str:
         return f"all that is left except {plain(test.without)}"
     if test.node == certificate.node:
         return "all that is left"
-    return named(test.node)
+    return environment_named(test.node)
 
 
 def _after(certificate: Certificate) -> str:
     if certificate.claims[0].verdict == "lost":
         return "What is left keeps too little of the rate. Earlier environments run, to find the last one not shown to lose it."
     return "The certificate is finished."
-
-
-def named(node: int) -> str:
-    """An environment by its number in the history."""
-    return "the whole world" if node == 0 else f"the environment of step {node}"

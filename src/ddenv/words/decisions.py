@@ -1,17 +1,29 @@
-"""The user's decisions that affect what happens now, in sentences: tries, pins, going back, other settings."""
+"""What the user's decisions lead to: tries, pins, going back, other settings; and how a run came to an environment."""
 
 from __future__ import annotations
 
-from ddenv.evidence.claims import drift, has_dropped
-from ddenv.guiding.situation import named
+from ddenv.evidence.claims import has_dropped
 from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, Trial
-from ddenv.text import plain
-from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count
+from ddenv.text import as_sentence, count, first_of, plain, shortened
+from ddenv.words.claims import drift
 
-HOW = {
+# The maximum number of pinned models that a sentence names, and the maximum width of each name in cells.
+NAMED, LONGEST = 2, 32
+# How a run came to an environment, by the `how` of its node: in few words, and in a line.
+CAME_BY = {
+    "start": ("", "where the run began"),
+    "reduced": ("", "reduced to what shows f"),
+    "adopted": ("adopted by hand", "a try by hand that showed f"),
+    "accepted": ("another failure, accepted by hand", "another failure, accepted as f, too"),
+    "instead": ("a branch to its failure", "a branch: the failure of this test is f here"),
+    "certified": ("by a certificate", "reduced by a certificate: fresh runs show f as often"),
+    "left_out": ("left out by hand", "left out by hand: by the certificate it only helped"),
+    "sliced": ("without a test", "reduced without a test to what took part"),
+}
+_DECIDED = {
     "adopted": "You adopted {what}",
     "left_out": "You went on {what}",
     "accepted": "You accepted the other failure of {what} as f",
@@ -21,18 +33,22 @@ HOW = {
 
 def to_adopt(state: RunState) -> tuple[str, ...]:
     """The last try that showed f and could become the environment."""
-    similar = [trial for trial in state.trials if _can_be_adopted(state, trial)]
-    if not similar:
-        return ()
-    return (f"{similar[-1].label} shows f with {count(similar[-1].size, 'model')}: a on its row adopts it.",)
+    adoptable = (one for one in reversed(state.trials) if one.verdict == "similar" and not one.adopted)
+    last = next((one for one in adoptable if one.node == state.node), None)
+    return () if last is None else (f"{shows_f(last)}: a on its row adopts it.",)
+
+
+def shows_f(trial: Trial) -> str:
+    """That a try showed f, without a full stop."""
+    return f"{trial.label} shows f with {count(trial.size, 'model')}"
 
 
 def by_hand(state: RunState) -> tuple[str, ...]:
     """Tries that are not judged yet, and models that are pinned."""
     sentences = [_under_way(state, trial) for trial in state.trials if not trial.verdict]
-    pinned = [name for name in state.environment if name in state.pinned]
+    pinned = [shortened(name, LONGEST) for name in state.environment if name in state.pinned]
     if pinned and not state.ended:
-        sentences.append(f"Pinned, and so in every candidate: {named(pinned)}.")
+        sentences.append(f"Pinned, and so in every candidate: {first_of(pinned, NAMED)}.")
     return tuple(sentences)
 
 
@@ -44,19 +60,13 @@ def last_reduction(state: RunState) -> tuple[str, ...]:
     return (f"{here.what} showed f: {_sizes(state, here)}.",)
 
 
-def _can_be_adopted(state: RunState, trial: Trial) -> bool:
-    return trial.verdict == "similar" and not trial.adopted and trial.node == state.node
-
-
 def _under_way(state: RunState, trial: Trial) -> str:
-    most = settings(state).most_runs
-    tests = [state.tests[id - 1] for id in trial.tests if 0 < id <= len(state.tests)]
-    running = next((test for test in tests if test.outcome == "running"), None)
+    running = [test.outcome == "running" for test in state.tests_of(trial.tests)]
     what = f"{trial.label} ({count(trial.size, 'model')})"
-    if running is None:
+    if not any(running):
         return f"{what} is the next test, before the round goes on."
-    number = tests.index(running)
-    again = f"re-run {number} of {most - 1}" if number else "first run"
+    number = running.index(True)
+    again = f"re-run {number} of {settings(state).most_runs - 1}" if number else "first run"
     return f"{what} is being tested: {again}."
 
 
@@ -76,21 +86,17 @@ def arrival(state: RunState) -> str:
     if here is None or last is None or last.tests != state.tests_done:
         return ""
     if last.kind in ("go_back", "undo"):
-        return f"{_capital(plain(last.words))}."
+        return as_sentence(plain(last.words))
     if last.kind == "change":
-        return f"{_capital(plain(last.words))}, from this round on."
-    if here.how in HOW and last.kind in ("adopt", "leave_out", "accept_other"):
-        return f"{HOW[here.how].format(what=here.what)}: {_sizes(state, here)}."
+        return as_sentence(f"{plain(last.words)}, from this round on")
+    if here.how in _DECIDED and last.kind in ("adopt", "leave_out", "accept_other"):
+        return f"{_DECIDED[here.how].format(what=here.what)}: {_sizes(state, here)}."
     return ""
 
 
 def _sizes(state: RunState, here: Node) -> str:
     before = 0 if here.parent is None else len(state.nodes[here.parent].environment)
     return f"{before} → {count(len(here.environment), 'model')}"
-
-
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]
 
 
 def out_of_budget(state: RunState) -> tuple[str, ...]:

@@ -1,22 +1,16 @@
-"""Numbers and names as the screen shows them."""
+"""Signs and short words: for how a run stands, how a test ended, and the verdicts of candidates and claims."""
 
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
-from ddenv.text import about as about
-from ddenv.text import count as count
-from ddenv.text import duration as duration
-from ddenv.text import percent as percent
-from ddenv.text import plain, shortened
-from ddenv.words.news import SETTLING
+from ddenv.text import shortened
 
+SETTLING = "finding which models rest on which"
 # Every status and verdict has its own sign, so that nothing depends on colour alone.
 STATUS = {
     "created": ("○", "not started"),
@@ -51,8 +45,6 @@ VERDICT = {
     "rejected": "✗ rejected",
     "undone": "↶ undone",
 }
-
-
 # The signs of the verdicts of a certificate.
 CLAIM = {
     "kept": "●",
@@ -64,6 +56,8 @@ CLAIM = {
     "not shown": "?",
     "unknown": "✗",
 }
+# What would fall once something that it rests on is gone, on the map and in the table.
+DROPS = "↓"
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
 
 
@@ -105,18 +99,6 @@ def metres(value: Any, digits: int = 1) -> str:
     if not isinstance(value, (int, float)) or not math.isfinite(value):
         return ""
     return f"{value:.{digits}f} m"
-
-
-def attach_name(run: Path) -> str:
-    """A run's name if it is in the runs folder, else its path, quoted for a shell."""
-    from ddenv.runs.folder import find_run
-
-    name = run.stem if find_run(run.stem) == run else str(run)
-    return shlex.quote(plain(name))
-
-
-# What would fall once something that it rests on is gone, on the map and in the table.
-DROPS = "↓"
 
 
 def dropping(names: Sequence[str], width: int) -> str:

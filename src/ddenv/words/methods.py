@@ -9,8 +9,7 @@ from typing import Literal
 from ddenv.runfile.run_settings import Settings
 from ddenv.runfile.state import Round
 from ddenv.schemas import BOTH, Kind, explanation, names, uses
-from ddenv.text import plain
-from ddenv.workbench.shared.wording import count
+from ddenv.text import count, plain
 
 Step = Literal["baseline", "split", "next", "test", "rerun", "waiting", "reduced", "nothing", "returned"]
 Lines = tuple[tuple[int, str], ...]

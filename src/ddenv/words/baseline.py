@@ -1,0 +1,72 @@
+"""What the baseline showed: how often the whole world fails, in which ways, and what that means for flaky candidates."""
+
+from __future__ import annotations
+
+from ddenv.evidence.rates import miss_chance
+from ddenv.runfile.events import BaselineFinished, deed
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import RunState
+from ddenv.text import as_sentence, count, first_of, percent
+
+# A line names so many failures.
+MOST_FAILURES = 3
+
+
+def baseline(state: RunState) -> str:
+    """The result in a line; "" before it is finished."""
+    found = state.baseline
+    if found is None:
+        return ""
+    x, y, z = found.position
+    broke = f", {count(found.broken, 'more run')} broke" if found.broken else ""
+    others = f"; {also} (--failure reduces another one)" if (also := other_failures(found)) else ""
+    return (
+        f"baseline: f in {how_often(found)}{broke}; f: {state.failure or 'ending'} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        f"{others}; {missed(state)}"
+    )
+
+
+def baseline_sentence(state: RunState) -> str:
+    """The same in sentences."""
+    found = state.baseline
+    if found is None:
+        return ""
+    broke = f"; {count(found.broken, 'more run')} broke" if found.broken else ""
+    said = [f"Baseline: the robot {failed_in(state, found)} in {how_often(found)}{broke}."]
+    if also := other_failures(found):
+        said.append(as_sentence(also))
+    if found.rate < 1.0:
+        said.append(as_sentence(missed(state)))
+    return " ".join(said)
+
+
+def how_often(found: BaselineFinished) -> str:
+    """How often f showed: "3 of 4 runs (75 %, 95 % interval 30 % to 95 %)"."""
+    interval = f"95 % interval {percent(found.low)} to {percent(found.high)}"
+    return f"{found.failures} of {count(found.runs, 'run')} ({percent(found.rate)}, {interval})"
+
+
+def failed_in(state: RunState, found: BaselineFinished) -> str:
+    """What the robot did in the f of the baseline; on a branch another failure is f."""
+    return next((deed(test.failure) for test in state.tests_of((found.failure_test,))), deed(""))
+
+
+def other_failures(found: BaselineFinished) -> str:
+    """The failures besides f of the runs that chose f, with their numbers; "" if there is none."""
+    listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
+    chose = f"the first {count(found.chose, 'run')} only chose f, and showed " if found.chose else ""
+    return f"{chose}other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
+
+
+def missed(state: RunState) -> str:
+    """How likely all runs of a candidate miss f, by the baseline's rate and its interval; without a full stop."""
+    base, asked = state.baseline, settings(state)
+    if base is None:
+        return ""
+    if asked.accept_rate == "exact":
+        return f"each candidate runs with the seeds of {count(min(asked.exact_seeds, base.failures), 'failing run')} of these"
+    middle, most = (percent(miss_chance(rate, asked.iterations)) for rate in (base.rate, base.low))
+    chance = middle if middle == most else f"{middle} (at most {most})"
+    rare = base.iterations_95 > asked.iterations
+    enough = f"; a 95 % chance to see f needs --iterations {base.iterations_95}" if rare else ""
+    return f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is {chance}{enough}"

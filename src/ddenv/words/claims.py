@@ -1,0 +1,395 @@
+"""What a run may claim of its result: said here alone, from the runs that show it, with their number and interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import islice
+from typing import Protocol
+
+from ddenv.evidence.claims import (
+    current,
+    expected_fresh_runs,
+    fresh_runs_made,
+    helping,
+    is_minimal,
+    never_left_out,
+    so_far,
+)
+from ddenv.evidence.fresh_runs import FreshRuns
+from ddenv.runfile.fold_decisions import failures_at, origin
+from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
+from ddenv.runfile.state import RunState, Trial
+from ddenv.runfile.supports import stack_with
+from ddenv.text import between, count, first_of, percent
+
+MOST_NAMES, MOST_SEEDS = 3, 4
+
+
+def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
+    """What a finished certificate shows, in one sentence without a full stop.
+
+    `pinned` models could not be left out; `each` is what was left out at a time.
+    """
+    left, *removals = certificate.claims
+    if left.verdict == "lost":
+        return (
+            f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
+        )
+    if left.verdict != "kept" and not certificate.seeds:
+        aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
+        shown = f"; it keeps at least {percent(left.bound)}" if left.bound else ""
+        return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
+    for word, start in (
+        ("unknown", "not shown that each model is needed: tests broke without"),
+        ("not shown", "not shown that each model is needed: undecided without"),
+        ("not needed", "not minimal: f shows about as often without"),
+    ):
+        names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
+        if names:
+            return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
+    but = f"; {_stayed(pinned)}" if pinned else ""
+    if certificate.seeds:
+        return f"{_exactly(certificate)}; with other seeds {rate(left)}{but}"
+    if not removals:
+        return f"nothing is left that can be removed: {rate(left)}{but}"
+    if helps := helping(certificate):
+        first = next(claim for claim in removals if claim.without == helps[0])
+        return (
+            f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
+        )
+    most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
+    without, bound = (
+        f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
+        _at_most(certificate),
+    )
+    often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
+    return f"no {one} can be removed: {kept(certificate)}; without {without} {often}{but}"
+
+
+def _exactly(certificate: Certificate) -> str:
+    """What the chosen runs show: "f shows with seed 3 each time; without any one of these 4 models it does not"."""
+    _, *removals = certificate.claims
+    shows = f"f shows with {seeds_of(certificate)} each time"
+    if not removals:
+        return f"{shows}; nothing is left that can be removed"
+    names = f"any one of these {len(removals)} models" if len(removals) > 1 else removals[0].without
+    runs = removals[0].runs
+    return f"{shows}; without {names} it {f'shows with none of the {runs} chosen seeds' if runs > 1 else 'does not'}"
+
+
+def seeds_of(certificate: Certificate) -> str:
+    seeds = certificate.seeds
+    return f"seed{'s' * (len(seeds) > 1)} {first_of([str(seed) for seed in seeds], MOST_SEEDS)}"
+
+
+def kept(certificate: Certificate) -> str:
+    """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
+    return f"{rate(certificate.claims[0])}, at least {percent(_kept(certificate))} of {_whole_rate(certificate)}"
+
+
+def _kept(certificate: Certificate) -> float:
+    """The share that "kept" has shown. Certificates of older versions had no bound beyond what they asked for."""
+    bound = certificate.claims[0].bound
+    return certificate.certify_rate if bound is None else bound
+
+
+def _at_most(certificate: Certificate) -> float | None:
+    """How often f shows without any one model, as a share of its rate with it; None if that was not bounded."""
+    bounds = [claim.bound for claim in certificate.claims if claim.without is not None]
+    return max((bound for bound in bounds if bound is not None), default=None) if None not in bounds else None
+
+
+def shown(state: RunState) -> str:
+    """What fresh runs show of what is left, by a finished certificate or so far; one sentence without a full stop."""
+    if (found := current(state)) is not None:
+        return verdict_on(found, never_left_out(state, found))
+    said = [missing(state)]
+    if (now := state.certificate) is not None:
+        bounds = [(name, claim.bound) for name, claim in so_far(state, now).items() if claim.bound is not None]
+        said += [
+            f"so far at least {percent(share)} of {_whole_rate(now)} is kept" for name, share in bounds[:1] if share
+        ]
+        less = ((name, share) for name, share in bounds[1:] if share < 1.0)
+        said += [
+            f"without {name} f shows at most {percent(share)} as often" for name, share in islice(less, MOST_NAMES)
+        ]
+    return "; ".join(said)
+
+
+def uncertified(state: RunState, run: object) -> str:
+    """Why what needs a finished certificate cannot be had of a run, and the command that makes one."""
+    command = "certify" if state.status == "finished" else "resume"
+    return f"{run}: {shown(state)}; make a certificate first: ddenv {command} {run}"
+
+
+def _stayed(pinned: int) -> str:
+    """That nothing is claimed of models that were never left out."""
+    return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
+
+
+def environment_named(node: int) -> str:
+    """An environment by its number in the history."""
+    return "the whole world" if node == 0 else f"the environment of step {node}"
+
+
+def what_ran(one: FreshRuns) -> str:
+    """What was run with fresh seeds: "what is left", "without crate_00" or "the whole world"."""
+    if one.without is not None:
+        return f"without {one.without}"
+    return "what is left" if one.is_left else environment_named(one.node)
+
+
+class Counted(Protocol):
+    """Runs with their rate of f, as in a claim."""
+
+    @property
+    def shown(self) -> int: ...
+    @property
+    def runs(self) -> int: ...
+    @property
+    def low(self) -> float: ...
+    @property
+    def high(self) -> float: ...
+
+
+def rate(fresh: Counted) -> str:
+    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"; without an interval, how often chosen ones did."""
+    if fresh.low == fresh.high:
+        return f"f in {fresh.shown} of {count(fresh.runs, 'chosen run')}"
+    interval = f" ({percent(fresh.low)} to {percent(fresh.high)})" if fresh.runs else ""
+    return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
+
+
+def for_everyone(certificate: Certificate) -> str:
+    """What a finished certificate shows, for readers who know no statistics; one sentence without a full stop."""
+    left, *removals = certificate.claims
+    share = f"{percent(left.low)} to {percent(left.high)} of all drives, with 95 % confidence"
+    said = f"It failed so in {left.shown} of {count(left.runs, 'new drive')} with nothing else there ({share})"
+    if not is_minimal(certificate):
+        return f"{said}, but not every part of this result is shown to hold"
+    if not removals:
+        return said
+    most = max(removals, key=lambda claim: claim.high)
+    one = "it" if len(removals) == 1 else "any one of them"
+    if certificate.seeds:
+        return f"{said}; of the drives that were chosen, none of {most.runs} failed so without {one}"
+    seldom = f"at most {most.shown}" if most.shown else "none"
+    return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
+
+
+def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
+    """What runs `there`, in another simulator, show of what is left, or of that without a model; without a full stop.
+
+    The certificate says `here` of what is left. `fails` is what `rates.shows_at` says of the runs at the low end of its interval.
+    """
+    share = f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
+    if there.without is not None:
+        verdicts = {True: f"not needed in {name}", False: f"needed in {name}, too", None: f"not shown for {name}"}
+        return f"{there.without}: {verdicts[fails]}: without it {share}"
+    verdicts = {
+        True: f"fails in {name}, too",
+        False: f"does not fail in {name} as it did",
+        None: f"the runs do not say whether it fails in {name} as it did",
+    }
+    return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
+
+
+def meaning(claim: Claim, certificate: Certificate) -> str:
+    """What the verdict of a claim means, in plain words."""
+    rate, bound = _whole_rate(certificate), claim.bound
+    if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
+        return f"shown to keep at least {percent(bound)} of {rate}, not {percent(certificate.certify_rate)}"
+    often = (
+        "with none of these seeds"
+        if claim.is_exact
+        else "rarer"
+        if bound is None
+        else f"at most {percent(bound)} as often"
+    )
+    return {
+        "exact": f"f shows with {seeds_of(certificate)} each time",
+        "kept": f"keeps at least {percent(certificate.certify_rate if bound is None else bound)} of {rate}",
+        "lost": f"keeps less than {percent(certificate.keep_rate)} of {rate}",
+        "needed": f"needed: without it f shows {often}",
+        "helps": "helps: without it f is rarer, but not by much",
+        "not needed": "not needed: f shows about as often without it",
+        "not shown": "not shown: the runs do not decide",
+        "unknown": "unknown: too many runs broke",
+    }.get(claim.verdict, "")
+
+
+def _whole_rate(certificate: Certificate) -> str:
+    """The rate that what is left has to keep a part of."""
+    return "the rate where its branch begins" if certificate.branch else "the whole world's rate"
+
+
+def of_passing(state: RunState, one: Isolation) -> str:
+    """What an isolation that has ended shows, in one sentence without a full stop."""
+    if not one.checks:
+        return (
+            "no world was found that passes: the robot does not reach its goal often enough even without all "
+            f"{count(len(_may_go(state, one)), 'model')} that may go"
+        )
+    check = one.checks[-1]
+    gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
+    names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
+    if one.found is None:
+        return f"no world is shown to pass: without {names} {_reaching(one, first)}"
+    said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(one, first)}"
+    for word, start in (
+        ("unknown", "not shown that each of them has to go: tests broke with"),
+        ("not shown", "not shown that each of them has to go: undecided with"),
+        ("not needed", "not a nearest one: the robot passes about as often with"),
+    ):
+        found = [claim.back for claim in backs if claim.verdict == word and claim.back is not None]
+        if found:
+            return f"{said}; {start} {first_of(found, MOST_NAMES)} put back"
+    most = max(backs, key=lambda claim: claim.high)
+    back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
+    if one.chosen:
+        return f"{said}; with {back} put back it misses its goal in a chosen run"
+    return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most)}"
+
+
+def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
+    stacks = (stack_with(state, state.elements, name) for name in one.suspects)
+    return frozenset(name for stack in stacks for name in stack)
+
+
+def _reaching(one: Isolation, claim: Returned) -> str:
+    chosen = f"each of {count(len(one.chosen), 'chosen run')} and in " if one.chosen else ""
+    return f"the robot reaches its goal in {chosen}{_share(claim)}"
+
+
+def _share(claim: Returned) -> str:
+    if claim.low == claim.high:
+        return f"{claim.reached} of {count(claim.runs, 'chosen run')}"
+    interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
+    return f"{claim.reached} of {count(claim.runs, 'fresh run')}{interval}"
+
+
+def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence[str]) -> str:
+    """What is known of an environment that shows f where it is known of every part of the world; without a full stop.
+
+    `could_go` are its models without which f still shows; `smaller` is a smaller set that shows f, somewhere in the world.
+    """
+    if could_go:
+        any_one = "any one of " if len(could_go) > 1 else ""
+        return f"not 1-minimal: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
+    if not left:
+        return "nothing is left that can be removed"
+    known = f"1-minimal: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    if smaller:
+        return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
+    return f"{known}. No smaller set shows f, either, which 1-minimal alone does not promise"
+
+
+def usual_runs(state: RunState, now: Certificate) -> str:
+    """How many runs a certificate is expected to take, such as "30 to 150 runs"."""
+    low, _, high = expected_fresh_runs(state, now)
+    return f"{between(low, high)} runs"
+
+
+def made_of_usual(state: RunState, now: Certificate) -> str:
+    """How far a certificate is: "23 of about 30 to 150 runs"."""
+    return f"{fresh_runs_made(state, now)} of about {usual_runs(state, now)}"
+
+
+def short(claim: Claim) -> str:
+    """The verdict of a claim in a word or two."""
+    return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
+
+
+def terms(certificate: Certificate, pinned: int = 0) -> str:
+    """What a certificate asks for, in one sentence without a full stop."""
+    if certificate.seeds:
+        return f"they say how often what is left shows f with other seeds than {seeds_of(certificate)}"
+    aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
+    return f"they have to show that what is left keeps {aim}, and that f is rarer without {_any_one(pinned)}"
+
+
+def promise(state: RunState, certificate: Certificate) -> str:
+    """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
+    if certificate.seeds:
+        return (
+            "minimal means: a run with a chosen seed repeats to the last bit, so this is exact for these seeds; for others fresh "
+            "runs say how often f shows, and nothing more"
+        )
+    kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
+    most = _at_most(certificate)
+    often = "rarer" if most is None else f"at most {percent(most)} as often"
+    return (
+        f"minimal means: what is left keeps at least {kept}; without {_any_one(pinned)} f shows {often}; "
+        f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
+    )
+
+
+def _any_one(pinned: int) -> str:
+    return f"any one model that is not pinned ({_stayed(pinned)})" if pinned else "any one model"
+
+
+def ended(state: RunState) -> str:
+    """Why a finished run ended, without a full stop; it says so where no fresh runs show what the result is worth."""
+    said = (state.reason, "" if state.baseline is None else missing(state), smaller_known(state))
+    return "; ".join(words for words in said if words)
+
+
+def smaller_known(state: RunState) -> str:
+    """That a smaller environment is known to show f, which the search may not take, and where it is; "" if there is none."""
+    left = len(state.environment)
+    nodes = [
+        (len(node.environment), f"#{node.number} in the history{', taken back' if node.rejected else ''}")
+        for node in state.nodes
+        if node.shown and not node.lost_rate and len(node.environment) < left and _same_f(state, node)
+    ]
+    trials = [(one.size, one.label) for one in state.trials if one.size < left and _shows_f(state, one)]
+    if not nodes and not trials:
+        return ""
+    size, where = min((*nodes, *trials), key=lambda each: each[0])
+    return f"a smaller environment is known to show f: {count(size, 'model')} ({where})"
+
+
+def _same_f(state: RunState, node: Node) -> bool:
+    """Whether the same failures count as f in a node as now."""
+    return failures_at(state, node.number) == state.failures
+
+
+def _shows_f(state: RunState, trial: Trial) -> bool:
+    return trial.verdict == "similar" and any(test.outcome == "similar" for test in state.tests_of(trial.tests))
+
+
+def missing(state: RunState) -> str:
+    """Why the current environment has no finished certificate; "" if it has one."""
+    if current(state) is not None:
+        return ""
+    return "no fresh runs were made" if state.certificate is None else "its certificate is not finished"
+
+
+def drift(state: RunState) -> tuple[str, ...]:
+    """How often f showed in the current environment and where it was seen first, from all runs; shorter and shorter forms.
+
+    Empty in the whole world, and where a certificate says more.
+    """
+    here = state.here
+    if here is None or not here.runs or current(state) is not None:
+        return ()
+    whole = origin(state, here.number)
+    if whole is here:
+        return ()
+    long, brief = ("in the whole world", "whole world") if whole.parent is None else ("where the branch began", "first")
+    return (
+        f"f in {seen(here)} here, {seen(whole)} {long}",
+        f"f {here.shown}/{len(here.runs)} here, {whole.shown}/{len(whole.runs)} {brief}",
+        f"f {here.shown}/{len(here.runs)} here",
+    )
+
+
+def seen(node: Node) -> str:
+    """How often f showed in an environment, from all runs so far; "" without runs."""
+    return f"{node.shown} of {len(node.runs)}" if node.runs else ""
+
+
+def of_runs(shown: int, runs: int) -> str:
+    """3 of 5 runs."""
+    return f"{shown} of {count(runs, 'run')}"
