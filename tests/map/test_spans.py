@@ -168,7 +168,7 @@ def test_a_gap_between_platforms_is_seen_wherever_the_pixels_fall(gap, offset):
     palette = mixed(*DARK)
     for who in (Kept(names, names), Kept(frozenset({"other"}), frozenset())):
         canvas = Canvas(view.rows, view.columns, palette.back)
-        fill(canvas, owners(masks(prints, view), view), looks(prints, who, *DARK, palette))
+        fill(canvas, owners(masks(prints, view), view), looks(prints, who, palette))
         row = [(chr(char), int(back)) for char, back in zip(canvas.chars[3], canvas.back[3], strict=True)]
         inside = row[4:20]
         assert len(set(inside)) > 1, "no seam and no gap"

@@ -19,10 +19,9 @@ HUES: tuple[RGB, ...] = (
     (140, 140, 250),
     (150, 200, 90),
 )
-# The packed colour of the terminal's default, and the offset of packed numbers 0..15 of the terminal's palette.
-PLAIN, NUMBERED = -1, 1 << 24
+# The packed colour of the terminal's default.
+PLAIN = -1
 BLACK, WHITE = 0x000000, 0xFFFFFF
-_BRIGHT = frozenset({2, 3, 6, 7, 10, 11, 13, 14, 15})
 
 
 def blend(back: RGB, front: RGB, amount: float) -> RGB:
@@ -40,8 +39,6 @@ def readable(back: int) -> int:
     """Black or white, whichever is more readable on a packed colour; the terminal's default on its own default."""
     if back < 0:
         return PLAIN
-    if back >= NUMBERED:
-        return NUMBERED | (0 if back - NUMBERED in _BRIGHT else 15)
     return BLACK if luminance(back) > 110 else WHITE
 
 

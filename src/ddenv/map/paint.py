@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ddenv.map.colors import BLACK, NUMBERED, RGB, WHITE, luminance, packed, readable
+from ddenv.map.colors import BLACK, RGB, WHITE, luminance, packed, readable
 
 # Minimum difference in brightness between a dot and its background, of 255.
 LEAST_APART = 70
@@ -20,11 +20,10 @@ FILLED = tuple(map(ord, "█▉▇"))
 def _apart(backs: np.ndarray, color: int) -> np.ndarray:
     """`color` for each of the packed colours `backs`, or black or white if `color` is too similar."""
     colors = np.full(len(backs), color, dtype=np.int32)
-    if not 0 <= color < NUMBERED:
+    if color < 0:
         return colors
-    mixed = (backs >= 0) & (backs < NUMBERED)
     bright = luminance(backs)
-    near = mixed & (abs(bright - luminance(color)) < LEAST_APART)
+    near = (backs >= 0) & (abs(bright - luminance(color)) < LEAST_APART)
     colors[near] = np.where(bright[near] > 110, BLACK, WHITE)
     return colors
 
@@ -40,7 +39,7 @@ class Run:
 
 
 class Canvas:
-    """`chars` are code points, `fore` and `back` packed colours (or PLAIN, or NUMBERED), all of shape (rows, columns)."""
+    """`chars` are code points, `fore` and `back` packed colours (or PLAIN), all of shape (rows, columns)."""
 
     def __init__(self, rows: int, columns: int, back: RGB | int) -> None:
         color = back if isinstance(back, int) else packed(back)

@@ -1,4 +1,4 @@
-"""The colours and fillings of the map: for many colours, for the sixteen of a terminal, and for none."""
+"""The colours and fillings of the map: mixed from the theme's, of which a terminal shows as many as it has."""
 
 from __future__ import annotations
 
@@ -7,138 +7,94 @@ from typing import TYPE_CHECKING, Any
 
 from textual.color import Color, ColorParseError
 
-from ddenv.map.colors import HUES, NUMBERED, PLAIN, RGB, blend, luminance, packed
+from ddenv.map.colors import HUES, PLAIN, RGB, blend, luminance, packed
 
 if TYPE_CHECKING:
     from textual.app import App
 
 KEPT, FLOOR, LEFT_OUT, FLOOR_OUT, PROTECTED, REMOVED, PINNED, SELECTED = range(8)
-# The number of colours of the terminal.
-MANY, SIXTEEN, NONE = 24, 4, 0
-# A full cell of each kind. Where there are many colours, all but the protected ones look solid.
+# A full cell of each kind: where there are colours, all but the protected ones look solid.
 SOLID = "█░▓░▒ ██"
-# A full cell of parts 1, 2, ... where there are no colours to tell them apart.
-PATTERNS = "█╱─╲│╳"
 # The strength of a part's hue on the background.
 STRENGTH = {KEPT: 0.74, FLOOR: 0.24, LEFT_OUT: 0.25, FLOOR_OUT: 0.10, PINNED: 0.62, REMOVED: 0.0}
 LIGHT_STRENGTH = STRENGTH | {KEPT: 0.88, LEFT_OUT: 0.30, PINNED: 0.80}
-# Bright blue, yellow, green, magenta, red and cyan of the sixteen: as numbers, and as the colours that terminals show.
-NUMBERS = (12, 3, 2, 5, 1, 6)
-STANDARD: tuple[int, ...] = (0x5555FF, 0xAA5500, 0x00AA00, 0xAA00AA, 0xAA0000, 0x00AAAA)
 NEUTRAL: RGB = (128, 140, 160)
+YELLOW: RGB = (255, 215, 80)
+# Background and text that a theme of the terminal's own colours may have: it does not say which these are.
+OWN: dict[bool, tuple[RGB, RGB]] = {True: ((15, 20, 27), (213, 219, 229)), False: ((246, 248, 251), (28, 35, 45))}
 
 
 @dataclass(frozen=True, slots=True)
 class Tone:
-    """How a model looks: the `glyph` of a full cell in `ink` on `fill`. With `halves`, half a cell can be filled with `fill`.
-
-    A `seam` of that colour is drawn between neighbours that look alike; PLAIN's is the terminal's own.
-    """
+    """How a model looks: the `glyph` of a full cell in `ink` on `fill`, and the `seam` between neighbours that look alike."""
 
     glyph: str
     fill: int
     ink: int
     seam: int
-    halves: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """Packed colours. `back` and `fore` are background and text, `native` says that the sixteen colours are numbers."""
+    """Packed colours. `back` is the map's background, or PLAIN for the terminal's own; `ground` is what is mixed with instead."""
 
-    colors: int
     back: int
-    fore: int
-    faint: int
-    path: int
-    original: int
+    ground: RGB
+    fore: RGB
     live: int
-    dull: int
-    selected: int
     start: int
     goal: int
     failure: int
-    native: bool = False
+
+    def shade(self, amount: float) -> int:
+        """The text's colour on the background, by this much."""
+        return packed(blend(self.ground, self.fore, amount))
 
     @property
-    def tones(self) -> int:
-        """The number of parts with different looks."""
-        return {MANY: len(HUES), SIXTEEN: len(NUMBERS), NONE: len(PATTERNS)}[self.colors]
+    def faint(self) -> int:
+        return self.shade(0.35)
+
+    @property
+    def dull(self) -> int:
+        return self.shade(0.5)
+
+    @property
+    def original(self) -> int:
+        return self.shade(0.55)
+
+    @property
+    def path(self) -> int:
+        return self.shade(0.8)
 
     def tone(self, kind: int, part: int) -> Tone:
         """The looks of a model of part number `part`, or of none: -1."""
-        if self.colors == MANY:
-            return self._rich(kind, part)
-        return self._sparse(kind, part)
-
-    def _rich(self, kind: int, part: int) -> Tone:
-        back = unpacked(self.back)
         if kind == PROTECTED:
-            fill = packed(blend(back, unpacked(self.fore), 0.10))
-            return Tone(SOLID[kind], fill, packed(blend(back, unpacked(self.fore), 0.20)), fill)
+            return Tone(SOLID[kind], self.shade(0.1), self.shade(0.2), self.shade(0.1))
         if kind == SELECTED:
-            return Tone(SOLID[kind], self.selected, self.selected, self._seam(self.selected))
+            return self._solid(kind, self.live)
         hue = NEUTRAL if part < 0 or kind == PINNED else HUES[part % len(HUES)]
         strength = STRENGTH[kind]
         # On a light background a bright hue would not be seen.
-        if luminance(self.back) > 128:
+        if luminance(packed(self.ground)) > 128:
             hue, strength = blend(hue, (0, 0, 0), 0.4), LIGHT_STRENGTH[kind]
-        fill = packed(blend(back, hue, strength))
-        return Tone(SOLID[kind], fill, fill, self._seam(fill))
+        return self._solid(kind, packed(blend(self.ground, hue, strength)))
 
-    def _seam(self, fill: int) -> int:
-        return packed(blend(unpacked(fill), unpacked(self.back), 0.5))
-
-    def _sparse(self, kind: int, part: int) -> Tone:
-        """For few colours or none: dots of one colour replace a weaker one."""
-        color = self._color(part)
-        if kind == REMOVED:
-            return Tone(" ", self.back, self.back, self.back)
-        if kind == SELECTED:
-            return Tone("█", self.selected, self.selected, self.back, self.colors != NONE)
-        if kind == PINNED:
-            return Tone("▓", self.back, self.fore, self.back, False)
-        if kind == PROTECTED:
-            return Tone("░", self.back, self.faint, self.back, False)
-        if kind == FLOOR_OUT:
-            return Tone(" ", self.back, self.back, self.back, False)
-        if kind == FLOOR:
-            return Tone(":", self.back, color, self.back, False)
-        if kind == LEFT_OUT:
-            return Tone("▒", self.back, color, self.back, False)
-        pattern = PATTERNS[max(part, 0) % len(PATTERNS)] if self.colors == NONE else "█"
-        if pattern == "█":
-            return Tone(pattern, color, color, self.back)
-        return Tone(pattern, self.back, color, self.back, False)
-
-    def _color(self, part: int) -> int:
-        if self.colors == NONE or part < 0:
-            return self.fore
-        return NUMBERED | NUMBERS[part % len(NUMBERS)] if self.native else STANDARD[part % len(STANDARD)]
+    def _solid(self, kind: int, fill: int) -> Tone:
+        return Tone(SOLID[kind], fill, fill, packed(blend(unpacked(fill), self.ground, 0.5)))
 
 
 def unpacked(color: int) -> RGB:
     return color >> 16, color >> 8 & 255, color & 255
 
 
-def mixed(back: RGB, fore: RGB, *, accent: RGB = (255, 215, 80), marks: tuple[RGB, RGB, RGB] | None = None) -> Palette:
-    """For a terminal with many colours. `marks` are those of start, goal and f."""
-    ground, text = packed(back), packed(fore)
-    accent = _seen(accent, back, fore)
+def mixed(
+    ground: RGB, fore: RGB, *, own: bool = False, accent: RGB = YELLOW, marks: tuple[RGB, RGB, RGB] | None = None
+) -> Palette:
+    """For a background and a text colour; with `own` the background is the terminal's. `marks` are those of start, goal and f."""
     start, goal, failure = marks or ((31, 111, 235), (26, 127, 55), (207, 34, 46))
+    back = PLAIN if own else packed(ground)
     return Palette(
-        MANY,
-        back=ground,
-        fore=text,
-        faint=packed(blend(back, fore, 0.35)),
-        path=packed(blend(back, fore, 0.80)),
-        original=packed(blend(back, fore, 0.55)),
-        live=packed(accent),
-        dull=packed(blend(back, fore, 0.5)),
-        selected=packed(accent),
-        start=packed(start),
-        goal=packed(goal),
-        failure=packed(failure),
+        back, ground, fore, packed(_seen(accent, ground, fore)), packed(start), packed(goal), packed(failure)
     )
 
 
@@ -151,39 +107,13 @@ def _seen(color: RGB, back: RGB, fore: RGB) -> RGB:
     return fore
 
 
-def sixteen(back: int = PLAIN, fore: int = PLAIN) -> Palette:
-    """For the colours that every terminal has; without a background it is the terminal's own, as in an ANSI theme."""
-    native = back == PLAIN
-    if native:
-        grey, cyan, yellow, white = (NUMBERED | number for number in (8, 6, 3, 15))
-    else:
-        grey, cyan, yellow, white = 0x555555, 0x00AAAA, 0xAA5500, 0xFFFFFF
-    # With their own hues, start, goal and f would look like models of a part.
-    marks = dict.fromkeys(("start", "goal", "failure"), white)
-    lines = {"path": fore, "original": cyan, "live": yellow, "dull": fore}
-    return Palette(SIXTEEN, back, fore, faint=grey, selected=fore, native=native, **lines, **marks)
-
-
-def plain(back: int = PLAIN, fore: int = PLAIN) -> Palette:
-    """For a terminal without colours: letters and fillings show everything."""
-    native = back == PLAIN
-    faint = fore if native else packed(blend(unpacked(back), unpacked(fore), 0.4))
-    names = ("path", "original", "live", "dull", "selected", "start", "goal", "failure")
-    return Palette(NONE, back, fore, faint, native=native, **dict.fromkeys(names, fore))
-
-
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
-    """The palette for a widget's background and text colour in the app's theme and terminal."""
-    native = app.native_ansi_color
-    ground, text = (PLAIN, PLAIN) if native else (packed(back.rgb), packed(fore.rgb))
-    system = "truecolor" if app.is_headless else app.console.color_system
-    if app.no_color or system is None:
-        return plain(ground, text)
-    if native or system in ("standard", "windows"):
-        return sixteen(ground, text)
+    """The palette for a widget's background and text colour in the app's theme."""
+    if app.native_ansi_color:
+        return mixed(*OWN[app.current_theme.dark], own=True)
     start, goal, failure = _variable(app, "primary"), _variable(app, "success"), _variable(app, "error")
     marks = (start, goal, failure) if start and goal and failure else None
-    return mixed(back.rgb, fore.rgb, accent=_variable(app, "accent") or (255, 215, 80), marks=marks)
+    return mixed(back.rgb, fore.rgb, accent=_variable(app, "accent") or YELLOW, marks=marks)
 
 
 def _variable(app: App[Any], name: str) -> RGB | None:

@@ -15,7 +15,7 @@ from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
 from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
-from ddenv.workbench.map.map_colors import Palette, unpacked
+from ddenv.workbench.map.map_colors import Palette
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
 from ddenv.workbench.map.moved_prints import MovedPrints
@@ -125,8 +125,7 @@ class MapDrawing:
         outlines = self._outlines.get((place.prints,), lambda: pack(place.prints))
         models = self._seen.get((outlines, view), lambda: seen(outlines, view))
         who = self._who(shown)
-        back, fore = unpacked(palette.back), unpacked(palette.fore)
-        how = self._looks.get((who, palette, place.prints), lambda: looks(place.prints, who, back, fore, palette))
+        how = self._looks.get((who, palette, place.prints), lambda: looks(place.prints, who, palette))
 
         def draw() -> Picture:
             lines = [Line(evidence, palette.path)] if "path" in layers else []
@@ -189,5 +188,5 @@ def _marks(shown: Shown, palette: Palette) -> Iterator[Mark]:
     places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal)]
     if "failure" in shown.layers:
         places.append((shown.failure, "×", palette.failure))
-    places.append((shown.parting, PARTING, palette.selected))
+    places.append((shown.parting, PARTING, palette.live))
     return (Mark(point, sign, ground) for point, sign, ground in places if point and np.isfinite(point).all())

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ddenv.map.cells import Signs
-from ddenv.map.colors import RGB
+from ddenv.map.colors import HUES
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import Candidate, RunState, Trial, partition_letter
@@ -22,15 +22,13 @@ from ddenv.workbench.map.map_colors import (
     FLOOR_OUT,
     KEPT,
     LEFT_OUT,
-    MANY,
-    PATTERNS,
     PINNED,
     PROTECTED,
     REMOVED,
     SELECTED,
+    SOLID,
     Palette,
     Tone,
-    mixed,
 )
 
 if TYPE_CHECKING:
@@ -83,16 +81,15 @@ def kept(state: RunState, candidate: Candidate | Trial | None) -> Kept:
     return Kept(frozenset(state.elements), frozenset(state.environment), shown, fallen, parts, state.pinned)
 
 
-def looks(prints: Sequence[Footprint], who: Kept, back: RGB, fore: RGB, palette: Palette | None = None) -> Looks:
-    """The looks of all models on a background `back` with text colour `fore`, or in a `palette`."""
-    palette = palette or mixed(back, fore)
+def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
+    """The looks of all models in a `palette`."""
     names, floor = _known(tuple(prints))
     kinds = _kinds(names, floor, who)
     parts = np.array([who.parts.get(name, -1) for name in names], dtype=int)
     # Only some of many parts look different, and only these colours are mixed.
-    short = np.where(parts < 0, -1, parts % palette.tones)
-    found, tones = np.unique(kinds * (palette.tones + 1) + short + 1, return_inverse=True)
-    mixes = [divmod(value, palette.tones + 1) for value in found.tolist()]
+    short = np.where(parts < 0, -1, parts % len(HUES))
+    found, tones = np.unique(kinds * (len(HUES) + 1) + short + 1, return_inverse=True)
+    mixes = [divmod(value, len(HUES) + 1) for value in found.tolist()]
     alike = tuple(palette.tone(kind, part - 1) for kind, part in mixes)
     return Looks(kinds, tones.astype(np.int32), alike, palette, _signs(names, kinds, parts, who))
 
@@ -161,28 +158,24 @@ def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
     fills = np.array([*(each.fill for each in how.looks), ground], dtype=np.int32)
     inks = np.array([*(each.ink for each in how.looks), ground], dtype=np.int32)
     glyphs = np.array([ord(char) for char in (*(each.glyph for each in how.looks), " ")], dtype=np.uint32)
-    halves = np.array([*(each.halves for each in how.looks), True])
-    top, bottom = grid[0::2], grid[1::2]
-    upper, lower = tone[top], tone[bottom]
-    # A look without halves takes the whole cell; the model that is drawn later wins.
-    whole = (upper == lower) | ~halves[upper] | ~halves[lower]
-    upper = np.where(whole, tone[np.maximum(top, bottom)], upper)
+    upper, lower = tone[grid[0::2]], tone[grid[1::2]]
+    whole = upper == lower
     canvas.chars[:] = np.where(whole, glyphs[upper], ord("▀"))
     canvas.fore[:] = np.where(whole, inks[upper], fills[upper])
     canvas.back[:] = np.where(whole, fills[upper], fills[lower])
     # The terminal's own colour can only be the background of a block.
-    under = ~whole & (top == EMPTY)
+    under = ~whole & (grid[0::2] == EMPTY)
     canvas.chars[under], canvas.fore[under], canvas.back[under] = ord("▄"), fills[lower[under]], ground
     _seams(canvas, grid, tone, how)
 
 
 def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> None:
     """Lines between neighbours that look alike but are different models."""
-    pixels, many = tone[grid], how.palette.colors == MANY
+    pixels = tone[grid]
     beside, above = np.zeros(grid.shape, dtype=bool), np.zeros(grid.shape, dtype=bool)
     beside[:, :-1] = (pixels[:, :-1] == pixels[:, 1:]) & (grid[:, :-1] != grid[:, 1:])
     above[1:] = (pixels[:-1] == pixels[1:]) & (grid[:-1] != grid[1:])
-    solid = np.array([*(each.halves and each.glyph != " " for each in how.looks), False])
+    solid = np.array([*(each.glyph != " " for each in how.looks), False])
     seams = np.array([*(each.seam for each in how.looks), 0], dtype=np.int32)
     fills = np.array([*(each.fill for each in how.looks), 0], dtype=np.int32)
     upper, lower = pixels[0::2], pixels[1::2]
@@ -190,15 +183,15 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     # The background of a full block is invisible: one style for all makes a row of few pieces of text.
     block = full & (canvas.chars == ord("█"))
     canvas.back[block] = seams[upper[block]]
-    for where, fine, coarse in ((above[0::2], "▇", "▄"), (beside[0::2] | beside[1::2], "▉", "▌")):
-        canvas.chars[where & block] = ord(fine if many else coarse)
-    halved = full & above[1::2] if many else np.zeros_like(full)
+    for where, char in ((above[0::2], "▇"), (beside[0::2] | beside[1::2], "▉")):
+        canvas.chars[where & block] = ord(char)
+    halved = full & above[1::2]
     canvas.chars[halved] = ord("─")
     canvas.fore[halved], canvas.back[halved] = seams[upper[halved]], fills[upper[halved]]
     # Between protected platforms, too: a gap between them may be narrower than a pixel, and what the failure is about.
-    dithered = np.isin(canvas.chars, [ord(char) for char in f"{PATTERNS[1:]}▒"])
+    protected = canvas.chars == ord(SOLID[PROTECTED])
     for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):
-        canvas.chars[where & dithered] = ord(line)
+        canvas.chars[where & protected] = ord(line)
     for half, quarter, sides in (("▀", "▘", beside[0::2]), ("▄", "▖", beside[1::2])):
         canvas.chars[(canvas.chars == ord(half)) & sides & ~full] = ord(quarter)
 

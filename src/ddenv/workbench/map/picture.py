@@ -13,7 +13,7 @@ from rich.style import Style
 from textual.strip import Strip
 
 from ddenv.map.cells import Cell, place_signs
-from ddenv.map.colors import NUMBERED, readable
+from ddenv.map.colors import readable
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, owners, spans
 from ddenv.runfile.store import Live
@@ -201,8 +201,4 @@ def _style(fore: int, back: int, bold: bool) -> Style:
 
 
 def _color(value: int) -> Color:
-    if value < 0:
-        return Color.default()
-    if value >= NUMBERED:
-        return Color.from_ansi(value - NUMBERED)
-    return Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)
+    return Color.default() if value < 0 else Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)
