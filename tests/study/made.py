@@ -10,9 +10,8 @@ import yaml
 
 from ddenv.evidence.claims import is_minimal, verdict_on
 from ddenv.runfile.fold import fold
-from ddenv.study.plan import Cell, Plan, make_plan
+from ddenv.study.plan import Cell, Plan, make_plan, run_path
 from ddenv.study.results import Found, read_cell
-from ddenv.study.study_folder import run_path
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.workbench import fake_run
