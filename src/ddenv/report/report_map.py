@@ -48,7 +48,6 @@ WORDS = {
 # Pixels: the drawing's own width, the highest map and close-up, the lowest map, and the margins.
 WIDTH, HIGHEST, CLOSE_HIGH, LEAST_HIGH = 880.0, 620.0, 420.0, 180.0
 LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
-CORNERS = 32
 # The minimum drawn along each axis: of the world and of a close-up, m; and the minimum magnification of a close-up.
 LEAST, CLOSE, CLOSER = 4.0, 2.0, 3.0
 # The maximum number of labels, and how many of the models drawn last they must not hide.
@@ -61,18 +60,17 @@ MOST_POLYGONS = 20_000
 
 def picture(
     record: Record,
-    models: Sequence[Drawn],
     name: str = "all",
     ways: Ways | None = None,
     named: Collection[str] | None = None,
 ) -> str:
-    """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`. `name` is different for each map of a page.
+    """The map of a run as SVG. `name` is different for each map of a page.
 
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
     these models, in place of those that are left.
     """
-    frame = _frame(models, list(_places(record).values()), LEAST)
-    return _picture(record, models, frame, name, ways or _ways(record), named)
+    frame = _frame(record.models, list(_places(record).values()), LEAST)
+    return _picture(record, frame, name, ways or _ways(record), named)
 
 
 def _ways(record: Record) -> Ways:
@@ -80,21 +78,20 @@ def _ways(record: Record) -> Ways:
     return {"way": record.original, "last": last}
 
 
-def close_up(record: Record, models: Sequence[Drawn]) -> str:
+def close_up(record: Record) -> str:
     """A map of only what is left and f's end; "" if it would add little to the whole map."""
-    kept = [each for each in models if each.model.name in record.kept]
+    kept = [each for each in record.models if each.model.name in record.kept]
     places = _places(record)
     if "end" not in places or not kept:
         return ""
     frame = _frame(kept, [places["end"]], CLOSE, CLOSE_HIGH)
-    if frame.scale < CLOSER * _frame(models, list(places.values()), LEAST).scale:
+    if frame.scale < CLOSER * _frame(record.models, list(places.values()), LEAST).scale:
         return ""
-    return _picture(record, models, frame, "near", _ways(record), None)
+    return _picture(record, frame, "near", _ways(record), None)
 
 
-def _picture(
-    record: Record, models: Sequence[Drawn], frame: Frame, name: str, ways: Ways, named: Collection[str] | None
-) -> str:
+def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collection[str] | None) -> str:
+    models = record.models
     places = {sign: point for sign, point in _places(record).items() if frame.holds(point)}
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS

@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.rates import anytime_interval
 from ddenv.page.blocks import Block, Cell, Paragraph, Part, Picture, Section, Strong, Table, named, percent, say
 from ddenv.page.step_chart import LEFT, At, axes, opening, path, scale, steps
-from ddenv.report.report_map import CORNERS, picture
+from ddenv.report.report_map import picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import file_name, run_path
 from ddenv.study.results import Found, Group, Row, Theirs, spread, theirs
@@ -115,8 +115,6 @@ def _said(left: tuple[str, ...], cells: Sequence[Found], of_them: int) -> Iterat
 
 
 def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
-    from ddenv.map.footprints import plan
-
     try:
         record = read_run(run_path(folder, found.cell))
     except UserError as error:
@@ -128,7 +126,7 @@ def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
     alternative = (
         f"The world of {plain(found.cell.scenario.name)} from above: what is left is solid, what was removed is faint."
     )
-    yield Picture(name, picture(record, plan(record.world, CORNERS), name), alternative)
+    yield Picture(name, picture(record, name), alternative)
 
 
 def section(folder: Path, group: Group) -> Section:
