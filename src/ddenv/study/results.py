@@ -259,14 +259,6 @@ class Group:
         return tuple(each for row in self.rows for each in row.minimal)
 
     @property
-    def ends(self) -> dict[tuple[str, ...], list[Found]]:
-        """The cells that came to an end, by the models that are left."""
-        ends = defaultdict[tuple[str, ...], list[Found]](list)
-        for each in self.over:
-            ends[each.left].append(each)
-        return ends
-
-    @property
     def models(self) -> int:
         """How many models of its world can be removed; 0 before the first run."""
         return max(len(each.elements) for row in self.rows for each in row.found)

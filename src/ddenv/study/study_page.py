@@ -28,14 +28,14 @@ from ddenv.page.blocks import (
 )
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
-from ddenv.settings import SETTINGS, Setting
+from ddenv.report.repeat import value_words
+from ddenv.settings import SETTINGS
 from ddenv.study.plan import RUNS, Plan, run_path
 from ddenv.study.results import Found, groups, read_cell, theirs
 from ddenv.study.tables import best, section
 from ddenv.study.work import Sitting
 from ddenv.text import count, plain
 from ddenv.world.access import write_file
-from ddenv.world.scenario import Scenario
 
 STEM = "study"
 # These differ between cells.
@@ -182,13 +182,17 @@ def _row(folder: Path, each: Found) -> dict[str, object]:
 
 def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:
     """The section on how the study was made."""
+    # A name that begins with a dash would be an option.
+    start = f"./{folder}" if str(folder).startswith("-") else folder
+    example = shlex.quote(plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv"))
     blocks: list[Block] = [
         _settings(plan),
-        *_sittings(sittings),
+        *([_sittings(sittings)] if sittings else []),
         *_computed(found),
         say("What the columns mean:"),
         Table(("column", "meaning"), tuple(yaml.safe_load(COLUMNS.read_text()).items())),
-        *_again(plan, folder),
+        say("Each cell is a run that can be watched, continued and reported:"),
+        Code((f"ddenv open {example}", f"ddenv certify {example}")),
     ]
     return Section("How it was made", tuple(blocks))
 
@@ -197,7 +201,7 @@ def _settings(plan: Plan) -> Table:
     """The settings that any method uses, with a column for each scenario."""
     used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
     rows = [
-        (one.label, *(_value(scenario, one) for scenario in plan.scenarios))
+        (one.label, *(value_words(getattr(getattr(each, one.section), one.name)) for each in plan.scenarios))
         for one in SETTINGS.values()
         if one.section != "simulation" and one.name not in OF_A_CELL and (not one.used_by or used & set(one.used_by))
     ]
@@ -207,14 +211,7 @@ def _settings(plan: Plan) -> Table:
     return Table(head, tuple(rows), frozenset(range(1, len(head))))
 
 
-def _value(scenario: Scenario, one: Setting) -> str:
-    value = getattr(getattr(scenario, one.section), one.name)
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
+def _sittings(sittings: Sequence[Sitting]) -> Table:
     rows = tuple(
         (
             *(f"{moment(one.begun)} UTC", duration(one.seconds), str(one.jobs), thousands(one.tests)),
@@ -223,11 +220,11 @@ def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
         for one in sittings
     )
     head = ("worked on", "for", "workers", "tests made", "machine", "versions")
-    return [Table(head, rows, frozenset({1, 2, 3}))] if rows else []
+    return Table(head, rows, frozenset({1, 2, 3}))
 
 
 def _computed(found: Sequence[Found]) -> Iterator[Block]:
-    """The versions, since tests of different versions may differ."""
+    # Tests of different versions may differ.
     drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
     versions = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
     taken = sum(each.taken_over for each in found)
@@ -240,13 +237,3 @@ def _computed(found: Sequence[Found]) -> Iterator[Block]:
             f"{thousands(taken)} tests were reused from another cell with the same models and the same seed: the simulation is "
             "deterministic to the last bit. They count in each cell, with their time."
         )
-
-
-def _again(plan: Plan, folder: Path) -> list[Block]:
-    # A name that begins with a dash would be an option.
-    start = f"./{folder}" if str(folder).startswith("-") else folder
-    example = plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv")
-    return [
-        say("Each cell is a run that can be watched, continued and reported:"),
-        Code((f"ddenv open {shlex.quote(example)}", f"ddenv certify {shlex.quote(example)}")),
-    ]

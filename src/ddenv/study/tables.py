@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
@@ -27,8 +27,6 @@ WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
 MOST_WORLDS, MOST_LEFT = 4, 12
 # The maximum number of models that are named.
 MOST_NAMES = 8
-# With more methods than this, the details are not a table but a sentence for each set of models that is left.
-MOST_ROWS = 12
 # The maximum number of cells with the same problem that are named.
 MOST_CELLS = 3
 BEHIND = (
@@ -97,50 +95,44 @@ def _line_end(row: Row) -> str:
 
 def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
     """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
-    ends = group.ends
+    ends = defaultdict[tuple[str, ...], list[Found]](list)
+    for each in group.over:
+        ends[each.left].append(each)
     ranked = sorted(ends.items(), key=lambda one: (-sum(each.minimal for each in one[1]), -len(one[1])))
     for number, (left, cells) in enumerate(ranked[:MOST_WORLDS], start=1):
-        yield say(*_said(left, cells, len(group.over)))
-        yield from _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
+        minimal = any(each.minimal for each in cells)
+        what = "The minimal world" if minimal else "What is left, not shown to be minimal"
+        of_them = f", the end of {len(cells)} of {len(group.over)} cells" if len(group.over) > 1 else ""
+        these = named(left, MOST_LEFT) or ("nothing that can be removed",)
+        yield say(f"{what} (the paper's Figure 3){of_them}: ", *these, ".")
+        yield _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
     if len(ranked) > MOST_WORLDS:
         yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')}, which fewer cells found.")
 
 
-def _said(left: tuple[str, ...], cells: Sequence[Found], of_them: int) -> Iterator[Part]:
-    minimal = any(each.minimal for each in cells)
-    yield f"{'The minimal world' if minimal else 'What is left, not shown to be minimal'} (the paper's Figure 3)"
-    yield f", the end of {len(cells)} of {of_them} cells: " if of_them > 1 else ": "
-    yield from named(left, MOST_LEFT) or ("nothing that can be removed",)
-    yield "."
-
-
-def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
+def _map(folder: Path, found: Found, name: str) -> Block:
     try:
         record = read_run(run_path(folder, found.cell))
     except UserError as error:
-        yield say(f"No map: {plain(error)}", notice=True)
-        return
+        return say(f"No map: {plain(error)}", notice=True)
     if record.world is None:
-        yield say("No map: the world cannot be read.", notice=True)
-        return
-    alternative = (
-        f"The world of {plain(found.cell.scenario.name)} from above: what is left is solid, what was removed is faint."
-    )
-    yield Picture(name, picture(record, name), alternative)
+        return say("No map: the world cannot be read.", notice=True)
+    scenario = plain(found.cell.scenario.name)
+    words = f"The world of {scenario} from above: what is left is solid, what was removed is faint."
+    return Picture(name, picture(record, name), words)
 
 
 def section(folder: Path, group: Group) -> Section:
     """The section on one scenario."""
-    name = plain(group.scenario.name)
-    models = f", {count(group.models, 'model')}" if group.models else ""
-    title = f"{name}{models}" + (f" (Table {paper[0].table} of the paper)" if (paper := _papers(group)) else "")
+    file, paper = file_name(group.scenario), _papers(group)
+    title = plain(group.scenario.name) + (f", {count(group.models, 'model')}" if group.models else "")
+    title += f" (Table {paper[0].table} of the paper)" if paper else ""
     blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
     blocks += [numbers(group), *_slices(group), *_problems(group)]
     if group.over:
-        blocks += [behind(group)] if len(group.rows) <= MOST_ROWS else _in_short(group)
         caption = "Models left after each test of the search, a line for each method (the paper's Figure 2):"
-        blocks += [say(caption), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), caption)]
-    blocks += worlds(folder, group, file_name(group.scenario))
+        blocks += [behind(group), say(caption), Picture(f"figure-2-{file}", chart(group), caption)]
+    blocks += worlds(folder, group, file)
     return Section(title, tuple(blocks))
 
 
@@ -210,45 +202,21 @@ def behind(group: Group) -> Table:
     return Table(BEHIND, tuple(_behind(row) for row in group.rows), frozenset({1, 6, 7}))
 
 
-def _in_short(group: Group) -> Iterator[Paragraph]:
-    """The details of many methods, a sentence for each set of models that is left."""
-    for left, cells in group.ends.items():
-        reruns = spread([each.reruns / each.tests for each in cells], percent)
-        certified = f"certified in {sum(each.minimal for each in cells)} of them; re-runs {reruns} of the search tests"
-        rates = f"f in the whole world {_in_whole(cells)}, in what is left {_in_left(cells)}"
-        words = (
-            f" are left in {len(cells)} of {count(len(group.over), 'cell')}, {certified}; {rates}, without one of them "
-        )
-        yield say(*(named(left, MOST_NAMES) or ("none",)), f"{words}{_without(cells)}.")
-
-
 def _behind(row: Row) -> tuple[Cell, ...]:
     over = row.over
+    claims = [claim for each in over if each.certificate for claim in each.certificate.claims]
+    of_left = [claim for claim in claims if claim.without is None]
+    # The highest of the rates without one of the models.
+    without = max((claim for claim in claims if claim.without), key=lambda claim: claim.high, default=None)
     reruns = spread([each.reruns / each.tests for each in over if each.tests], percent)
     bound = "–" if row.bound is None else f"{row.bound:g}"
     back = spread([each.steps_back for each in over], _whole)
-    rates = (_in_whole(row.found), _in_left(over), _without(over))
+    rates = (
+        _rate(sum(each.whole_f for each in row.found), sum(each.whole_runs for each in row.found)),
+        _rate(sum(claim.shown for claim in of_left), sum(claim.runs for claim in of_left)),
+        "–" if without is None else f"at most {_rate(without.shown, without.runs)}",
+    )
     return row.method.label, reruns, _left(over), *rates, back, bound
-
-
-def _in_whole(cells: Sequence[Found]) -> str:
-    """How often f showed in all runs of the whole world."""
-    return _rate(sum(each.whole_f for each in cells), sum(each.whole_runs for each in cells))
-
-
-def _in_left(cells: Sequence[Found]) -> str:
-    """How often f showed in fresh runs of what is left."""
-    claims = [claim for each in cells if each.certificate for claim in each.certificate.claims if claim.without is None]
-    return _rate(sum(claim.shown for claim in claims), sum(claim.runs for claim in claims))
-
-
-def _without(cells: Sequence[Found]) -> str:
-    """How often f showed in fresh runs without one of the models that are left: the highest of these rates."""
-    claims = [claim for each in cells if each.certificate for claim in each.certificate.claims if claim.without]
-    if not claims:
-        return "–"
-    most = max(claims, key=lambda claim: claim.high)
-    return f"at most {_rate(most.shown, most.runs)}"
 
 
 def _rate(shown: int, runs: int) -> str:
