@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from ddenv.map.footprints import Footprint
 from ddenv.map.paint import Canvas
-from ddenv.map.raster import EMPTY, View, extent, label_cells, masks, owners, pack, threads
+from ddenv.map.raster import EMPTY, SHORT, View, extent, label_cells, masks, owners
 from ddenv.workbench.map.map_colors import mixed
 from ddenv.workbench.map.model_looks import Kept, fill, looks
-from ddenv.world.extent import convex_hull
+from ddenv.world.extent import convex_hull, polygon_area
 from tests.tiers import examples
 
 VIEW = View(0.3, -0.2, 0.5, 12, 6)
@@ -40,14 +40,18 @@ def slowly(each: Footprint, view: View) -> tuple[np.ndarray, np.ndarray]:
             sides = np.roll(corners, -1, axis=0) - corners
             away = np.array([column + 0.5, row + 0.5]) - corners
             turns = sides[:, 0] * away[:, 1] - sides[:, 1] * away[:, 0]
-            inside[row, column] |= len(corners) > 2 and bool((turns <= 0).all())
-            unsure[row, column] |= bool((abs(turns) < 1e-6).any())
+            # What is thinner than a pixel is widened to one.
+            length = np.hypot(*np.ptp(corners, axis=0))
+            width = abs(polygon_area(corners)) / max(length, 1e-9)
+            wider = (1 - width) / 2 if length > SHORT and width < 1 else 0.0
+            low, high = np.floor(corners.min(axis=0) - wider), np.ceil(corners.max(axis=0) + wider)
+            if len(corners) > 2 and (low <= (column, row)).all() and ((column, row) < high).all():
+                beyond = turns - wider * np.hypot(*sides.T)
+                inside[row, column] |= bool((beyond <= 0).all())
+                unsure[row, column] |= bool((abs(beyond) < 1e-6).any())
     x, y = view.pixels(np.array([each.center]))[0]
     if (each.area < 4 * view.scale**2 or not each.polygons) and 0 <= x < view.columns and 0 <= y < 2 * view.rows:
         inside[int(y), int(x)], unsure[int(y), int(x)] = True, False
-    # What is thinner than a pixel fills more than it covers, see below.
-    _, dots = threads(pack([each]), view)
-    inside[dots[:, 1], dots[:, 0]], unsure[dots[:, 1], dots[:, 0]] = True, False
     return inside, unsure
 
 

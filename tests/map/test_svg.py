@@ -19,7 +19,8 @@ def tree_of(*models: str, file: str = "w.sdf", **marks):
 
 
 def tooltips(tree) -> list[str]:
-    return [group.findtext(f"{SVG}title") for group in tree.iter(f"{SVG}g") if group.find(f"{SVG}title") is not None]
+    parts = (part for part in tree.iter() if part is not tree)
+    return [part.findtext(f"{SVG}title") for part in parts if part.find(f"{SVG}title") is not None]
 
 
 def words(tree) -> list[str]:
@@ -46,8 +47,8 @@ def test_the_head_names_the_file_and_counts():
 
 def test_only_what_can_move_is_dashed():
     tree = tree_of(box("a", 0, 0), box("b", 3, 0, static=False))
-    dashed = [group for group in tree.iter(f"{SVG}g") if group.get("stroke-dasharray")]
-    assert [group.findtext(f"{SVG}title").splitlines()[0] for group in dashed] == ["b"]
+    dashed = [path for path in tree.iter(f"{SVG}path") if "dynamic" in path.get("class").split()]
+    assert [path.findtext(f"{SVG}title").splitlines()[0] for path in dashed] == ["b"]
 
 
 def test_names_are_text_and_nothing_else():
@@ -55,7 +56,7 @@ def test_names_are_text_and_nothing_else():
     assert tooltips(tree)[0].startswith("<b>&amp;\"' [bold] ]]> \N{REPLACEMENT CHARACTER} x\n")
     assert "<i>&.sdf" in words(tree)
     assert {element.tag for element in tree.iter()} <= {
-        SVG + tag for tag in ("svg", "title", "rect", "g", "path", "text", "clipPath")
+        SVG + tag for tag in ("svg", "style", "title", "rect", "g", "path", "text", "clipPath")
     }
 
 

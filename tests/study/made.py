@@ -10,9 +10,8 @@ import yaml
 
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.fold import fold
-from ddenv.study.plan import Cell, Plan, make_plan
+from ddenv.study.plan import Cell, Plan, make_plan, run_path
 from ddenv.study.results import Found, read_cell
-from ddenv.study.study_folder import run_path
 from ddenv.words.claims import verdict_on
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA

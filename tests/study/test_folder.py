@@ -6,7 +6,8 @@ import pytest
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.study.study_folder import ABOUT, RUNS, Sitting, machine, opened, sittings, versions, write_sittings
+from ddenv.study.plan import RUNS
+from ddenv.study.work import ABOUT, Sitting, machine, opened, sittings, versions, write_sittings
 
 TIMES = (
     Sitting(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),

@@ -7,8 +7,8 @@ import sqlite3
 import pytest
 
 from ddenv import __version__
+from ddenv.study.plan import RUNS, run_path
 from ddenv.study.results import read_cell
-from ddenv.study.study_folder import RUNS, run_path
 from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_moments
 
@@ -51,9 +51,9 @@ def test_a_minimal_cell(done):
     assert (found.certificate_tests, found.certificate_seconds) == (FRESH, 2.0 * FRESH)
     assert found.sizes == ((4, 11), (5, 2), (13, 2))
     # One fresh run was ahead of time.
-    assert (found.ahead, found.taken, found.steps_back, found.version) == (1, 0, 0, __version__)
+    assert (found.ahead, found.taken_over, found.steps_back, found.version) == (1, 0, 0, __version__)
     assert (found.baseline.failures, found.baseline.runs) == (3, 4)
-    assert (found.whole_shown, found.whole_runs) == (3, 4)
+    assert (found.whole_f, found.whole_runs) == (3, 4)
 
 
 def test_tests_made_ahead_of_time_do_not_count(tmp_path, cell, run):
@@ -138,7 +138,7 @@ def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):
     run.write("test_finished", test=test, **data, wall_seconds=5.0, taken="another")
     run.judge(0, "similar", [test])
     found = read_cell(tmp_path, cell)
-    assert (found.tests, found.taken, found.seconds) == (5, 1, 13.0)
+    assert (found.tests, found.taken_over, found.seconds) == (5, 1, 13.0)
 
 
 PROBLEMS = {

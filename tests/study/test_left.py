@@ -7,9 +7,8 @@ import pytest
 from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.store import RunFile
-from ddenv.study.conduct import seconds_left
-from ddenv.study.plan import sizes
-from ddenv.study.study_folder import RUNS, run_path
+from ddenv.study.conduct import seconds_left, sizes
+from ddenv.study.plan import RUNS, run_path
 from ddenv.study.work import Work
 from tests.study.made import FRESH, TESTS, crates, plan_of, reduced
 

@@ -10,8 +10,9 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from ddenv.study.study_folder import Sitting, run_path
+from ddenv.study.plan import run_path
 from ddenv.study.study_page import write_study
+from ddenv.study.work import Sitting
 from tests.report.test_report import EVIL, Page
 from tests.study.made import LONGEST, crates, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_run

@@ -10,9 +10,8 @@ from ddenv.evidence.certificate import MOST_ALONE, MOST_BROKEN, MOST_PAIRS
 from ddenv.reduction.procedure import MOST_STEPS_BACK
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS
 from ddenv.runfile.state import FIRST_FRESH_RUN
-from ddenv.study.plan import PAIRS, make_plan
+from ddenv.study.plan import PAIRS, make_plan, run_path
 from ddenv.study.results import theirs
-from ddenv.study.study_folder import run_path
 from tests.study.made import LONGEST, crates, plan_of
 
 LONGEST_FILE_NAME = 255

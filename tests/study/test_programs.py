@@ -10,7 +10,8 @@ import pytest
 
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
-from ddenv.study.study_folder import run_path, sittings
+from ddenv.study.plan import run_path
+from ddenv.study.work import sittings
 from tests.study.made import plan_of, wall
 from tests.study.quick import Lab
 from tests.study.test_work import fails, study, told

@@ -43,12 +43,11 @@ def found(cell, tests, left=1, **other):
         "reruns": tests // 2,
         "seconds": 3.0 * tests,
         "baseline": BaselineFinished(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1, Outcomes({}, {})),
-        "baseline_runs": 10,
         "sizes": ((10, 16), (tests, left)),
         "certificate": certificate(left),
         "certificate_tests": 40,
         "certificate_seconds": 120.0,
-        "whole_shown": 19,
+        "whole_f": 19,
         "whole_runs": 20,
         "misses": 4,
     }

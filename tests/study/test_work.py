@@ -17,8 +17,9 @@ from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.study.conduct import Progress, conduct
+from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
-from ddenv.study.study_folder import run_path, sittings
+from ddenv.study.work import sittings
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
 from tests.waiting import PATIENCE, wait_until
@@ -87,11 +88,11 @@ def test_what_another_cell_has_tested_is_not_tested_again(undisturbed, two_by_tw
     folder, _, lab = undisturbed
     found = [read_cell(folder, cell) for cell in two_by_two.cells]
     # Nothing between scenarios, whose seeds differ.
-    assert [each.taken > 0 for each in found] == [False, True, False, True]
-    assert sum(each.tests + each.certificate_tests + each.ahead - each.taken for each in found) == lab.made
+    assert [each.taken_over > 0 for each in found] == [False, True, False, True]
+    assert sum(each.tests + each.certificate_tests + each.ahead - each.taken_over for each in found) == lab.made
     assert [each.tests for each in found[:2]] == [each.tests for each in found[2:]]
     # The second cell ends with the same models: it has the whole certificate of the first.
-    assert [each.taken >= each.certificate_tests for each in found] == [False, True, False, True]
+    assert [each.taken_over >= each.certificate_tests for each in found] == [False, True, False, True]
 
 
 def test_run_again_it_makes_no_test(undisturbed, two_by_two, lab, tmp_path):

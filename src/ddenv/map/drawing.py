@@ -1,9 +1,12 @@
-"""What drawings of a world share: which part they show and how large, axes, outlines, and the names on them."""
+"""What drawings of a world share: which part they show and how large, axes, outlines, marks, and the names on them.
+
+They have no colours but classes: grid, origin, tick, frame, plate, label, badge, sign.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
@@ -25,6 +28,8 @@ SIZES = (12.0, 10.5, 9.0)
 WIDTH, HEIGHT = 0.58, 1.15
 GAP = 3.0
 LONGEST_LABEL = 26  # columns
+LEAST = 11.0  # the size of letters that are drawn, also where a smaller size fits better, pixels
+MARK = 14.0  # half the size of a mark, with some space, pixels
 # Maximum fraction of a name that may cover other models.
 MOST_COVERED = 0.3
 # A model at least this many times larger than a name may carry the name of another model.
@@ -109,24 +114,47 @@ def tick_text(value: float, step: float) -> str:
     return f"{value:.{decimals}f}"
 
 
-def axes(frame: Frame, most: int, grid: Callable[[float], str], text: str) -> Iterator[str]:
-    """Grid lines with their numbers, at most `most` along an axis, and the names of the axes.
+def plot(frame: Frame, most: int, name: str, inside: Iterable[str], above: Iterable[str]) -> Iterator[str]:
+    """A map in its axes: what is `inside` is cut off at its frame, names and marks `above` it are not.
 
-    `grid(value)` are the attributes of the line at `value` m, `text` those of a number.
+    An axis has at most `most` numbers; `name` is different for each map of a page.
     """
     left, top, right, bottom = frame.box
     step = tick_step(float(max(frame.high - frame.low)), most)
     for value in ticks(frame.low[0], frame.high[0], step):
         x, _ = frame.pixel((value, 0.0))
-        yield f'<path {grid(value)} d="M{x:.1f} {top:.1f}V{bottom:.1f}"/>'
-        yield f'<text {text} x="{x:.1f}" y="{bottom + 17:.1f}" text-anchor="middle">{tick_text(value, step)}</text>'
+        yield f'<path class="{_grid(value)}" d="M{x:.1f} {top:.1f}V{bottom:.1f}"/>'
+        yield tick(x, bottom + 17, "middle", tick_text(value, step))
     for value in ticks(frame.low[1], frame.high[1], step):
         _, y = frame.pixel((0.0, value))
-        yield f'<path {grid(value)} d="M{left:.1f} {y:.1f}H{right:.1f}"/>'
-        yield f'<text {text} x="{left - 7:.1f}" y="{y + 4:.1f}" text-anchor="end">{tick_text(value, step)}</text>'
-    yield f'<text {text} x="{right:.1f}" y="{bottom + 34:.1f}" text-anchor="end">x, m</text>'
-    y = (top + bottom) / 2
-    yield f'<text {text} transform="translate(13 {y:.1f}) rotate(-90)" text-anchor="middle">y, m</text>'
+        yield f'<path class="{_grid(value)}" d="M{left:.1f} {y:.1f}H{right:.1f}"/>'
+        yield tick(left - 7, y + 4, "end", tick_text(value, step))
+    yield tick(right, bottom + 34, "end", "x, m")
+    turned = f"translate(13 {(top + bottom) / 2:.1f}) rotate(-90)"
+    yield f'<text class="tick" transform="{turned}" text-anchor="middle">y, m</text>'
+    rectangle = f'x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{bottom - top:.1f}"'
+    yield f'<clipPath id="{name}"><rect {rectangle}/></clipPath>'
+    yield from (f'<g clip-path="url(#{name})">', *inside, "</g>", *above)
+    yield f'<rect class="frame" {rectangle}/>'
+
+
+def _grid(value: float) -> str:
+    return "grid" if value else "grid origin"
+
+
+def tick(x: float, y: float, anchor: str, words: str) -> str:
+    """A number or a name at an axis."""
+    return f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{words}</text>'
+
+
+def at(point: Point, drawn: str) -> str:
+    """What is drawn around (0, 0), at a place in pixels."""
+    return f'<g transform="translate({point[0]:.1f} {point[1]:.1f})">{drawn}</g>'
+
+
+def badge(name: str, letter: str) -> str:
+    """The mark of the start or the goal, around (0, 0)."""
+    return f'<circle class="badge {name}" r="10"/><text class="sign" y="4.5">{letter}</text>'
 
 
 def path_of(each: Drawn, frame: Frame, coarse: bool = False) -> str:
@@ -140,12 +168,6 @@ def path_of(each: Drawn, frame: Frame, coarse: bool = False) -> str:
     return "".join("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in shape) + "Z" for shape in corners)
 
 
-def rectangle(box: np.ndarray) -> str:
-    """The attributes of the rectangle with this left, top, right and bottom."""
-    left, top, right, bottom = box
-    return f'x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{bottom - top:.1f}"'
-
-
 def written(text: str) -> str:
     """`text` as it stands in an SVG file: it may come from an untrusted one."""
     return escape(plain(text))
@@ -155,13 +177,14 @@ def written(text: str) -> str:
 
 
 def labels(
-    models: Sequence[Drawn], wanted: Sequence[int], frame: Frame, points: Sequence[Point], around: float
-) -> Iterator[tuple[Drawn, Label]]:
-    """The names of the `wanted` of `models` that have room for one; none comes nearer to `points` (m) than `around`, pixels."""
+    models: Sequence[Drawn], wanted: Iterable[int], most: int, frame: Frame, points: Sequence[Point]
+) -> Iterator[str]:
+    """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m."""
+    largest = sorted(wanted, key=lambda index: -models[index].outline.area)[:most]
     names = [shortened(each.model.name, LONGEST_LABEL) for each in models]
-    marks = [np.array([x - around, y - around, x + around, y + around]) for x, y in map(frame.pixel, points)]
-    placed = place_labels(names, [_spot(each, frame) for each in models], wanted, frame.box, marks)
-    return ((models[index], label) for index, label in placed.items())
+    marks = [np.array([x - MARK, y - MARK, x + MARK, y + MARK]) for x, y in map(frame.pixel, points)]
+    placed = place_labels(names, [_spot(each, frame) for each in models], largest, frame.box, marks)
+    return (_plate(label) for label in placed.values())
 
 
 def _spot(each: Drawn, frame: Frame) -> Spot:
@@ -171,18 +194,15 @@ def _spot(each: Drawn, frame: Frame) -> Spot:
     return spot(frame.pixels(np.array([each.outline.center])) + around, frame.box, False)
 
 
-def name_plate(label: Label, ground: str, text: str, least: float = 0.0) -> str:
-    """A name on its own background, so that outlines and neighbours do not make it hard to read.
-
-    `ground` and `text` are the attributes of both; the letters have at least the size `least`, pixels.
-    """
-    size = max(least, label.size)
+def _plate(label: Label) -> str:
+    """A name on its own background, so that outlines and neighbours do not make it hard to read."""
+    size = max(LEAST, label.size)
     long, high = 1.04 * label.length * size / label.size + 4, HEIGHT * size
     turn = f" rotate({label.angle:.1f})" if abs(label.angle) > 0.05 else ""
     return (
         f'<g transform="translate({label.x:.1f} {label.y:.1f}){turn}">'
-        f'<rect {ground} {rectangle(np.array([-long, -high, long, high]) / 2)} rx="2"/>'
-        f'<text {text} y="{0.35 * size:.1f}" font-size="{size:g}">{written(label.text)}</text></g>'
+        f'<rect class="plate" x="{-long / 2:.1f}" y="{-high / 2:.1f}" width="{long:.1f}" height="{high:.1f}" rx="2"/>'
+        f'<text class="label" y="{0.35 * size:.1f}" font-size="{size:g}">{written(label.text)}</text></g>'
     )
 
 

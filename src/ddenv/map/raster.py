@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # Tolerance of the fill test at the edges of outlines, pixels.
 SLACK = 1e-9
-# A model thinner than a pixel and longer than this many of them is drawn as a line.
+# A polygon thinner than a pixel and longer than this many of them is widened to one: it would have gaps, or vanish.
 SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
@@ -117,13 +117,16 @@ def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -
 class Outlines:
     """The polygons of all models in flat arrays: polygon p has `counts[p]` of the `corners` (M, 2) m, from `first[p]` on.
 
-    `models[p]` is the model of polygon p. Per model: `centers` (N, 2) m, `areas` (N,) m^2, and `bare` (N,) if it has none.
+    `models[p]` is the model of polygon p; `lengths[p]` and `widths[p]` are its diagonal and its mean width across it, m.
+    Per model: `centers` (N, 2) m, `areas` (N,) m^2, and `bare` (N,) if it has none.
     """
 
     corners: np.ndarray
     first: np.ndarray
     counts: np.ndarray
     models: np.ndarray
+    lengths: np.ndarray
+    widths: np.ndarray
     centers: np.ndarray
     areas: np.ndarray
     bare: np.ndarray
@@ -145,11 +148,23 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
     """Footprints as arrays, for repeated drawing."""
     polygons = [(index, polygon) for index, each in enumerate(prints) for polygon in each.polygons if len(polygon)]
     counts = np.array([len(polygon) for _, polygon in polygons], dtype=np.intp)
+    corners = np.concatenate([polygon for _, polygon in polygons]) if polygons else np.zeros((0, 2))
+    first = np.cumsum(counts) - counts
+    following = np.arange(1, len(corners) + 1)
+    following[first + counts - 1] = first
+    with np.errstate(invalid="ignore", over="ignore"):
+        low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
+        here = corners - np.repeat(low, counts, axis=0)
+        ahead = here[following]
+        areas = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
+        lengths = np.hypot(*(high - low).T)
     return Outlines(
-        np.concatenate([polygon for _, polygon in polygons]) if polygons else np.zeros((0, 2)),
-        np.cumsum(counts) - counts,
+        corners,
+        first,
         counts,
         np.array([index for index, _ in polygons], dtype=np.intp),
+        lengths,
+        areas / np.maximum(lengths, 1e-12),
         np.array([each.center for each in prints]).reshape(-1, 2),
         np.array([each.area for each in prints]),
         np.array([not each.polygons for each in prints], dtype=bool),
@@ -164,79 +179,30 @@ def masks(prints: Sequence[Footprint], view: View) -> Spans:
 def spans(outlines: Outlines, view: View) -> Spans:
     """The pixels of each model of packed outlines."""
     width, height = view.columns, 2 * view.rows
-    polygon, row, left, right = rows_of(view.pixels(outlines.corners), outlines, width, height)
+    polygon, row, left, right = rows_of(outlines, view)
     # A model smaller than a pixel stays visible.
     tiny = np.flatnonzero((outlines.areas < 4 * view.scale**2) | outlines.bare)
     middle = view.pixels(outlines.centers[tiny])
     seen = ((middle >= 0) & (middle < (width, height))).all(axis=1)
     tiny, dots = tiny[seen], middle[seen].astype(np.intp)
-    thin, thread = threads(outlines, view)
-    models = np.concatenate([outlines.models[polygon], tiny, thin])
-    dots = np.concatenate([dots, thread])
+    models = np.concatenate([outlines.models[polygon], tiny])
     starts = np.concatenate([row * width + left, dots[:, 1] * width + dots[:, 0]])
     lengths = np.concatenate([right - left + 1, np.ones(len(dots), dtype=np.intp)])
     order = np.argsort(models, kind="stable")
     return Spans(models[order], starts[order], lengths[order])
 
 
-def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels along polygons that are thinner than one, which would have gaps or vanish: their models, and (column, row) of each."""
-    corners, first, last = view.pixels(outlines.corners), outlines.first, outlines.first + outlines.counts - 1
-    with np.errstate(invalid="ignore", over="ignore"):
-        low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
-        extent = high - low
-        # By the cross products of the edges.
-        following = np.arange(1, len(corners) + 1)
-        following[last] = first
-        here = corners - np.repeat(low, outlines.counts, axis=0)
-        ahead = here[following]
-        area = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
-        length = np.hypot(extent[:, 0], extent[:, 1])
-        thin = np.isfinite(length) & (length > SHORT) & (area < length) & (outlines.counts > 2)
-        thin &= (high >= 0).all(axis=1) & (low < (view.columns, 2 * view.rows)).all(axis=1)
-    which = np.flatnonzero(thin)
-    ends, which = _in_view(_ends(corners, outlines, which, extent), which, view)
-    steps = np.ceil(2 * np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)).astype(np.intp) + 2
-    along = (_within(steps) / np.repeat(steps - 1, steps))[:, None]
-    begin, end = np.repeat(ends[:, 0], steps, axis=0), np.repeat(ends[:, 1], steps, axis=0)
-    dots = np.floor(begin * (1 - along) + end * along)
-    seen = ((dots >= 0) & (dots < (view.columns, 2 * view.rows))).all(axis=1)
-    return np.repeat(outlines.models[which], steps)[seen], dots[seen].astype(np.intp)
+def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
+    """Polygon, row, first and last column of each row of pixels in a polygon.
 
-
-def _ends(corners: np.ndarray, outlines: Outlines, which: np.ndarray, extent: np.ndarray) -> np.ndarray:
-    """The two ends of long thin polygons, in the middle of their short sides, shape (N, 2, 2)."""
-    ends = np.empty((len(which), 2, 2))
-    for place, polygon in enumerate(which.tolist()):
-        begin = outlines.first[polygon]
-        own = corners[begin : begin + outlines.counts[polygon]]
-        order = np.argsort(own[:, int(extent[polygon, 1] > extent[polygon, 0])], kind="stable")
-        half = 2 if len(own) == 4 else 1
-        ends[place] = own[order[:half]].mean(axis=0), own[order[-half:]].mean(axis=0)
-    return ends
-
-
-def _in_view(ends: np.ndarray, which: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """The parts of lines (N, 2, 2) that are in the view, and whose lines they are."""
-    begin, way = ends[:, 0], ends[:, 1] - ends[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        borders = np.stack([-begin / way, ((view.columns, 2 * view.rows) - begin) / way])
-    borders = np.where(way == 0, np.array([-np.inf, np.inf])[:, None, None], borders)
-    enter = np.clip(borders.min(axis=0).max(axis=1), 0, 1)
-    leave = np.clip(borders.max(axis=0).min(axis=1), 0, 1)
-    seen = enter < leave
-    parts: np.ndarray = begin[:, None] + way[:, None] * np.stack([enter, leave], axis=1)[:, :, None]
-    return parts[seen], which[seen]
-
-
-def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) -> tuple[np.ndarray, ...]:
-    """Polygon, row, first and last column of each row of pixels in a polygon; `corners` are those of `outlines` in pixels.
-
-    A pixel belongs to a polygon if its centre is inside.
+    A pixel belongs to a polygon if its centre is inside, or to a thin one if it is at most `wider` outside.
     """
+    width, height = view.columns, 2 * view.rows
+    corners, widths = view.pixels(outlines.corners), outlines.widths / view.scale
+    wider = np.where((widths < 1) & (outlines.lengths > SHORT * view.scale), (1 - widths) / 2, 0.0)
     with np.errstate(invalid="ignore"):
-        low = np.floor(np.minimum.reduceat(corners, outlines.first))
-        high = np.ceil(np.maximum.reduceat(corners, outlines.first))
+        low = np.floor(np.minimum.reduceat(corners, outlines.first) - wider[:, None])
+        high = np.ceil(np.maximum.reduceat(corners, outlines.first) + wider[:, None])
     whole = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1) & (outlines.counts > 2)
     low = np.clip(np.where(whole[:, None], low, 0), 0, (width, height)).astype(np.intp)
     high = np.clip(np.where(whole[:, None], high, 0), 0, (width, height)).astype(np.intp)
@@ -253,7 +219,7 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
         bx, by = corners[start + (edge + 1) % count].T
         # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
         dx, dy = bx - ax, by - ay
-        lean = dx * (row[some] + 0.5 - ay) - SLACK
+        lean = dx * (row[some] + 0.5 - ay) - SLACK - wider[polygon[some]] * np.hypot(dx, dy)
         up, down, flat = dy > 0, dy < 0, dy == 0
         with np.errstate(over="ignore"):
             at = ax + lean / np.where(flat, 1.0, dy) - 0.5

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from ddenv.map.colors import RGB, blend, packed, readable
-from ddenv.map.drawing import Frame, Point, axes, labels, name_plate, path_of, rectangle, tick_step, tick_text, written
+from ddenv.map.colors import RGB, blend, packed
+from ddenv.map.drawing import Frame, Point, at, badge, labels, path_of, plot, tick, tick_step, tick_text, written
 from ddenv.map.footprints import Drawn, plan
 from ddenv.text import count, shortened
 from ddenv.world.model import World, is_ground
@@ -19,9 +19,26 @@ LEAST = 4.0  # minimum extent of the world along each axis, m: a single crate mu
 MOST_LABELS = 60
 WHITE: RGB = (255, 255, 255)
 BLACK: RGB = (0, 0, 0)
-INK, FAINT, GRID, ORIGIN = "#24292f", "#6e7781", "#e7eaee", "#c4cad1"
-START, GOAL = "#1f6feb", "#1a7f37"
-FONT = "font-family=\"Inter, 'Segoe UI', Helvetica, Arial, 'DejaVu Sans', sans-serif\""
+STYLE = """
+svg { font: 12px Inter, "Segoe UI", Helvetica, Arial, "DejaVu Sans", sans-serif; }
+.title { font-size: 20px; font-weight: 600; fill: #24292f; }
+.tick { fill: #6e7781; }
+.grid { stroke: #e7eaee; }
+.origin { stroke: #c4cad1; }
+.frame { fill: none; stroke: #6e7781; }
+.model { fill-opacity: 0.92; stroke-width: 1; stroke-linejoin: round; }
+.many { stroke-width: 0.5; }
+.dynamic { stroke-width: 1.4; stroke-dasharray: 5 3; }
+.bare { stroke: #24292f; stroke-width: 1.5; }
+.plate { fill: none; }
+.label { text-anchor: middle; pointer-events: none; paint-order: stroke; stroke: #ffffff; stroke-opacity: 0.7; stroke-width: 3; }
+.badge { stroke: #ffffff; stroke-width: 2; }
+.start { fill: #1f6feb; }
+.goal { fill: #1a7f37; }
+.sign { fill: #ffffff; font-weight: 700; text-anchor: middle; }
+.scale { fill: none; stroke: #24292f; stroke-width: 1.5; }
+.kind { fill: #f3f4f6; stroke: #6e7781; }
+"""
 
 
 def svg_map(world: World, *, spawn: tuple[float, float, float] | None = None, goal: Point | None = None) -> str:
@@ -36,21 +53,15 @@ def svg_map(world: World, *, spawn: tuple[float, float, float] | None = None, go
     frame = Frame.around(models, points, 0.04, LEAST, (WIDEST, HIGHEST), room, (LEFT, TOP))
     _, _, right, bottom = frame.box
     width, height = right + RIGHT, bottom + BOTTOM
+    names = labels(models, range(len(models)), MOST_LABELS, frame, points)
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
-        f'viewBox="0 0 {width:.0f} {height:.0f}" {FONT}>',
+        f'viewBox="0 0 {width:.0f} {height:.0f}">',
+        f"<style>{STYLE}</style>",
         f"<title>{written(world.path.name)}</title>",
         '<rect width="100%" height="100%" fill="#ffffff"/>',
         *_head(world, models),
-        # The axes themselves stand out.
-        *axes(frame, 16, lambda value: f'stroke="{GRID if value else ORIGIN}"', f'font-size="12" fill="{FAINT}"'),
-        f'<clipPath id="map"><rect {rectangle(frame.box)}/></clipPath>',
-        '<g clip-path="url(#map)" stroke-linejoin="round">',
-        *(_model(each, frame) for each in models),
-        "</g>",
-        *_labels(models, frame, points),
-        *_marks(frame, spawn, goal),
-        f'<rect {rectangle(frame.box)} fill="none" stroke="{FAINT}"/>',
+        *plot(frame, 16, "map", (_model(each, frame) for each in models), [*names, *_marks(frame, spawn, goal)]),
         *_foot(frame, models),
         "</svg>",
     ]
@@ -63,19 +74,19 @@ def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
     parts += [f"{moving} dynamic"] if moving else []
     parts += ["ground not drawn"] if any(map(is_ground, world.models)) else []
     name = written(shortened(world.path.name, 48))
-    yield f'<text x="{LEFT:.0f}" y="34" font-size="20" font-weight="600" fill="{INK}">{name}</text>'
-    yield f'<text x="{LEFT:.0f}" y="56" font-size="13" fill="{FAINT}">{" · ".join(parts)}</text>'
+    yield f'<text class="title" x="{LEFT:.0f}" y="34">{name}</text>'
+    yield tick(LEFT, 56, "start", " · ".join(parts))
 
 
 def _model(each: Drawn, frame: Frame) -> str:
     fill = _fill(each)
-    dashes = "" if each.model.static else ' stroke-dasharray="5 3"'
+    kinds = ["model"]
     # Models with many small parts would be all outline.
-    thick = 1.4 if dashes else 0.5 if len(each.outline.polygons) > 8 else 1.0
-    edge = _hex(blend(fill, BLACK, 0.45))
-    style = f'fill="{_hex(fill)}" fill-opacity="0.92" stroke="{edge}" stroke-width="{thick}"{dashes}'
-    bare = "" if each.outline.polygons else f' stroke="{INK}" stroke-width="1.5"'
-    return f'<g {style}><title>{_tooltip(each)}</title><path d="{path_of(each, frame)}"{bare}/></g>'
+    kinds += ["many"] if len(each.outline.polygons) > 8 else []
+    kinds += [] if each.model.static else ["dynamic"]
+    kinds += [] if each.outline.polygons else ["bare"]
+    color = f'fill="{_hex(fill)}" stroke="{_hex(blend(fill, BLACK, 0.45))}"'
+    return f'<path class="{" ".join(kinds)}" {color} d="{path_of(each, frame)}"><title>{_tooltip(each)}</title></path>'
 
 
 def _fill(each: Drawn) -> RGB:
@@ -92,35 +103,15 @@ def _tooltip(each: Drawn) -> str:
     return f"{written(each.model.name)}\n{words}"
 
 
-def _labels(models: Sequence[Drawn], frame: Frame, points: Sequence[Point]) -> Iterator[str]:
-    """The names of the largest models."""
-    largest = sorted(range(len(models)), key=lambda index: -models[index].outline.area)[:MOST_LABELS]
-    yield '<g text-anchor="middle" pointer-events="none">'
-    for each, label in labels(models, largest, frame, points, 16):
-        fill = _fill(each) if label.inside else WHITE
-        yield name_plate(label, f'fill="{_hex(fill)}" fill-opacity="0.8"', f'fill="#{readable(packed(fill)):06x}"')
-    yield "</g>"
-
-
 def _marks(frame: Frame, spawn: tuple[float, float, float] | None, goal: Point | None) -> Iterator[str]:
     if spawn is not None:
-        x, y = frame.pixel(spawn[:2])
-        yield (
-            f'<g transform="translate({x:.1f} {y:.1f})"><title>start ({spawn[0]:g}, {spawn[1]:g}) m, yaw {spawn[2]:g} rad</title>'
-            f'<path transform="rotate({-math.degrees(spawn[2]):.1f})" d="M8 -10L30 0L8 10Z" fill="{START}"/>'
-            f"{_badge('S', START)}</g>"
-        )
+        x, y, yaw = spawn
+        title = f"<title>start ({x:g}, {y:g}) m, yaw {yaw:g} rad</title>"
+        arrow = f'<path class="start" transform="rotate({-math.degrees(yaw):.1f})" d="M7 -8L26 0L7 8Z"/>'
+        yield at(frame.pixel((x, y)), f"{title}{arrow}{badge('start', 'S')}")
     if goal is not None:
-        x, y = frame.pixel(goal)
         title = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
-        yield f'<g transform="translate({x:.1f} {y:.1f})">{title}{_badge("G", GOAL)}</g>'
-
-
-def _badge(sign: str, color: str) -> str:
-    return (
-        f'<circle r="12" fill="{color}" stroke="#ffffff" stroke-width="2"/>'
-        f'<text y="5" text-anchor="middle" font-size="14" font-weight="700" fill="#ffffff">{sign}</text>'
-    )
+        yield at(frame.pixel(goal), f"{title}{badge('goal', 'G')}")
 
 
 def _foot(frame: Frame, models: Sequence[Drawn]) -> Iterator[str]:
@@ -129,16 +120,11 @@ def _foot(frame: Frame, models: Sequence[Drawn]) -> Iterator[str]:
     y = bottom + 68
     step = tick_step(frame.high[0] - frame.low[0], 6)
     start = right - step * frame.scale
-    yield f'<path d="M{start:.1f} {y - 5:.1f}v5H{right:.1f}v-5" fill="none" stroke="{INK}" stroke-width="1.5"/>'
-    yield (
-        f'<text x="{start - 8:.1f}" y="{y + 1:.1f}" text-anchor="end" font-size="12" fill="{INK}">'
-        f"{tick_text(step, step)} m</text>"
-    )
-    if all(each.model.static for each in models):
-        return
-    for x, word, dashes in ((left, "static", ""), (left + 90, "dynamic", ' stroke-dasharray="5 3"')):
-        yield f'<rect x="{x:.1f}" y="{y - 10:.1f}" width="20" height="12" fill="#f3f4f6" stroke="{FAINT}"{dashes}/>'
-        yield f'<text x="{x + 27:.1f}" y="{y:.1f}" font-size="12" fill="{INK}">{word}</text>'
+    yield f'<path class="scale" d="M{start:.1f} {y - 5:.1f}v5H{right:.1f}v-5"/>'
+    yield tick(start - 8, y + 1, "end", f"{tick_text(step, step)} m")
+    for x, word in () if all(each.model.static for each in models) else ((left, "static"), (left + 90, "dynamic")):
+        yield f'<rect class="kind {word}" x="{x:.1f}" y="{y - 10:.1f}" width="20" height="12"/>'
+        yield tick(x + 27, y, "start", word)
 
 
 def _hex(color: RGB) -> str:

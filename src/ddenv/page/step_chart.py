@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from ddenv.map.drawing import tick_step, tick_text, ticks
+from ddenv.map.drawing import tick, tick_step, tick_text, ticks
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import RunState
 from ddenv.text import count
@@ -83,19 +83,17 @@ def steps(points: Sequence[tuple[int, int]]) -> Steps:
 
 def axes(at: At, last: int, most: int) -> Iterator[str]:
     """Both axes up to `last` tests and `most` models; `at` gives x and y of a number of tests and of models, pixels."""
+    right, floor = at(last, 0)
     step = max(1.0, tick_step(most, 6))
     for value in ticks(0, most, step):
         left, y = at(0, value)
-        right, _ = at(last, value)
         yield f'<path class="grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>'
-        yield f'<text class="tick" x="{left - 7:.1f}" y="{y + 4:.1f}" text-anchor="end">{tick_text(value, step)}</text>'
+        yield tick(left - 7, y + 4, "end", tick_text(value, step))
     step = max(1.0, tick_step(last, 12))
     for value in ticks(0, last, step):
-        x, y = at(value, 0)
-        yield f'<text class="tick" x="{x:.1f}" y="{y + 17:.1f}" text-anchor="middle">{tick_text(value, step)}</text>'
-    right, floor = at(last, 0)
-    yield f'<text class="tick" x="{right:.1f}" y="{floor + 36:.1f}" text-anchor="end">tests</text>'
-    yield f'<text class="tick" x="{LEFT - 7:.1f}" y="13" text-anchor="start">models left</text>'
+        yield tick(at(value, 0)[0], floor + 17, "middle", tick_text(value, step))
+    yield tick(right, floor + 36, "end", "tests")
+    yield tick(LEFT - 7, 13, "start", "models left")
 
 
 def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:

@@ -8,6 +8,7 @@ from collections import Counter
 from ddenv.evidence.claims import current, never_left_out
 from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
 from ddenv.evidence.took_part import why_sliced
+from ddenv.map.drawing import tick
 from ddenv.page.blocks import (
     Block,
     Cell,
@@ -62,8 +63,7 @@ def interval(base: BaselineFinished) -> str:
         return LEFT + (WIDTH - LEFT - RIGHT) * min(1.0, max(0.0, rate))
 
     ticks = "".join(
-        f'<path class="grid" d="M{at(each):.1f} {LINE - 9}v18"/>'
-        f'<text class="tick" x="{at(each):.1f}" y="{LINE + 26}" text-anchor="middle">{percent(each)}</text>'
+        f'<path class="grid" d="M{at(each):.1f} {LINE - 9}v18"/>{tick(at(each), LINE + 26, "middle", percent(each))}'
         for each in (0.0, 0.25, 0.5, 0.75, 1.0)
     )
     return (

@@ -21,11 +21,13 @@ def settings(record: Record) -> Section:
         for one in SETTINGS.values()
         if one.name in section(scenario, one.section) or not one.stored
     ]
-    rows += [("driver", _value(section(scenario, "controller").get("use")), "who drives the robot")]
+    rows += [("driver", value_words(section(scenario, "controller").get("use")), "who drives the robot")]
     rows += [("start", _place(section(scenario, "robot").get("spawn")), "where the robot starts")]
     rows += [("goal", _place(scenario.get("goal")), "where it has to go")]
     rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
-    rows += [("simulator", _value(section(scenario, "oracle").get("command")), "what runs the robot in place of Drake")]
+    rows += [
+        ("simulator", value_words(section(scenario, "oracle").get("command")), "what runs the robot in place of Drake")
+    ]
     table = Table(
         ("setting", "value", "meaning"), tuple((name, Name(value), meaning) for name, value, meaning in rows if value)
     )
@@ -37,11 +39,12 @@ def settings(record: Record) -> Section:
 
 def _read(scenario: dict[str, Any], asked: dict[str, Any], one: Setting) -> str:
     """The value of a setting, with the first value if it was changed during the run."""
-    now, first = (_value(read(each, one)) or one.none for each in (scenario, asked))
+    now, first = (value_words(read(each, one)) or one.none for each in (scenario, asked))
     return now if first == now else f"{now} (changed during the run; at first {first})"
 
 
-def _value(value: Any) -> str:
+def value_words(value: Any) -> str:
+    """The value of a setting as people write it; "" for none."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None or isinstance(value, (dict, list)):
@@ -55,7 +58,9 @@ def _place(values: Any) -> str:
         return ""
     units = {"yaw": "rad", "tolerance": "m", "x": "m", "y": "m", "z": "m"}
     return ", ".join(
-        f"{key} {_value(value)} {units[key]}" for key, value in values.items() if key in units and _value(value)
+        f"{key} {value_words(value)} {units[key]}"
+        for key, value in values.items()
+        if key in units and value_words(value)
     )
 
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ddenv.map.drawing import FAR, Frame, Point, axes, labels, name_plate, path_of, rectangle, written
+from ddenv.map.drawing import FAR, Frame, Point, at, badge, labels, path_of, plot, written
 from ddenv.map.footprints import Drawn
 from ddenv.page.blocks import section
+from ddenv.page.step_chart import opening
 from ddenv.report.run_data import Record
 from ddenv.runfile.store import COLUMNS
 
@@ -25,14 +26,10 @@ PATHS = ("way", "last", "with", "without")
 LETTER, GAP, LINE, LEGEND_LEFT = 6.9, 12.0, 24.0, 52.0
 
 
-def _badge(name: str, letter: str) -> str:
-    return f'<circle class="badge {name}" r="10"/><text class="sign" y="4.5">{letter}</text>'
-
-
 # Around (0, 0): where the robot starts, where it should go, and where it ended in f.
 MARKS = {
-    "start": _badge("start", "S"),
-    "goal": _badge("goal", "G"),
+    "start": badge("start", "S"),
+    "goal": badge("goal", "G"),
     "end": '<path class="ring" d="M-7 -7L7 7M-7 7L7 -7"/><path class="end" d="M-7 -7L7 7M-7 7L7 -7"/>',
 }
 WORDS = {
@@ -51,7 +48,6 @@ WORDS = {
 # Pixels: the drawing's own width, the highest map and close-up, the lowest map, and the margins.
 WIDTH, HIGHEST, CLOSE_HIGH, LEAST_HIGH = 880.0, 620.0, 420.0, 180.0
 LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
-CORNERS = 32
 # The minimum drawn along each axis: of the world and of a close-up, m; and the minimum magnification of a close-up.
 LEAST, CLOSE, CLOSER = 4.0, 2.0, 3.0
 # The maximum number of labels, and how many of the models drawn last they must not hide.
@@ -64,18 +60,17 @@ MOST_POLYGONS = 20_000
 
 def picture(
     record: Record,
-    models: Sequence[Drawn],
     name: str = "all",
     ways: Ways | None = None,
     named: Collection[str] | None = None,
 ) -> str:
-    """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`. `name` is different for each map of a page.
+    """The map of a run as SVG. `name` is different for each map of a page.
 
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
     these models, in place of those that are left.
     """
-    frame = _frame(models, list(_places(record).values()), LEAST)
-    return _picture(record, models, frame, name, ways or _ways(record), named)
+    frame = _frame(record.models, list(_places(record).values()), LEAST)
+    return _picture(record, frame, name, ways or _ways(record), named)
 
 
 def _ways(record: Record) -> Ways:
@@ -83,21 +78,20 @@ def _ways(record: Record) -> Ways:
     return {"way": record.original, "last": last}
 
 
-def close_up(record: Record, models: Sequence[Drawn]) -> str:
+def close_up(record: Record) -> str:
     """A map of only what is left and f's end; "" if it would add little to the whole map."""
-    kept = [each for each in models if each.model.name in record.kept]
+    kept = [each for each in record.models if each.model.name in record.kept]
     places = _places(record)
     if "end" not in places or not kept:
         return ""
     frame = _frame(kept, [places["end"]], CLOSE, CLOSE_HIGH)
-    if frame.scale < CLOSER * _frame(models, list(places.values()), LEAST).scale:
+    if frame.scale < CLOSER * _frame(record.models, list(places.values()), LEAST).scale:
         return ""
-    return _picture(record, models, frame, "near", _ways(record), None)
+    return _picture(record, frame, "near", _ways(record), None)
 
 
-def _picture(
-    record: Record, models: Sequence[Drawn], frame: Frame, name: str, ways: Ways, named: Collection[str] | None
-) -> str:
+def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collection[str] | None) -> str:
+    models = record.models
     places = {sign: point for sign, point in _places(record).items() if frame.holds(point)}
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS
@@ -105,23 +99,19 @@ def _picture(
     legend = _lines({*sorts.values(), *drawn, *places})
     bottom = float(frame.box[3]) + AXIS
     height = bottom + LINE * len(legend) + 6
-    with_name = [each for each in models if _has_name(each.model.name, sorts, named)]
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {height:.0f}">',
-        *axes(frame, 12, lambda _: 'class="grid"', 'class="tick"'),
-        f'<clipPath id="{name}"><rect {rectangle(frame.box)}/></clipPath>',
-        f'<g clip-path="url(#{name})">',
+    inside = [
         *(_model(each, sorts[each.model.name], frame, coarse) for each in models),
         *(f'<path class="{way}" d="{path}"/>' for way, path in drawn.items()),
         *_near(record, frame, places),
-        "</g>",
-        *_labels(with_name, sorts, frame, list(places.values())),
-        *(_at(*frame.pixel(point), MARKS[sign]) for sign, point in places.items()),
-        f'<rect {rectangle(frame.box)} class="frame"/>',
-        *_legend(legend, bottom),
-        "</svg>",
     ]
-    return "\n".join(lines)
+    # By default what is left has a name, or keeps names away; a name may cover the rest, which is faint.
+    own = [one for one in models if (sorts[one.model.name] != "gone" if named is None else one.model.name in named)]
+    own = own[-MOST_AVOIDED:]
+    wanted = [index for index, each in enumerate(own) if sorts[each.model.name] != "still"]
+    names = labels(own, wanted, MOST_LABELS, frame, list(places.values()))
+    marks = [at(frame.pixel(point), MARKS[sign]) for sign, point in places.items()]
+    drawing = plot(frame, 12, name, inside, [*names, *marks])
+    return "\n".join([opening(height), *drawing, *_legend(legend, bottom), "</svg>"])
 
 
 def _places(record: Record) -> dict[str, Point]:
@@ -185,23 +175,6 @@ def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
 
 
-def _labels(models: Sequence[Drawn], sorts: dict[str, str], frame: Frame, points: Sequence[Point]) -> Iterator[str]:
-    """Names of `models`, the largest first, but not of those that are always there."""
-    seen = models[-MOST_AVOIDED:]
-    wanted = [index for index, each in enumerate(seen) if sorts[each.model.name] != "still"]
-    largest = sorted(wanted, key=lambda index: -seen[index].outline.area)[:MOST_LABELS]
-    for _, label in labels(seen, largest, frame, points, 14):
-        yield name_plate(label, 'class="plate"', 'class="label"', 11.0)
-
-
-def _has_name(model: str, sorts: dict[str, str], named: Collection[str] | None) -> bool:
-    """Whether a model has a name, or keeps names away: by default what is left. A name may cover the rest, which is faint."""
-    return sorts[model] != "gone" if named is None else model in named
-
-
-# The legend.
-
-
 def _lines(shown: Collection[str]) -> list[list[str]]:
     """The signs that are `shown`, in lines that are not wider than the map."""
     lines: list[list[str]] = [[]]
@@ -220,7 +193,7 @@ def _legend(lines: list[list[str]], top: float) -> Iterator[str]:
     for number, line in enumerate(lines):
         x, y = LEGEND_LEFT, top + LINE * number + 10
         for name in line:
-            yield _at(x, y, f'{_sign(name)}\n<text class="tick" x="{_room(name):g}" y="4.5">{WORDS[name]}</text>')
+            yield at((x, y), f'{_sign(name)}\n<text class="tick" x="{_room(name):g}" y="4.5">{WORDS[name]}</text>')
             x += _wide(name)
 
 
@@ -235,13 +208,9 @@ def _room(name: str) -> float:
 
 def _sign(name: str) -> str:
     if name in MARKS:
-        return _at(10, 0, MARKS[name])
+        return at((10, 0), MARKS[name])
     return (
         f'<path class="{name}" d="M0 0H26"/>'
         if name in PATHS
         else f'<rect class="{name}" x="1" y="-7" width="24" height="14"/>'
     )
-
-
-def _at(x: float, y: float, drawn: str) -> str:
-    return f'<g transform="translate({x:.1f} {y:.1f})">{drawn}</g>'

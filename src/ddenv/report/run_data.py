@@ -7,10 +7,11 @@ from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
+from ddenv.map.footprints import Drawn, plan
 from ddenv.runfile.events import Created, RoundStarted
 from ddenv.runfile.fold import recorded_scenario, steps
 from ddenv.runfile.lock import engine_is_alive
@@ -18,11 +19,12 @@ from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, reasons
-
-if TYPE_CHECKING:
-    from ddenv.world.model import World
+from ddenv.runs.subject import read_parts
+from ddenv.world.model import World
 
 T = TypeVar("T")
+# Of the polygon that stands for a circle.
+CORNERS = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,8 @@ class Record:
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
     removed, `kept` those of them that are left. `reasons` say what happens without each of these, `nearest`
-    what the nearest world that passes lacks; `ways` are the robot's paths in the tests that they compare.
+    what the nearest world that passes lacks; `ways` are the robot's paths in the tests that they compare. `models` are those of the
+    world, as they are drawn.
     """
 
     path: Path
@@ -42,6 +45,7 @@ class Record:
     started: float = 0.0
     alive: bool = False
     world: World | None = None
+    models: tuple[Drawn, ...] = ()
     original: array[float] | None = None
     evidence: array[float] | None = None
     troubles: tuple[str, ...] = ()
@@ -54,8 +58,6 @@ class Record:
 
 def read_run(path: Path) -> Record:
     """Reads a run file; of a damaged one, as much as is valid. Raises UserError if it is not a run file."""
-    from ddenv.runs.subject import read_parts
-
     alive = engine_is_alive(path)
     with RunFile(path) as file:
         first, state, rounds, trouble = _story(file)
@@ -80,6 +82,7 @@ def read_run(path: Path) -> Record:
         started=first.time,
         alive=alive,
         world=world,
+        models=() if world is None else plan(world, CORNERS),
         original=original,
         evidence=evidence,
         troubles=tuple(troubles),

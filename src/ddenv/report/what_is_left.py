@@ -4,24 +4,21 @@ model that is left, and what the nearest world that passes lacks.
 
 from __future__ import annotations
 
-from array import array
+from collections.abc import Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ddenv.evidence.claims import current
+from ddenv.map.footprints import Drawn
 from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, place, say
-from ddenv.report.report_map import CORNERS, close_up, picture
+from ddenv.report.report_map import close_up, picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
 from ddenv.runs.nearest import Nearest
-from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, sentence
+from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
 from ddenv.text import count, first_of, plain
 from ddenv.words.claims import rate
-from ddenv.world.model import World, is_ground
-
-if TYPE_CHECKING:
-    from ddenv.map.footprints import Drawn
+from ddenv.world.model import is_ground
 
 # The maximum number of models in the table and with a sentence, of names in a list, of those that a removal drops, and of maps.
 MOST_MODELS, MOST_NAMES, MOST_DROPPED, MOST_MAPS = 200, 12, 3, 6
@@ -35,15 +32,14 @@ def what_is_left(record: Record) -> Section:
         title = "The world"
     if record.world is None:
         return Section(title, _names_alone(state))
-    drawn = _drawn(record.world)
-    blocks: list[Block] = [Picture("map", picture(record, drawn), _alternative(state))]
-    if near := close_up(record, drawn):
+    blocks: list[Block] = [Picture("map", picture(record), _alternative(state))]
+    if near := close_up(record):
         blocks += [
             say("Where the robot failed, closer:"),
             Picture("near", near, "A closer look at where the robot failed."),
         ]
     if state.baseline is not None:
-        blocks += _models(state, drawn)
+        blocks += _models(record)
     blocks += _stay(record)
     return Section(title, tuple(blocks))
 
@@ -57,9 +53,9 @@ def _alternative(state: RunState) -> str:
     )
 
 
-def _models(state: RunState, drawn: tuple[Drawn, ...]) -> list[Block]:
+def _models(record: Record) -> list[Block]:
     """A row for each model that is left, in the file's order."""
-    by_name = {each.model.name: each for each in drawn}
+    state, by_name = record.state, {each.model.name: each for each in record.models}
     touched = _touched(state)
     names = state.environment
     carried = {name: drops_without(state, frozenset({name})) for name in names[:MOST_MODELS]}
@@ -119,7 +115,6 @@ def why(record: Record) -> Section | None:
     found = current(record.state)
     if found is None and record.nearest is None:
         return None
-    drawn = () if record.world is None else _drawn(record.world)
     blocks: list[Block] = []
     if found is not None and len(found.claims) == 1:
         blocks.append(say(plain(no_reasons(found))))
@@ -128,28 +123,25 @@ def why(record: Record) -> Section | None:
         blocks.append(say(f"With what is left ({left}): {rate(found.claims[0])}."))
     for number, reason in enumerate(record.reasons[:MOST_MODELS]):
         blocks.append(say(plain(f"{sentence(reason)} {parting_sentence(reason)}".rstrip())))
-        if drawn and number < MOST_MAPS and reason.parting is not None:
-            blocks.append(_map(record, drawn, reason, f"why{number}"))
+        if record.models and number < MOST_MAPS and reason.parting is not None:
+            words = f"The world from above without {reason.without}: the robot's paths with it and without it"
+            blocks.append(_map(record, record.kept, reason.gone, reason.parting, f"why{number}", words, None))
     if record.nearest is not None:
-        blocks += _passing(record, record.nearest, drawn)
+        blocks += _passing(record, record.nearest)
     return Section("Why it fails", tuple(blocks)) if blocks else None
 
 
-def _passing(record: Record, found: Nearest, drawn: tuple[Drawn, ...]) -> list[Block]:
+def _passing(record: Record, found: Nearest) -> list[Block]:
     """The nearest world that passes, and the two runs side by side."""
     blocks: list[Block] = [say(plain(found.sentences))]
     one = found.parting
     if one is None:
         return blocks
-    if drawn:
-        there = replace(record, kept=record.elements - frozenset(found.gone))
+    if record.models:
         words = (
-            f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without, "
-            f"seed {one.seed}."
+            f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without"
         )
-        blocks.append(
-            Picture("nearest", picture(there, drawn, "nearest", _ways(record, one), found.gone), plain(words))
-        )
+        blocks.append(_map(record, record.elements, found.gone, one, "nearest", words, found.gone))
     rows = tuple(
         (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
         for each in found.instants
@@ -162,19 +154,16 @@ def _place(point: tuple[float, float]) -> str:
     return f"{point[0]:.2f}, {point[1]:.2f}"
 
 
-def _map(record: Record, drawn: tuple[Drawn, ...], reason: Reason, name: str) -> Picture:
-    one = reason.parting
-    assert one is not None
-    there = replace(record, kept=record.kept - frozenset(reason.gone))
-    words = f"The world from above without {reason.without}: the robot's paths with it and without it, seed {one.seed}."
-    return Picture(name, picture(there, drawn, name, _ways(record, one)), plain(words))
-
-
-def _ways(record: Record, one: Parting) -> dict[str, array[float]]:
-    return {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
-
-
-def _drawn(world: World) -> tuple[Drawn, ...]:
-    from ddenv.map.footprints import plan
-
-    return plan(world, CORNERS)
+def _map(
+    record: Record,
+    kept: frozenset[str],
+    gone: Collection[str],
+    one: Parting,
+    name: str,
+    words: str,
+    named: Collection[str] | None,
+) -> Picture:
+    """The world of the models `kept` without those `gone`, with the two ways of a parting; `named` models bear their names."""
+    ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
+    drawn = picture(replace(record, kept=kept - frozenset(gone)), name, ways, named)
+    return Picture(name, drawn, plain(f"{words}, seed {one.seed}."))

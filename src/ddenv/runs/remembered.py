@@ -25,8 +25,7 @@ def write_state(name: str, content: object) -> None:
     place = state_file(name)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        write_file(place, json.dumps(content).encode())
-        place.chmod(0o600)
+        write_file(place, json.dumps(content).encode(), 0o600)
     except (OSError, UserError, ValueError):
         return
 

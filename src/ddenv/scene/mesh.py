@@ -55,63 +55,55 @@ def merge(surfaces: Sequence[Surface]) -> Surface:
     return Surface(np.concatenate([one.vertices for one in surfaces]), np.concatenate(faces).astype(np.uint32))
 
 
-def _unit_box() -> Surface:
-    quads = []
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            u, v = np.roll(np.eye(3), axis + 1, axis=1)[:2] if sign > 0 else np.roll(np.eye(3), axis + 1, axis=1)[1::-1]
-            normal = np.eye(3)[axis] * sign
-            quads.append([0.5 * (normal + a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
-    faces = [[4 * quad + a, 4 * quad + b, 4 * quad + c] for quad in range(6) for a, b, c in ((0, 1, 2), (0, 2, 3))]
-    return Surface(np.array(quads).reshape(-1, 3), np.array(faces, dtype=np.uint32))
-
-
-_UNIT_BOX = _unit_box()
+# Corners of a box around the origin with sides of 1, numbered by their bits x, y, z, and the edges that join them.
+CORNERS = np.array([(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
+EDGES = np.array([(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]).ravel()
+_SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+_HALVES = np.array([(4 * side, 4 * side + a, 4 * side + a + 1) for side in range(6) for a in (1, 2)], dtype=np.uint32)
 
 
 def box(size: Sequence[float]) -> Surface:
     """A box centred on its frame's origin; `size` along x, y, z."""
-    return Surface(_UNIT_BOX.vertices * np.asarray(size, dtype=float), _UNIT_BOX.faces)
+    return Surface(CORNERS[np.ravel(_SIDES)] * np.asarray(size, dtype=float), _HALVES)
+
+
+def revolved(*profiles: Sequence[tuple[float, float]], sides: int = SIDES) -> Surface:
+    """The surface of profiles (radius, z), each from top to bottom, turned around z; between profiles the edge is sharp."""
+    angles = np.arange(sides) * 2 * math.pi / sides
+    parts = []
+    for profile in profiles:
+        radii, heights = np.array(profile, dtype=float).T[:, :, None]
+        points = np.stack([radii * np.cos(angles), radii * np.sin(angles), heights + 0 * angles], axis=-1)
+        parts.append(Surface(points.reshape(-1, 3), _sheet(len(profile), sides)))
+    return merge(parts)
 
 
 def frustum(bottom: float, top: float, length: float) -> Surface:
     """A truncated cone along z, centred on its frame's origin, with radii `bottom` and `top`."""
-    angles = np.arange(SIDES) * 2 * math.pi / SIDES
-    circle = np.column_stack([np.cos(angles), np.sin(angles)])
-    low = np.column_stack([circle * bottom, np.full(SIDES, -length / 2)])
-    high = np.column_stack([circle * top, np.full(SIDES, length / 2)])
-    here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
-    wall = np.concatenate(
-        [np.column_stack([here, after, after + SIDES]), np.column_stack([here, after + SIDES, here + SIDES])]
-    )
-    fan = np.column_stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)])
-    parts = [Surface(np.concatenate([low, high]), wall), Surface(low, fan[:, ::-1]), Surface(high, fan)]
-    return merge(parts)
+    low, high = (bottom, -length / 2), (top, length / 2)
+    return revolved([(0.0, length / 2), high], [high, low], [low, (0.0, -length / 2)])
 
 
 def sphere(radius: float, sides: int = SIDES) -> Surface:
     """A sphere centred on its frame's origin."""
-    rings = sides // 2
-    theta, phi = np.meshgrid(np.linspace(0, math.pi, rings + 1), np.arange(sides) * 2 * math.pi / sides, indexing="ij")
-    points = radius * np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-    return Surface(points.reshape(-1, 3), _sheet(rings + 1, sides))
-
-
-def ellipsoid(radii: Sequence[float]) -> Surface:
-    """An ellipsoid centred on its frame's origin; `radii` along x, y, z."""
-    ball = sphere(1.0)
-    return Surface(ball.vertices * np.asarray(radii, dtype=float), ball.faces)
+    return revolved(_arc(radius, 0.0, math.pi, sides // 2), sides=sides)
 
 
 def capsule(radius: float, length: float) -> Surface:
     """A cylinder of `length` along z, centred on its frame's origin, with a hemisphere on each end."""
-    ball = sphere(radius)
-    rings = ball.vertices.reshape(-1, SIDES, 3)
-    middle = len(rings) // 2
-    # The equator appears twice, once at each end of the cylinder.
-    end = np.array([0.0, 0.0, length / 2])
-    halves = np.concatenate([rings[: middle + 1] + end, rings[middle:] - end])
-    return Surface(halves.reshape(-1, 3), _sheet(len(halves), SIDES))
+    top, bottom = _arc(radius, 0.0, math.pi / 2, SIDES // 4), _arc(radius, math.pi / 2, math.pi, SIDES // 4)
+    return revolved([*((r, z + length / 2) for r, z in top), *((r, z - length / 2) for r, z in bottom)])
+
+
+def ring(radius: float, thickness: float) -> Surface:
+    """A torus in the plane z = 0 around its frame's origin."""
+    circle = _arc(thickness / 2, 0.0, 2 * math.pi, 8)
+    return revolved([(radius + r, z) for r, z in circle], sides=2 * SIDES)
+
+
+def _arc(radius: float, begin: float, end: float, pieces: int) -> list[tuple[float, float]]:
+    """A part of a circle as a profile; angles from z on, rad."""
+    return [(radius * math.sin(at), radius * math.cos(at)) for at in np.linspace(begin, end, pieces + 1).tolist()]
 
 
 def creased(mesh: Mesh) -> Surface:
@@ -132,21 +124,15 @@ def creased(mesh: Mesh) -> Surface:
     return Surface(np.concatenate([mesh.vertices, corners[sharp]])[used], number[faces].astype(np.uint32))
 
 
-def ring(radius: float, thickness: float) -> Surface:
-    """A torus in the plane z = 0 around its frame's origin."""
-    sides = 2 * SIDES
-    around, across = np.meshgrid(np.arange(sides + 1) * 2 * math.pi / sides, np.arange(8) * math.pi / 4, indexing="ij")
-    distance = radius + thickness / 2 * np.cos(across)
-    height = thickness / 2 * np.sin(across)
-    points = np.stack([distance * np.cos(around), distance * np.sin(around), height], axis=-1)
-    return Surface(points.reshape(-1, 3), _sheet(sides + 1, 8))
-
-
 def tube(points: np.ndarray, radius: float) -> Surface:
     """A tube along the path `points` (N, 3), thinned to one point every `TUBE_STEP`; empty for a path without length."""
-    path = thinned(points, TUBE_STEP)
-    if len(path) < 2:
+    taken = list(points[:1])
+    for point in points[1:]:
+        if np.linalg.norm(point - taken[-1]) >= TUBE_STEP:
+            taken.append(point)
+    if len(taken) < 2:
         return EMPTY
+    path = np.array(taken)
     ahead = np.gradient(path, axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
     # Sections are spanned from z, or from x where the path is vertical.
@@ -157,15 +143,6 @@ def tube(points: np.ndarray, radius: float) -> Surface:
     angles = -np.arange(8) * math.pi / 4
     section = np.cos(angles)[None, :, None] * aside[:, None] + np.sin(angles)[None, :, None] * over[:, None]
     return Surface((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), 8))
-
-
-def thinned(points: np.ndarray, step: float) -> np.ndarray:
-    """The first of `points` (N, 3), and each one that is at least `step` from the last one taken."""
-    taken = list(points[:1])
-    for point in points[1:]:
-        if np.linalg.norm(point - taken[-1]) >= step:
-            taken.append(point)
-    return np.array(taken).reshape(-1, 3)
 
 
 def of_shape(shape: Shape) -> Surface:
@@ -180,7 +157,8 @@ def of_shape(shape: Shape) -> Surface:
         case Capsule(radius, length):
             return capsule(radius, length)
         case Ellipsoid(radii):
-            return ellipsoid(radii)
+            ball = sphere(1.0)
+            return Surface(ball.vertices * radii, ball.faces)
         case Mesh():
             return creased(shape)
     return EMPTY
@@ -212,10 +190,6 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
     below, diagonal = here + columns, right + columns
     faces = np.stack([np.stack([here, below, diagonal], axis=-1), np.stack([here, diagonal, right], axis=-1)])
     return faces.reshape(-1, 3).astype(np.uint32)
-
-
-# Corners of a box, numbered by bits, that its twelve edges join.
-_PAIRS = np.array([(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]).ravel()
 
 
 @dataclass(frozen=True)
@@ -281,6 +255,5 @@ def outline(model: Model, shape: Surface) -> np.ndarray:
 
 def edges_of(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Ends (24, 3) of the edges of a box."""
-    corners = np.array([[(high if bit >> axis & 1 else low)[axis] for axis in range(3)] for bit in range(8)])
-    ends: np.ndarray = corners[_PAIRS]
+    ends: np.ndarray = (low + high) / 2 + CORNERS[EDGES] * (high - low)
     return ends

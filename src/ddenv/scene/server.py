@@ -16,7 +16,6 @@ import hashlib
 import hmac
 import json
 import logging
-import os
 import re
 import secrets
 from collections.abc import Callable
@@ -33,7 +32,7 @@ import tornado.websocket
 from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
 from ddenv.runs.programs import FIRST_PORT
-from ddenv.runs.remembered import read_state, state_file
+from ddenv.runs.remembered import read_state, write_state
 
 # Where the scenes of runs were served last, so many of them.
 FILE, MOST = "scenes.json", 50
@@ -253,16 +252,7 @@ def remember(run: Path, port: int, token: str) -> None:
     """Remembers it, for this user alone, if it can be written."""
     name = str(run.resolve())
     known = {each: where for each, where in _known().items() if each != name}
-    kept = dict([*known.items(), (name, [port, token])][-MOST:])
-    place = state_file(FILE)
-    fresh = place.with_name(f"{place.name}.{os.getpid()}")
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w") as file:
-            json.dump(kept, file)
-        fresh.replace(place)
-    except OSError:
-        return
+    write_state(FILE, dict([*known.items(), (name, [port, token])][-MOST:]))
 
 
 def _known() -> dict[str, object]:

@@ -15,7 +15,7 @@ from ddenv.scene import mesh
 from ddenv.scene.mesh import Painted, Surface, paint
 from ddenv.world.drive import Drive, find_drive, rolled, turned_links, wheel_links
 from ddenv.world.model import Model
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import Pose, Vector, pose_of
 from ddenv.world.scenario import Wheels as Named
 
 # Spokes, so that a plain wheel is seen to turn: their width, as part of its radius, and how far they stand out of it, m.
@@ -91,9 +91,7 @@ def _spokes(wheel: Surface, axis: np.ndarray, radius: float) -> Surface:
     width, middle = float(np.ptp(along)) + 2 * OUT, float(along.min() + along.max()) / 2
     # The shortest turn from y, along which the bars are made, to the axis.
     x, y, z = axis.tolist()
-    turn = Pose((0.0, 0.0, 0.0), (1 + y, z, 0.0, -x)) if y > -1 + 1e-9 else Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
-    length = math.hypot(*turn.quaternion)
-    w, i, j, k = (part / length for part in turn.quaternion)
-    at = Pose((middle * x, middle * y, middle * z), (w, i, j, k))
+    turn = (1 + y, z, 0.0, -x) if y > -1 + 1e-9 else (0.0, 1.0, 0.0, 0.0)
+    at = pose_of((*(middle * axis), *turn))
     sizes = (1.7 * radius, width, SPOKE * radius), (SPOKE * radius, width, 1.7 * radius)
     return mesh.merge([mesh.box(size).at(at) for size in sizes])

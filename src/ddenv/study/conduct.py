@@ -11,65 +11,96 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import mean
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from rich.cells import cell_len, set_cell_size
 
-from ddenv.runfile.state import RunState
+from ddenv.runs.subject import load_parts
 from ddenv.runs.tests_left import remaining, rough_run
-from ddenv.study.plan import Cell, Plan, Size, longest_first, sizes
+from ddenv.study.plan import Cell, Plan
 from ddenv.study.results import read_cell
-from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
 from ddenv.study.study_page import write_study
-from ddenv.study.work import PER_CELL, Work, is_done, tests_made, work
+from ddenv.study.work import (
+    PER_CELL,
+    Sitting,
+    Work,
+    is_done,
+    machine,
+    opened,
+    sittings,
+    tests_made,
+    versions,
+    work,
+    write_sittings,
+)
 from ddenv.text import count, duration, printable
+from ddenv.world.scenario import Scenario
+
+# The cost of a dynamic model in a test, relative to a static one: about what piles of boards cost when measured.
+MOVES = 4
+# Equal spans of time put most of a world into one part, which takes many rounds to split.
+SLOW = ("timeseg/", "trajectoryseg/")
+
+
+class Size(NamedTuple):
+    """A scenario's world: how many models can be removed, and the cost of a test, in static models."""
+
+    models: int
+    cost: int
+
+
+def sizes(plan: Plan) -> dict[str, Size]:
+    """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
+    return {scenario.name: _size(scenario) for scenario in plan.scenarios}
+
+
+def _size(scenario: Scenario) -> Size:
+    world, _ = load_parts(scenario)
+    elements = set(world.elements(frozenset(scenario.protected)))
+    moving = sum(not model.static for model in world.models if model.name in elements)
+    return Size(len(elements), len(elements) + MOVES * moving)
 
 
 def seconds_left(
     running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
 ) -> float | None:
     """Time until the last cell ends, s; None if unknown."""
-    times = [_of_running(each) for each in running]
-    times += [_of_waiting(cell, (*running, *ended), worlds) for cell in waiting]
+    alone = [_of_running(each) for each in running]
+    times = [*alone, *(_of_waiting(cell, (*running, *ended), worlds) for cell in waiting)]
     known = [each for each in times if each is not None]
     if len(known) < len(times):
         return None
-    alone = [seconds / each.workers for seconds, each in zip(known, running, strict=False)]
-    return max([sum(known) / jobs, *alone])
+    return max(sum(known) / jobs, *(seconds / each.workers for seconds, each in zip(known, running, strict=False)), 0)
 
 
 def _of_running(each: Work) -> float | None:
     """What one worker still needs, s; None if unknown."""
     left = remaining(each.state, True)
-    if left is None or left.seconds is None:
-        return None
-    return left.seconds[1] * max(1, each.state.jobs)
+    return None if left is None or left.seconds is None else left.seconds[1] * max(1, each.state.jobs)
 
 
 def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
-    """What one worker would need, s: the time of other cells of the scenario, or an estimate."""
-    same = [each.state for each in others if each.cell.scenario.name == cell.scenario.name]
-    if over := [_spent(state) for state in same if state.status == "finished"]:
+    """What one worker would need, s: the time of other cells of the scenario, or an estimate by the time of a test."""
+    same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
+    # Tests reused from another cell cost nothing.
+    if over := [
+        sum(test.wall_seconds for test in each.state.finished_tests if not test.taken)
+        for each in same
+        if each.state.status == "finished"
+    ]:
         return mean(over)
-    size = worlds[cell.scenario.name]
-    one = [seconds for state in same if (seconds := _of_a_test(state)) is not None] or [
-        seconds * size.cost / worlds[each.cell.scenario.name].cost
-        for each in others
-        if (seconds := _of_a_test(each.state)) is not None
+    tested = [each for each in same if each.state.finished_tests] or [
+        each for each in others if each.state.finished_tests
     ]
-    if not one:
+    if not tested:
         return None
-    return mean(one) * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
-
-
-def _spent(state: RunState) -> float:
-    """The time of a cell's tests, s, one after another; tests reused from another cell cost nothing."""
-    return sum(test.wall_seconds for test in state.finished_tests if not test.taken)
-
-
-def _of_a_test(state: RunState) -> float | None:
-    tests = [test.wall_seconds for test in state.finished_tests]
-    return mean(tests) if tests else None
+    size = worlds[cell.scenario.name]
+    a_test = mean(
+        mean(test.wall_seconds for test in each.state.finished_tests)
+        * (size.cost / worlds[each.cell.scenario.name].cost)
+        for each in tested
+    )
+    return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
 
 
 # Time between two estimates of the time left, which are slow, s.
@@ -180,17 +211,20 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
 
     0 means that every cell is certified to be minimal, 1 that not all are, 130 that it was interrupted. Raises UserError.
     """
-    worlds = sizes(plan)
+    worlds, interrupted = sizes(plan), False
     with opened(folder):
-        interrupted = False
         names = {cell.name for cell in plan.cells if is_done(folder, cell)}
         open_ones = [cell for cell in plan.cells if cell.name not in names]
         try:
             if open_ones:
                 progress = Progress(plan, folder, len(names), worlds, jobs, out)
+                if jobs > PER_CELL:
+                    # The cells that take longest come first.
+                    open_ones.sort(
+                        key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW))
+                    )
                 with contextlib.closing(progress):
-                    cells = longest_first(open_ones, worlds) if jobs > PER_CELL else open_ones
-                    work(folder, cells, jobs, progress.look)
+                    work(folder, open_ones, jobs, progress.look)
         except KeyboardInterrupt:
             interrupted = True
         page, found = write_study(plan, folder, sittings(folder))

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import product
+from pathlib import Path
 from typing import Any
 
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.runfile.state import FIRST_FRESH_RUN
-from ddenv.runs.subject import load_parts, with_options
+from ddenv.runs.folder import SUFFIX
+from ddenv.runs.subject import with_options
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 
@@ -22,6 +25,8 @@ PAIRS = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", 
 MOST_SEED = 2**31
 # Between the seeds of a scenario. Run i has seed + i: the search has few runs, certificates have those from `FIRST_FRESH_RUN` on.
 SEEDS_APART = 10 * FIRST_FRESH_RUN
+# The folder of the runs, in that of the study.
+RUNS = "runs"
 # Characters that must not stand in the name of a file.
 NO_NAME = re.compile(r"[^\w-]+")
 # Bytes of a scenario's name in the names of files.
@@ -51,9 +56,7 @@ class Method:
     def label(self) -> str:
         """In short: the pair of `ddenv`, or the algorithm's name with the parts that it uses."""
         words = "/".join(self.used)
-        if self.algorithm == "ddenv":
-            return words
-        return f"{self.algorithm} {words}".strip()
+        return words if self.algorithm == "ddenv" else f"{self.algorithm} {words}".strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,11 @@ class Cell:
     def label(self) -> str:
         """Its name for people, without its seed."""
         return f"{self.scenario.name} {self.method.label}{' with slices' if self.slices else ''}"
+
+
+def run_path(folder: Path, cell: Cell) -> Path:
+    """The run file of a cell."""
+    return folder / RUNS / f"{cell.name}{SUFFIX}"
 
 
 def file_name(scenario: Scenario) -> str:
@@ -114,15 +122,18 @@ def make_plan(
 
     `options` are those of `ddenv.runs.subject.with_options` for all of it.
     """
-    names = scenario_names(scenarios)
     chosen_pairs = _chosen("--pairs", pairs, schemas.split_pair, {"paper": PAIRS, "all": schemas.pairs()})
     known = {"all": schemas.names("algorithm")}
     chosen_algorithms = _chosen("--algorithms", algorithms, partial(schemas.check, "algorithm"), known)
-    loaded = tuple(with_options(load_scenario(find_scenario(name)), **options) for name in names)
+    loaded = tuple(with_options(load_scenario(find_scenario(name)), **options) for name in scenario_names(scenarios))
     for number, scenario in enumerate(loaded):
         if scenario.name in (other.name for other in loaded[:number]):
             raise UserError(f"--scenarios: two of them are called '{scenario.name}'; give each a name of its own")
-    plan = Plan(loaded, tuple(_methods(chosen_algorithms, chosen_pairs)), seeds)
+    # Methods that use the same parts are the same.
+    methods: dict[tuple[str, ...], Method] = {}
+    for method in (Method(*parts) for parts in product(chosen_algorithms, chosen_pairs)):
+        methods.setdefault((method.algorithm, *method.used), method)
+    plan = Plan(loaded, tuple(methods.values()), seeds)
     if len({cell.name for cell in plan.cells}) < len(plan.cells):
         raise UserError("--scenarios: the names of two of them make the same file names; give each a name of its own")
     return plan
@@ -153,54 +164,12 @@ def _chosen(
     return names
 
 
-def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method]:
-    """Each method once: those that use the same parts are the same."""
-    seen = set()
-    for algorithm in algorithms:
-        for pair in pairs:
-            method = Method(algorithm, pair)
-            if (algorithm, method.used) not in seen:
-                seen.add((algorithm, method.used))
-                yield method
-
-
 def _cell(scenario: Scenario, method: Method, number: int, slices: bool) -> Cell:
     """The seeds of a scenario are so far apart that two cells share either all runs or none."""
     reduction = scenario.reduction
     seed = reduction.seed + number * SEEDS_APART
     if seed >= MOST_SEED:
         raise UserError(f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}")
-    of_cell = {"algorithm": method.algorithm, "pair": method.pair, "seed": seed, "slice": slices}
-    asked = reduction.model_copy(update=of_cell)
+    own = {"algorithm": method.algorithm, "pair": method.pair, "seed": seed, "slice": slices}
+    asked = reduction.model_copy(update=own)
     return Cell(scenario.model_copy(update={"reduction": asked}), method, seed)
-
-
-# The cost of a dynamic model in a test, relative to a static one: about what piles of boards cost when measured.
-MOVES = 4
-# Equal spans of time put most of a world into one part, which takes many rounds to split.
-SLOW = ("timeseg/", "trajectoryseg/")
-
-
-@dataclass(frozen=True, slots=True)
-class Size:
-    """A scenario's world: how many models can be removed, and the cost of a test, in static models."""
-
-    models: int
-    cost: int
-
-
-def sizes(plan: Plan) -> dict[str, Size]:
-    """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
-    return {scenario.name: _size(scenario) for scenario in plan.scenarios}
-
-
-def _size(scenario: Scenario) -> Size:
-    world, _ = load_parts(scenario)
-    elements = set(world.elements(frozenset(scenario.protected)))
-    moving = sum(not model.static for model in world.models if model.name in elements)
-    return Size(len(elements), len(elements) + MOVES * moving)
-
-
-def longest_first(cells: Sequence[Cell], worlds: dict[str, Size]) -> list[Cell]:
-    """The cells as they are to be made."""
-    return sorted(cells, key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW)))

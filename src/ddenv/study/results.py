@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
-from itertools import islice
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -30,9 +30,8 @@ from ddenv.runfile.events import (
 from ddenv.runfile.fold import steps
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import Recorded, RunFile
-from ddenv.study.plan import Cell, Method, Plan
-from ddenv.study.study_folder import run_path
+from ddenv.runfile.store import RunFile
+from ddenv.study.plan import Cell, Method, Plan, run_path
 from ddenv.world.access import read_bytes
 from ddenv.world.scenario import Scenario
 
@@ -67,9 +66,9 @@ class Found:
     those that the certificates rest on. They do not depend on the number of workers; tests made `ahead` of time and not needed do.
 
     `minimal`: the certificate shows it; `problem` says why not, "" if it does. `sizes` are (tests of the search, models left) from
-    the end of the baseline on. `seconds` and `certificate_seconds` are the times of these tests, one after another. `taken` of all
-    tests were reused from other cells. `whole_shown` of `whole_runs` of the counted runs of the whole world showed f. A candidate
-    without f cost `misses` tests at least. `steps_back`: how often the run went back because the rate of f was lost.
+    the end of the baseline on. `seconds` and `certificate_seconds` are the times of these tests, one after another. `taken_over`
+    of all tests were reused from other cells. `whole_f` of `whole_runs` of the counted runs of the whole world showed f. A
+    candidate without f cost `misses` tests at least. `steps_back`: how often the run went back because the rate of f was lost.
 
     `simulated` and `certificate_simulated` are those of them that no other run implied, with the audits of slices.
     """
@@ -81,22 +80,21 @@ class Found:
     elements: tuple[str, ...] = ()
     left: tuple[str, ...] = ()
     tests: int = 0
+    simulated: int = 0
     reruns: int = 0
     certificate_tests: int = 0
-    simulated: int = 0
     certificate_simulated: int = 0
     ahead: int = 0
-    taken: int = 0
+    taken_over: int = 0
     seconds: float = 0.0
     certificate_seconds: float = 0.0
+    steps_back: int = 0
     version: str = ""
     simulator: str = ""
     baseline: BaselineFinished | None = None
-    baseline_runs: int = 0
-    whole_shown: int = 0
     whole_runs: int = 0
+    whole_f: int = 0
     misses: int = 1
-    steps_back: int = 0
     sizes: tuple[tuple[int, int], ...] = ()
     certificate: Certificate | None = None
 
@@ -104,6 +102,12 @@ class Found:
     def smaller(self) -> float:
         """The share of the models that was removed."""
         return 1 - len(self.left) / len(self.elements) if self.elements else 0.0
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """The minimum of tests to show this result, and to find it (`least_to_show`, `least_to_find`)."""
+        known = len(self.elements), len(self.left), self.misses, self.cell.scenario.reduction.baseline_runs
+        return least_to_show(*known), least_to_find(*known)
 
 
 def read_cell(folder: Path, cell: Cell) -> Found:
@@ -113,16 +117,35 @@ def read_cell(folder: Path, cell: Cell) -> Found:
         return Found(cell)
     try:
         with RunFile(path) as file:
-            story = _story(file.events())
-            if other := difference(file, cell):
-                return Found(cell, problem=f"its run was made with {other}")
+            found = _read(file, cell)
+            other = difference(file, cell)
     except UserError as error:
         return Found(cell, problem=str(error))
-    state = story.state
-    if not all(0 < number <= len(state.tests) for number in (*story.search, *story.certificates)):
-        return Found(cell, problem=f"{path}: damaged run file: a verdict rests on tests that are not there")
-    tests = [state.tests[number - 1] for number in story.search]
-    fresh = [state.tests[number - 1] for number in story.certificates]
+    return Found(cell, problem=f"its run was made with {other}") if other else found
+
+
+def _read(file: RunFile, cell: Cell) -> Found:
+    """What the events of a cell's run add up to. Raises UserError."""
+    state = RunState()
+    # The numbers of the tests that the search and the certificates rest on, in order.
+    search, fresh = dict[int, None](), dict[int, None]()
+    sizes, misses, steps_back = list[tuple[int, int]](), list[int](), 0
+    for recorded, _, state in steps(file.events()):
+        match event := recorded.event:
+            case TestFinished(test) if state.tests[test - 1].phase == "baseline":
+                search[test] = None
+            case CandidateJudged():
+                search |= dict.fromkeys(event.tests)
+                if event.verdict == "dissimilar" and event.tests:
+                    misses.append(len(event.tests))
+            case CertificateFinished() | RateLost():
+                fresh |= dict.fromkeys(event.tests)
+                steps_back += isinstance(event, RateLost)
+        if isinstance(event, BaselineFinished | Reduced | RateLost | LeftOut | Finished):
+            sizes.append((len(search), len(state.environment)))
+    if not all(0 < number <= len(state.tests) for number in (*search, *fresh)):
+        raise UserError(f"{file.path}: damaged run file: a verdict rests on tests that are not there")
+    tests, fresh_tests = ([state.tests[number - 1] for number in numbers] for numbers in (search, fresh))
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
     # A certificate runs the whole world only where what is left missed f: its runs would show the rate as too low.
@@ -135,23 +158,22 @@ def read_cell(folder: Path, cell: Cell) -> Found:
         elements=state.elements,
         left=state.environment,
         tests=len(tests),
+        simulated=sum(test.implied_by is None for test in tests) + state.audits,
         reruns=sum(test.is_deflake_run for test in tests),
         certificate_tests=len(fresh),
-        simulated=sum(test.implied_by is None for test in tests) + state.audits,
-        certificate_simulated=sum(test.implied_by is None for test in fresh),
+        certificate_simulated=sum(test.implied_by is None for test in fresh_tests),
         ahead=state.tests_done - state.audits - len(tests) - len(fresh),
-        taken=sum(test.taken for test in state.tests),
+        taken_over=sum(test.taken for test in state.tests),
         seconds=sum(test.wall_seconds for test in tests),
-        certificate_seconds=sum(test.wall_seconds for test in fresh),
+        certificate_seconds=sum(test.wall_seconds for test in fresh_tests),
+        steps_back=steps_back,
         version=state.engine_version,
         simulator=state.simulator,
         baseline=state.baseline,
-        baseline_runs=sum(test.phase == "baseline" for test in tests),
-        whole_shown=whole.count("similar"),
         whole_runs=len(whole),
-        misses=min(story.misses, default=1 + cell.scenario.reduction.iterations),
-        steps_back=story.steps_back,
-        sizes=tuple(story.sizes),
+        whole_f=whole.count("similar"),
+        misses=min(misses, default=1 + cell.scenario.reduction.iterations),
+        sizes=tuple(sizes),
         certificate=certificate,
     )
 
@@ -159,65 +181,30 @@ def read_cell(folder: Path, cell: Cell) -> Found:
 def _problem(state: RunState) -> str:
     if state.minimal:
         return "it has no certificate"
-    if state.status == "finished":
-        return state.reason
     return state.reason if state.ended else "has not ended"
 
 
-@dataclass(slots=True)
-class _Story:
-    """What a run's events add up to. `search` and `certificates` are the tests that those rest on, in order; each entry of `misses`
-    is what a candidate without f cost.
-    """
+class Theirs(NamedTuple):
+    """A row of the paper: the number of its table, tests, which part of the models was removed, and minutes."""
 
-    state: RunState = field(default_factory=RunState)
-    search: dict[int, None] = field(default_factory=dict)
-    certificates: dict[int, None] = field(default_factory=dict)
-    sizes: list[tuple[int, int]] = field(default_factory=list)
-    misses: list[int] = field(default_factory=list)
-    steps_back: int = 0
-
-
-def _story(events: Iterable[Recorded]) -> _Story:
-    told = _Story()
-    for recorded, _, state in steps(events):
-        told.state = state
-        match event := recorded.event:
-            case TestFinished(test) if state.tests[test - 1].phase == "baseline":
-                told.search[test] = None
-            case CandidateJudged():
-                told.search |= dict.fromkeys(event.tests)
-                if event.verdict == "dissimilar" and event.tests:
-                    told.misses.append(len(event.tests))
-            case CertificateFinished() | RateLost():
-                told.certificates |= dict.fromkeys(event.tests)
-                told.steps_back += isinstance(event, RateLost)
-        if isinstance(event, BaselineFinished | Reduced | RateLost | LeftOut | Finished):
-            told.sizes.append((len(told.search), len(state.environment)))
-    return told
-
-
-@dataclass(frozen=True, slots=True)
-class Theirs:
-    """A row of the paper: tests, which part of the models was removed, and minutes."""
-
+    table: str
     tests: int
     smaller: float
     minutes: int
 
 
 @cache
-def paper_tables() -> dict[str, Any]:
-    """The paper's tables by the names of their scenarios: `table` is the number, `rows` has what `Theirs` has for each pair."""
+def _paper() -> dict[str, Any]:
     return dict(yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text()))
 
 
 def theirs(cell: Cell) -> Theirs | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
-    if cell.method.algorithm != "ddenv" or cell.slices:
+    table = _paper().get(cell.scenario.name, {"rows": {}})
+    row = table["rows"].get(cell.method.pair)
+    if row is None or cell.method.algorithm != "ddenv" or cell.slices:
         return None
-    rows = paper_tables()[cell.scenario.name]["rows"] if cell.scenario.name in paper_tables() else {}
-    return Theirs(**rows[cell.method.pair]) if cell.method.pair in rows else None
+    return Theirs(table["table"], **row)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,8 +233,7 @@ class Row:
     @property
     def bound(self) -> float | None:
         """The minimum of tests for any method to find this result, the median of the seeds; None if nothing is minimal."""
-        bounds = [least_of(each, least_to_show) for each in self.minimal]
-        return median(bounds) if bounds else None
+        return median(each.bounds[0] for each in self.minimal) if self.minimal else None
 
     @property
     def tests(self) -> float | None:
@@ -273,14 +259,6 @@ class Group:
         return tuple(each for row in self.rows for each in row.minimal)
 
     @property
-    def ends(self) -> dict[tuple[str, ...], list[Found]]:
-        """The cells that came to an end, by the models that are left."""
-        ends: dict[tuple[str, ...], list[Found]] = {}
-        for each in self.over:
-            ends.setdefault(each.left, []).append(each)
-        return ends
-
-    @property
     def models(self) -> int:
         """How many models of its world can be removed; 0 before the first run."""
         return max(len(each.elements) for row in self.rows for each in row.found)
@@ -288,24 +266,16 @@ class Group:
 
 def groups(plan: Plan, found: Sequence[Found]) -> tuple[Group, ...]:
     """The cells of `plan`, in its order, as rows of its scenarios."""
-    cells = iter(found)
-
-    def row(scenario: Scenario, method: Method) -> Row:
-        every = tuple(islice(cells, plan.seeds * (2 if scenario.reduction.slice else 1)))
-        return Row(
-            method,
-            tuple(each for each in every if not each.cell.slices),
-            tuple(each for each in every if each.cell.slices),
-        )
-
+    cells = defaultdict[tuple[str, Method, bool], tuple[Found, ...]](tuple)
+    for each in found:
+        cells[each.cell.scenario.name, each.cell.method, each.cell.slices] += (each,)
     return tuple(
-        Group(scenario, tuple(row(scenario, method) for method in plan.methods)) for scenario in plan.scenarios
+        Group(
+            scenario,
+            tuple(Row(one, cells[scenario.name, one, False], cells[scenario.name, one, True]) for one in plan.methods),
+        )
+        for scenario in plan.scenarios
     )
-
-
-def least_of(found: Found, bound: Callable[[int, int, int, int], int]) -> int:
-    """One of the bounds for a cell that is minimal."""
-    return bound(len(found.elements), len(found.left), found.misses, found.cell.scenario.reduction.baseline_runs)
 
 
 def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
@@ -333,14 +303,10 @@ def least_to_find(models: int, needed: int, misses: int, baseline_runs: int) -> 
     x + x^misses = 1 (Kraft's inequality; one bit a test if one miss is enough), and log2 C(n, k) bits are needed. A method that
     knows more, such as that models near f are likelier, may need less.
     """
-    least = math.log(math.comb(models, needed)) / -math.log(_root(misses))
-    return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, misses, baseline_runs))
-
-
-def _root(cost: int) -> float:
-    """x in (0, 1) with x + x^cost = 1."""
+    # x in (0, 1) with x + x^misses = 1, by halving.
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = (low + high) / 2
-        low, high = (middle, high) if middle + middle**cost < 1 else (low, middle)
-    return (low + high) / 2
+        low, high = (middle, high) if middle + middle**misses < 1 else (low, middle)
+    least = math.log(math.comb(models, needed)) / -math.log((low + high) / 2)
+    return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, misses, baseline_runs))

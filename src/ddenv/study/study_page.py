@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import mean
 
@@ -28,18 +28,25 @@ from ddenv.page.blocks import (
 )
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
-from ddenv.settings import SETTINGS, Setting
-from ddenv.study.plan import Plan
-from ddenv.study.results import Found, groups, least_of, least_to_find, least_to_show, read_cell, theirs
-from ddenv.study.study_folder import RUNS, Sitting, run_path
+from ddenv.report.repeat import value_words
+from ddenv.settings import SETTINGS
+from ddenv.study.plan import RUNS, Plan, run_path
+from ddenv.study.results import Found, groups, read_cell, theirs
 from ddenv.study.tables import best, section
+from ddenv.study.work import Sitting
 from ddenv.text import count, plain
 from ddenv.world.access import write_file
-from ddenv.world.scenario import Scenario
 
 STEM = "study"
 # These differ between cells.
 OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
+# Numbers of a cell in the table for programs.
+TIMES = ("seconds", "certificate_seconds")
+COUNTED = (
+    *("tests", "simulated", "reruns", "certificate_tests", "certificate_simulated", "ahead", "taken_over"),
+    *TIMES,
+    "steps_back",
+)
 # What the columns of the tables mean.
 COLUMNS = Path(__file__).with_name("columns.yaml")
 
@@ -68,42 +75,30 @@ def _verdict(found: Sequence[Found], minimal: Sequence[Found]) -> str:
     return f"{every} {worlds} minimal: {percent(mean(each.smaller for each in minimal))} smaller on average"
 
 
-def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
-    lead = [
-        say(
-            "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
-            "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, "
-            "and stops when no single model can be left out. Runs with fresh seeds then show what that is worth: it is "
-            f"certified if it keeps at least {_shares(found)} of the whole world's failure rate, and less without any one of its "
-            "models."
-        )
-    ]
-    pairs = [(each, theirs(each.cell)) for each in minimal]
-    beside = [(each, paper) for each, paper in pairs if paper is not None]
+def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> Iterator[Paragraph]:
+    shares = sorted({each.cell.scenario.reduction.certify_rate for each in found})
+    yield say(
+        "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
+        "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, and "
+        "stops when no single model can be left out. Runs with fresh seeds then show what that is worth: it is certified if "
+        f"it keeps at least {' or '.join(map(percent, shares))} of the whole world's failure rate, and less without any one "
+        "of its models."
+    )
+    beside = [(each, paper) for each in minimal if (paper := theirs(each.cell)) is not None]
     if beside:
         better = sum(each.smaller >= paper.smaller for each, paper in beside)
         fewer = sum(each.tests <= paper.tests for each, paper in beside)
-        ours, hours = sum(each.seconds for each, _ in beside), sum(paper.minutes for _, paper in beside) / 60
-        more = sum(each.certificate_seconds for each, _ in beside)
-        lead.append(
-            say(
-                f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
-                f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {duration(ours)}, one test after "
-                f"another, and the certificates, which the paper does not have, {duration(more)}. "
-                "The worlds follow the paper's descriptions but are not its worlds, and the simulator differs: compare the methods "
-                "with each other, and the minutes only roughly with the paper's."
-            )
+        hours = sum(paper.minutes for _, paper in beside) / 60
+        ours, more = (duration(sum(getattr(each, time) for each, _ in beside)) for time in TIMES)
+        yield say(
+            f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
+            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, one test after another, and "
+            f"the certificates, which the paper does not have, {more}. The worlds follow the paper's descriptions but are not "
+            "its worlds, and the simulator differs: compare the methods with each other, and the minutes only roughly with the "
+            "paper's."
         )
     if missing := len(found) - len(minimal):
-        lead.append(say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True))
-    return lead
-
-
-def _shares(found: Sequence[Found]) -> str:
-    """The shares of the whole world's rate that have to be kept."""
-    return " or ".join(
-        percent(share) for share in sorted({each.cell.scenario.reduction.certify_rate for each in found})
-    )
+        yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
 
 
 def _figures(
@@ -146,6 +141,7 @@ def table(folder: Path, found: Sequence[Found]) -> str:
 def _row(folder: Path, each: Found) -> dict[str, object]:
     cell, base, paper = each.cell, each.baseline, theirs(each.cell)
     partitioning, prioritization = cell.method.parts
+    to_show, to_find = each.bounds if each.minimal else (None, None)
     left, *removals = each.certificate.claims if each.certificate is not None else (None,)
     most = max((claim.shown / claim.runs for claim in removals if claim and claim.runs), default=None)
     return {
@@ -161,23 +157,14 @@ def _row(folder: Path, each: Found) -> dict[str, object]:
         "left": len(each.left),
         "reduction": round(each.smaller, 4),
         "names": " ".join(each.left),
-        "tests": each.tests,
-        "simulated": each.simulated,
-        "reruns": each.reruns,
-        "certificate_tests": each.certificate_tests,
-        "certificate_simulated": each.certificate_simulated,
-        "ahead": each.ahead,
-        "taken_over": each.taken,
-        "seconds": round(each.seconds, 2),
-        "certificate_seconds": round(each.certificate_seconds, 2),
-        "steps_back": each.steps_back,
+        **{name: round(getattr(each, name), 2) for name in COUNTED},
         "baseline_runs": base and base.runs,
         "baseline_f": base and base.failures,
-        "least_to_show": least_of(each, least_to_show) if each.minimal else None,
-        "least_to_find": least_of(each, least_to_find) if each.minimal else None,
+        "least_to_show": to_show,
+        "least_to_find": to_find,
         "keep_rate": each.certificate and each.certificate.keep_rate,
         "whole_runs": each.certificate and each.whole_runs,
-        "whole_f": each.certificate and each.whole_shown,
+        "whole_f": each.certificate and each.whole_f,
         "left_runs": left and left.runs,
         "left_f": left and left.shown,
         "left_low": left and round(left.low, 4),
@@ -195,85 +182,58 @@ def _row(folder: Path, each: Found) -> dict[str, object]:
 
 def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:
     """The section on how the study was made."""
+    # A name that begins with a dash would be an option.
+    start = f"./{folder}" if str(folder).startswith("-") else folder
+    example = shlex.quote(plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv"))
     blocks: list[Block] = [
-        *_settings(plan),
-        *_sittings(sittings),
+        _settings(plan),
+        *([_sittings(sittings)] if sittings else []),
         *_computed(found),
         say("What the columns mean:"),
         Table(("column", "meaning"), tuple(yaml.safe_load(COLUMNS.read_text()).items())),
-        *_again(plan, folder),
+        say("Each cell is a run that can be watched, continued and reported:"),
+        Code((f"ddenv open {example}", f"ddenv certify {example}")),
     ]
     return Section("How it was made", tuple(blocks))
 
 
-def _settings(plan: Plan) -> list[Block]:
-    """A table with a column for each scenario."""
-    asked = [one for one in SETTINGS.values() if one.section != "simulation" and one.name not in OF_A_CELL]
-    said = [(one.label, [_value(scenario, one) for scenario in plan.scenarios]) for one in asked if _is_used(plan, one)]
-    said.append(("seeds", [", ".join(map(str, _seeds(plan, scenario))) for scenario in plan.scenarios]))
+def _settings(plan: Plan) -> Table:
+    """The settings that any method uses, with a column for each scenario."""
+    used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
+    rows = [
+        (one.label, *(value_words(getattr(getattr(each, one.section), one.name)) for each in plan.scenarios))
+        for one in SETTINGS.values()
+        if one.section != "simulation" and one.name not in OF_A_CELL and (not one.used_by or used & set(one.used_by))
+    ]
+    seeds = ({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name} for scenario in plan.scenarios)
+    rows.append(("seeds", *(", ".join(map(str, sorted(each))) for each in seeds)))
     head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
-    rows = tuple((label, *values) for label, values in said)
-    return [Table(head, rows, frozenset(range(1, len(head))))]
+    return Table(head, tuple(rows), frozenset(range(1, len(head))))
 
 
-def _is_used(plan: Plan, one: Setting) -> bool:
-    """Whether any method of the study uses the setting."""
-    return not one.used_by or any({method.algorithm, *method.parts} & set(one.used_by) for method in plan.methods)
-
-
-def _seeds(plan: Plan, scenario: Scenario) -> list[int]:
-    return sorted({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name})
-
-
-def _value(scenario: Scenario, one: Setting) -> str:
-    value = getattr(getattr(scenario, one.section), one.name)
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
+def _sittings(sittings: Sequence[Sitting]) -> Table:
     rows = tuple(
         (
-            f"{moment(each.begun)} UTC",
-            duration(each.seconds),
-            str(each.jobs),
-            thousands(each.tests),
-            Name(each.machine),
-            Name(each.versions),
+            *(f"{moment(one.begun)} UTC", duration(one.seconds), str(one.jobs), thousands(one.tests)),
+            *(Name(one.machine), Name(one.versions)),
         )
-        for each in sittings
+        for one in sittings
     )
     head = ("worked on", "for", "workers", "tests made", "machine", "versions")
-    return [Table(head, rows, frozenset({1, 2, 3}))] if rows else []
+    return Table(head, rows, frozenset({1, 2, 3}))
 
 
-def _computed(found: Sequence[Found]) -> list[Block]:
-    """The versions, since tests of different versions may differ."""
+def _computed(found: Sequence[Found]) -> Iterator[Block]:
+    # Tests of different versions may differ.
     drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
     versions = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
-    taken = sum(each.taken for each in found)
-    words = (
-        f"Computed with {versions[0]}."
-        if len(versions) == 1
-        else f"Different versions computed parts of it: {'; '.join(versions)}."
-    )
-    blocks: list[Block] = [say(words, notice=len(versions) > 1)] if versions else []
+    taken = sum(each.taken_over for each in found)
+    if len(versions) == 1:
+        yield say(f"Computed with {versions[0]}.")
+    elif versions:
+        yield say(f"Different versions computed parts of it: {'; '.join(versions)}.", notice=True)
     if taken:
-        blocks.append(
-            say(
-                f"{thousands(taken)} tests were reused from another cell with the same models and the same seed: the simulation is "
-                "deterministic to the last bit. They count in each cell, with their time."
-            )
+        yield say(
+            f"{thousands(taken)} tests were reused from another cell with the same models and the same seed: the simulation is "
+            "deterministic to the last bit. They count in each cell, with their time."
         )
-    return blocks
-
-
-def _again(plan: Plan, folder: Path) -> list[Block]:
-    # A name that begins with a dash would be an option.
-    start = f"./{folder}" if str(folder).startswith("-") else folder
-    example = plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv")
-    return [
-        say("Each cell is a run that can be watched, continued and reported:"),
-        Code((f"ddenv open {shlex.quote(example)}", f"ddenv certify {shlex.quote(example)}")),
-    ]

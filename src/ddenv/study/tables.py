@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
+from statistics import geometric_mean
 
 from ddenv.errors import UserError
 from ddenv.evidence.rates import anytime_interval
 from ddenv.page.blocks import Block, Cell, Paragraph, Part, Picture, Section, Strong, Table, named, percent, say
 from ddenv.page.step_chart import LEFT, At, axes, opening, path, scale, steps
-from ddenv.report.report_map import CORNERS, picture
+from ddenv.report.report_map import picture
 from ddenv.report.run_data import read_run
-from ddenv.study.plan import Method, file_name
-from ddenv.study.results import Found, Group, Row, least_of, least_to_find, least_to_show, paper_tables, spread, theirs
-from ddenv.study.study_folder import run_path
+from ddenv.study.plan import file_name, run_path
+from ddenv.study.results import Found, Group, Row, Theirs, spread, theirs
 from ddenv.text import count, plain
 
 HEIGHT = 320.0
@@ -27,8 +27,6 @@ WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
 MOST_WORLDS, MOST_LEFT = 4, 12
 # The maximum number of models that are named.
 MOST_NAMES = 8
-# With more methods than this, the details are not a table but a sentence for each set of models that is left.
-MOST_ROWS = 12
 # The maximum number of cells with the same problem that are named.
 MOST_CELLS = 3
 BEHIND = (
@@ -37,23 +35,32 @@ BEHIND = (
 )
 # A comparison needs at least this many methods.
 FEWEST = 4
+BOUNDS = (
+    "Search tests, the baseline included; certificates cost about the same after each method. Ranked by the ratio of tests to "
+    "the first bound (geometric mean over the scenarios); a method that is not certified with every seed is not ranked. No "
+    "search needs fewer tests: after the baseline, f has to show in what is left, and each of its models has to be left out "
+    "without success, with as many runs as a candidate without f takes. The second bound is for methods without any "
+    "knowledge: the mean number of tests to find the needed set of models, if all sets of that size are equally likely. A "
+    "method that first tries models near the failure may need fewer. The mark (◂) shows the fewest tests."
+)
 
 
 def chart(group: Group) -> str:
     """The chart of a scenario with at least one cell that came to an end."""
     named, others = _looks(group)
-    last = max(1, *(each.tests for each in group.over))
-    most = max(1, group.models)
-
+    last, most = max(1, *(each.tests for each in group.over)), max(1, group.models)
     at = scale(last, most, HEIGHT)
-    height = HEIGHT + LINE * (len(named) + bool(others)) + 4
-    parts = [opening(height), *axes(at, last, most)]
-    for row in others:
-        parts += _lines(row, at, "faint")
-    for number, row in enumerate(named):
-        parts += _lines(row, at, f"look look{number}", WIDTHS[number])
-    parts += _legend(named, others)
-    return "\n".join([*parts, "</svg>"])
+    own = [(row, f"look look{number}", width) for number, (row, width) in enumerate(zip(named, WIDTHS, strict=False))]
+    lines = [line for row in others for line in _lines(row, at, "faint")]
+    lines += [line for row, look, width in own for line in _lines(row, at, look, width)]
+    legend = [(look, f' stroke-width="{width:g}"', escape(plain(_line_end(row)))) for row, look, width in own]
+    legend += [("faint", "", count(len(others), "other method"))] if others else []
+    for number, (look, wide, words) in enumerate(legend):
+        y = HEIGHT + 4 + LINE * number
+        lines.append(f'<path class="{look}"{wide} d="M{LEFT} {y:.1f}h{SAMPLE}"/>')
+        lines.append(f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{words}</text>')
+    height = HEIGHT + LINE * len(legend) + 4
+    return "\n".join([opening(height), *axes(at, last, most), *lines, "</svg>"])
 
 
 def _looks(group: Group) -> tuple[list[Row], list[Row]]:
@@ -78,19 +85,6 @@ def _lines(row: Row, at: At, look: str, width: float | None = None) -> Iterator[
             yield f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" r="{1.5 + width / 2:g}"/>'
 
 
-def _legend(named: Sequence[Row], others: Sequence[Row]) -> Iterator[str]:
-    y = HEIGHT + 4
-    for number, row in enumerate(named):
-        wide = WIDTHS[number]
-        yield f'<path class="look look{number}" stroke-width="{wide:g}" d="M{LEFT} {y:.1f}h{SAMPLE}"/>'
-        yield f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{escape(plain(_line_end(row)))}</text>'
-        y += LINE
-    if others:
-        yield f'<path class="faint" d="M{LEFT} {y:.1f}h{SAMPLE}"/>'
-        words = count(len(others), "other method")
-        yield f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{words}</text>'
-
-
 def _line_end(row: Row) -> str:
     if len(row.found) > 1:
         return f"{row.method.label}, {len(row.minimal)} of {len(row.found)} seeds certified"
@@ -101,61 +95,50 @@ def _line_end(row: Row) -> str:
 
 def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
     """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
-    ends = group.ends
+    ends = defaultdict[tuple[str, ...], list[Found]](list)
+    for each in group.over:
+        ends[each.left].append(each)
     ranked = sorted(ends.items(), key=lambda one: (-sum(each.minimal for each in one[1]), -len(one[1])))
     for number, (left, cells) in enumerate(ranked[:MOST_WORLDS], start=1):
-        yield say(*_said(left, cells, len(group.over)))
-        yield from _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
+        minimal = any(each.minimal for each in cells)
+        what = "The minimal world" if minimal else "What is left, not shown to be minimal"
+        of_them = f", the end of {len(cells)} of {len(group.over)} cells" if len(group.over) > 1 else ""
+        these = named(left, MOST_LEFT) or ("nothing that can be removed",)
+        yield say(f"{what} (the paper's Figure 3){of_them}: ", *these, ".")
+        yield _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
     if len(ranked) > MOST_WORLDS:
         yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')}, which fewer cells found.")
 
 
-def _said(left: tuple[str, ...], cells: Sequence[Found], of_them: int) -> Iterator[Part]:
-    minimal = any(each.minimal for each in cells)
-    yield f"{'The minimal world' if minimal else 'What is left, not shown to be minimal'} (the paper's Figure 3)"
-    yield f", the end of {len(cells)} of {of_them} cells: " if of_them > 1 else ": "
-    yield from named(left, MOST_LEFT) or ("nothing that can be removed",)
-    yield "."
-
-
-def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
-    from ddenv.map.footprints import plan
-
+def _map(folder: Path, found: Found, name: str) -> Block:
     try:
         record = read_run(run_path(folder, found.cell))
     except UserError as error:
-        yield say(f"No map: {plain(error)}", notice=True)
-        return
+        return say(f"No map: {plain(error)}", notice=True)
     if record.world is None:
-        yield say("No map: the world cannot be read.", notice=True)
-        return
-    alternative = (
-        f"The world of {plain(found.cell.scenario.name)} from above: what is left is solid, what was removed is faint."
-    )
-    yield Picture(name, picture(record, plan(record.world, CORNERS), name), alternative)
+        return say("No map: the world cannot be read.", notice=True)
+    scenario = plain(found.cell.scenario.name)
+    words = f"The world of {scenario} from above: what is left is solid, what was removed is faint."
+    return Picture(name, picture(record, name), words)
 
 
 def section(folder: Path, group: Group) -> Section:
     """The section on one scenario."""
-    name = plain(group.scenario.name)
-    models = f", {count(group.models, 'model')}" if group.models else ""
-    title = f"{name}{models}"
-    if _has_theirs(group):
-        title += f" (Table {paper_tables()[group.scenario.name]['table']} of the paper)"
+    file, paper = file_name(group.scenario), _papers(group)
+    title = plain(group.scenario.name) + (f", {count(group.models, 'model')}" if group.models else "")
+    title += f" (Table {paper[0].table} of the paper)" if paper else ""
     blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
-    blocks += [numbers(group), *_slices(group)]
-    blocks += _problems(group)
+    blocks += [numbers(group), *_slices(group), *_problems(group)]
     if group.over:
-        blocks += [behind(group)] if len(group.rows) <= MOST_ROWS else _in_short(group)
         caption = "Models left after each test of the search, a line for each method (the paper's Figure 2):"
-        blocks += [say(caption), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), caption)]
-    blocks += worlds(folder, group, file_name(group.scenario))
+        blocks += [behind(group), say(caption), Picture(f"figure-2-{file}", chart(group), caption)]
+    blocks += worlds(folder, group, file)
     return Section(title, tuple(blocks))
 
 
 def numbers(group: Group) -> Table:
     """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has them."""
-    beside, slices = _has_theirs(group), any(row.sliced for row in group.rows)
+    beside, slices = bool(_papers(group)), any(row.sliced for row in group.rows)
     rows = [tuple(_numbers(row, beside, slices)) for row in group.rows]
     head = tuple(title for title, _ in rows[0])
     return Table(head, tuple(tuple(cell for _, cell in row) for row in rows), frozenset(range(2, len(head))))
@@ -178,10 +161,10 @@ def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]
     yield "% reduction", spread([each.smaller for each in over], percent)
     if beside:
         yield "paper", "–" if paper is None else percent(paper.smaller)
-    yield "search minutes", spread([each.seconds / 60 for each in over], _minutes)
+    yield "search minutes", spread([each.seconds / 60 for each in over], "{:.1f}".format)
     if beside:
         yield "paper", "–" if paper is None else str(paper.minutes)
-    yield "certificate minutes", spread([each.certificate_seconds / 60 for each in over], _minutes)
+    yield "certificate minutes", spread([each.certificate_seconds / 60 for each in over], "{:.1f}".format)
 
 
 def _slices(group: Group) -> Iterator[Paragraph]:
@@ -209,12 +192,9 @@ def _whole(value: float) -> str:
     return f"{value:.0f}" if value == int(value) else f"{value:.1f}"
 
 
-def _minutes(value: float) -> str:
-    return f"{value:.1f}"
-
-
-def _has_theirs(group: Group) -> bool:
-    return any(theirs(row.found[0].cell) is not None for row in group.rows)
+def _papers(group: Group) -> list[Theirs]:
+    """The rows of the paper's table of the scenario."""
+    return [paper for row in group.rows if (paper := theirs(row.found[0].cell)) is not None]
 
 
 def behind(group: Group) -> Table:
@@ -222,45 +202,21 @@ def behind(group: Group) -> Table:
     return Table(BEHIND, tuple(_behind(row) for row in group.rows), frozenset({1, 6, 7}))
 
 
-def _in_short(group: Group) -> Iterator[Paragraph]:
-    """The details of many methods, a sentence for each set of models that is left."""
-    for left, cells in group.ends.items():
-        reruns = spread([each.reruns / each.tests for each in cells], percent)
-        certified = f"certified in {sum(each.minimal for each in cells)} of them; re-runs {reruns} of the search tests"
-        rates = f"f in the whole world {_in_whole(cells)}, in what is left {_in_left(cells)}"
-        words = (
-            f" are left in {len(cells)} of {count(len(group.over), 'cell')}, {certified}; {rates}, without one of them "
-        )
-        yield say(*(named(left, MOST_NAMES) or ("none",)), f"{words}{_without(cells)}.")
-
-
 def _behind(row: Row) -> tuple[Cell, ...]:
     over = row.over
+    claims = [claim for each in over if each.certificate for claim in each.certificate.claims]
+    of_left = [claim for claim in claims if claim.without is None]
+    # The highest of the rates without one of the models.
+    without = max((claim for claim in claims if claim.without), key=lambda claim: claim.high, default=None)
     reruns = spread([each.reruns / each.tests for each in over if each.tests], percent)
     bound = "–" if row.bound is None else f"{row.bound:g}"
     back = spread([each.steps_back for each in over], _whole)
-    rates = (_in_whole(row.found), _in_left(over), _without(over))
+    rates = (
+        _rate(sum(each.whole_f for each in row.found), sum(each.whole_runs for each in row.found)),
+        _rate(sum(claim.shown for claim in of_left), sum(claim.runs for claim in of_left)),
+        "–" if without is None else f"at most {_rate(without.shown, without.runs)}",
+    )
     return row.method.label, reruns, _left(over), *rates, back, bound
-
-
-def _in_whole(cells: Sequence[Found]) -> str:
-    """How often f showed in all runs of the whole world."""
-    return _rate(sum(each.whole_shown for each in cells), sum(each.whole_runs for each in cells))
-
-
-def _in_left(cells: Sequence[Found]) -> str:
-    """How often f showed in fresh runs of what is left."""
-    claims = [claim for each in cells if each.certificate for claim in each.certificate.claims if claim.without is None]
-    return _rate(sum(claim.shown for claim in claims), sum(claim.runs for claim in claims))
-
-
-def _without(cells: Sequence[Found]) -> str:
-    """How often f showed in fresh runs without one of the models that are left: the highest of these rates."""
-    claims = [claim for each in cells if each.certificate for claim in each.certificate.claims if claim.without]
-    if not claims:
-        return "–"
-    most = max(claims, key=lambda claim: claim.high)
-    return f"at most {_rate(most.shown, most.runs)}"
 
 
 def _rate(shown: int, runs: int) -> str:
@@ -301,39 +257,34 @@ def best(groups: Sequence[Group]) -> Section | None:
     methods = [row.method for row in groups[0].rows]
     if len(methods) < FEWEST or not any(group.minimal for group in groups):
         return None
-    ranked = sorted(zip(methods, zip(*(group.rows for group in groups), strict=True), strict=True), key=_rank)
     least = [
         min((tests for row in group.rows if (tests := _certain(row)) is not None), default=None) for group in groups
     ]
-    rows = [_row(method, rows, least) for method, rows in ranked]
-    shown, likely = (tuple(_bound(group, bound) for group in groups) for bound in (least_to_show, least_to_find))
+    # Methods that are not certified everywhere come last.
+    ranked = sorted(
+        (
+            (_times(rows), method, rows)
+            for method, *rows in zip(methods, *(group.rows for group in groups), strict=True)
+        ),
+        key=lambda entry: entry[0] or math.inf,
+    )
     head = ("method", *(f"{plain(group.scenario.name)}, tests" for group in groups), "times the bound, mean")
-    bounds = (
+    shown, likely = (tuple(_bound(group, which) for group in groups) for which in (0, 1))
+    rows: list[tuple[Cell, ...]] = [
         ("minimum for a search that ends there", *shown, "1.0"),
         ("minimum to find it, if all sets are equally likely", *likely, "–"),
-    )
-    table = Table(head, (*bounds, *rows), frozenset(range(1, len(head))))
-    return Section("Which is best where", (*_words(groups), table, _about_the_bound()))
-
-
-def _rank(entry: tuple[Method, tuple[Row, ...]]) -> tuple[bool, float]:
-    """By the mean ratio of tests to bound; methods that are not certified everywhere come last."""
-    times = _times(entry[1])
-    return times is None, times or 0.0
+    ]
+    for times, method, own in ranked:
+        cells = [_cell(row, fewest) for row, fewest in zip(own, least, strict=True)]
+        rows.append((method.label, *cells, "–" if times is None else f"{times:.1f}"))
+    table = Table(head, tuple(rows), frozenset(range(1, len(head))))
+    return Section("Which is best where", (*_words(groups), table, say(BOUNDS)))
 
 
 def _times(rows: Sequence[Row]) -> float | None:
     """The geometric mean of tests to bound: each scenario has the same weight, whatever its number of tests."""
     ratios = [tests / row.bound for row in rows if (tests := _certain(row)) is not None and row.bound]
-    if len(ratios) < len(rows):
-        return None
-    return math.exp(sum(map(math.log, ratios)) / len(ratios))
-
-
-def _row(method: Method, rows: Sequence[Row], least: Sequence[float | None]) -> tuple[Cell, ...]:
-    times = _times(rows)
-    cells = tuple(_cell(row, fewest) for row, fewest in zip(rows, least, strict=True))
-    return method.label, *cells, "–" if times is None else f"{times:.1f}"
+    return geometric_mean(ratios) if len(ratios) == len(rows) else None
 
 
 def _certain(row: Row) -> float | None:
@@ -349,34 +300,22 @@ def _cell(row: Row, fewest: float | None) -> Cell:
     return Strong(f"{row.tests:g} ◂") if row.tests == fewest else f"{row.tests:g}"
 
 
-def _bound(group: Group, bound: Callable[[int, int, int, int], int]) -> str:
-    """The bound as a range, since cells may differ in how many models are left."""
-    bounds = sorted({least_of(each, bound) for each in group.minimal})
-    if not bounds:
-        return "–"
-    return str(bounds[0]) if len(bounds) == 1 else f"{bounds[0]} to {bounds[-1]}"
+def _bound(group: Group, which: int) -> str:
+    """One of the bounds as a range, since cells may differ in how many models are left."""
+    bounds = sorted({each.bounds[which] for each in group.minimal})
+    return " to ".join(map(str, dict.fromkeys((bounds[0], bounds[-1])))) if bounds else "–"
 
 
-def _words(groups: Sequence[Group]) -> list[Block]:
-    lines: list[Block] = []
+def _words(groups: Sequence[Group]) -> Iterator[Block]:
     for group in groups:
-        rows = [(tests, row) for row in group.rows if (tests := _certain(row)) is not None]
+        rows = sorted(
+            ((tests, row.method.label) for row in group.rows if (tests := _certain(row)) is not None),
+            key=lambda one: one[0],
+        )
         if rows:
-            fewest, first = min(rows, key=lambda one: one[0])
-            most, last = max(rows, key=lambda one: one[0])
+            (fewest, first), most = rows[0], rows[-1][0]
+            last = next(label for tests, label in rows if tests == most)
             equal = sum(tests == fewest for tests, _ in rows) - 1
             also = f" and {count(equal, 'other')}" if equal else ""
-            words = f": {first.method.label}{also} with the fewest tests, {fewest:g}; {last.method.label} with the most, {most:g}."
-            lines.append(say(Strong(plain(group.scenario.name)), words))
-    return lines
-
-
-def _about_the_bound() -> Block:
-    return say(
-        "Search tests, the baseline included; certificates cost about the same after each method. Ranked by the ratio of tests to "
-        "the first bound (geometric mean over the scenarios); a method that is not certified with every seed is not ranked. No "
-        "search needs fewer tests: after the baseline, f has to show in what is left, and each of its models has to be left out "
-        "without success, with as many runs as a candidate without f takes. The second bound is for methods without any "
-        "knowledge: the mean number of tests to find the needed set of models, if all sets of that size are equally likely. A "
-        "method that first tries models near the failure may need fewer. The mark (◂) shows the fewest tests."
-    )
+            words = f": {first}{also} with the fewest tests, {fewest:g}; {last} with the most, {most:g}."
+            yield say(Strong(plain(group.scenario.name)), words)

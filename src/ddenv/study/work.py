@@ -1,30 +1,112 @@
-"""Runs the cells of a study, several at the same time, each with its own engine; continues existing run files."""
+"""Works in the folder of a study: runs its cells, several at the same time, each with its own engine, and records its sessions."""
 
 from __future__ import annotations
 
 import contextlib
+import json
+import os
+import platform
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
+from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.runfile.fold import fold
-from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.lock import engine_is_alive, held
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs import processor
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
-from ddenv.study.plan import Cell
+from ddenv.study.plan import RUNS, Cell, run_path
 from ddenv.study.results import difference
-from ddenv.study.study_folder import run_path
+from ddenv.text import count
+from ddenv.world.access import read_bytes, write_file
 
+ABOUT, LOCK = "study.json", "study.lock"
+# The numbers of a run come from these: another version may give another result.
+PACKAGES = ("drake", "numpy", "scipy", "scikit-learn")
+# A machine's name may be anything.
+LONGEST_NAME = 120
 POLL = 0.2
 # With more workers, most of the additional tests are not needed.
 PER_CELL = 2
+
+
+@contextmanager
+def opened(folder: Path) -> Iterator[None]:
+    """Creates the folder if needed, and locks it against other studies. Raises UserError."""
+    refused, instead = f"{folder}: cannot be written", "choose another folder with -o"
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise UserError(f"{folder}: is a file; give the name of a folder")
+        if folder.is_dir() and any(folder.iterdir()) and not (folder / ABOUT).exists() and not (folder / LOCK).exists():
+            raise UserError(f"{folder}: contains other files; give the name of a new or empty folder")
+        (folder / RUNS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{refused}: {error.strerror}; {instead}") from None
+    if not os.access(folder / RUNS, os.W_OK):
+        raise UserError(f"{refused}: no permission; {instead}")
+    taken = f"{folder}: another study is running in this folder; wait for it, or {instead}"
+    with held(folder / LOCK, taken, refused, instead):
+        yield
+
+
+@dataclass(frozen=True, slots=True)
+class Sitting:
+    """One session of work on the study. `begun` is Unix time, s; `seconds` and `tests` count this session so far."""
+
+    begun: float
+    seconds: float
+    jobs: int
+    tests: int
+    versions: str
+    machine: str
+
+
+_SITTINGS = TypeAdapter(tuple[Sitting, ...])
+
+
+def sittings(folder: Path) -> tuple[Sitting, ...]:
+    """The sessions of work on the study so far. Raises UserError for a damaged file."""
+    path = folder / ABOUT
+    if not path.exists():
+        return ()
+    try:
+        return _SITTINGS.validate_python(json.loads(read_bytes(path))["sittings"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise UserError(f"{path}: is damaged; delete it (the runs are not affected)") from None
+
+
+def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:
+    """Writes them as a whole or not at all."""
+    text = json.dumps({"sittings": [asdict(each) for each in all_of_them]}, indent=1)
+    write_file(folder / ABOUT, text.encode())
+
+
+def versions() -> str:
+    """The versions of ddenv, Python and the packages that compute; imports none of them."""
+    found = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
+    for name in PACKAGES:
+        with contextlib.suppress(PackageNotFoundError):
+            found.append(f"{name} {version(name)}")
+    return ", ".join(found)
+
+
+def machine() -> str:
+    """The processor, its cores and the system."""
+    cores = count(processor.usable_cores(), "core")
+    name = processor.name()[:LONGEST_NAME]
+    return f"{name}, {cores}, {platform.system()}" if name else cores
 
 
 @dataclass
@@ -44,6 +126,10 @@ class Work:
     problem: str = ""
     made_before: int = 0
     known: int = 0
+
+    def catch_up(self) -> None:
+        """Reads the new events."""
+        self.state = fold(self.file.events(self.state.revision), self.state)
 
 
 Look = Callable[[Sequence[Work], Sequence[Cell], Sequence[Work]], None]
@@ -123,7 +209,7 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
     if not path.exists():
         create_run(cell.scenario, path)
     each = Work(cell, path, workers, RunFile(path))
-    each.state = fold(each.file.events())
+    each.catch_up()
     each.made_before = tests_made(each.state)
     each.known = each.state.revision
     if not engine_is_alive(path) and not _is_over(each.state):
@@ -132,11 +218,10 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
 
 
 def _has_ended(each: Work) -> bool:
-    """Reads a cell's new events."""
     # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours, and
     # then ours gave up.
     at_work = (each.engine is not None and each.engine.poll() is None) or engine_is_alive(each.path)
-    each.state = fold(each.file.events(each.state.revision), each.state)
+    each.catch_up()
     if at_work:
         return False
     if each.state.status != "finished":
@@ -169,4 +254,4 @@ def _stop(running: Sequence[Work]) -> None:
     while time.monotonic() < deadline and any(engine_is_alive(each.path) for each in left):
         time.sleep(POLL)
     for each in running:
-        each.state = fold(each.file.events(each.state.revision), each.state)
+        each.catch_up()

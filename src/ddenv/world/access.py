@@ -94,8 +94,11 @@ def read_bytes(path: Path) -> bytes:
         raise UserError(f"{path}: {error}") from None
 
 
-def write_file(path: Path, content: bytes) -> None:
-    """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises UserError."""
+def write_file(path: Path, content: bytes, mode: int = 0o666) -> None:
+    """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises UserError.
+
+    `mode` are the file's permissions, from which the user's mask takes away.
+    """
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     except OSError as error:
@@ -107,7 +110,7 @@ def write_file(path: Path, content: bytes) -> None:
             os.fsync(file.fileno())
         mask = os.umask(0)
         os.umask(mask)
-        Path(name).chmod(0o666 & ~mask)
+        Path(name).chmod(mode & ~mask)
         Path(name).replace(path)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
