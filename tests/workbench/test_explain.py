@@ -369,3 +369,12 @@ def test_invalid_events_are_named_and_the_rest_is_shown(run, kind, data):
     assert f"({kind})" in found.error
     assert found.state.round.number == 1
     explain(found)
+
+
+def test_where_f_is_rare_the_other_way_is_offered_until_something_is_left_out(run):
+    run.created().baseline(failures=1)
+    run.write("noted", about="rare", words="f shows in 1 of 4 runs: exactly takes less")
+    run.start_round(2)
+    assert "F shows in 1 of 4 runs: exactly takes less. Press c to change it." in told(run)[1]
+    run.reduce(0, run.elements[:4], run.similar(0))
+    assert "exactly takes less" not in told(run)[1]

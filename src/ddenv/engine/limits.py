@@ -86,7 +86,7 @@ def note_rare(journal: Journal) -> None:
         journal,
         "rare",
         f"f shows in {base.failures} of {count(base.runs, 'run')}: to keep its rate takes about {kept} tests; to reduce the "
-        f"failing runs themselves, exactly, about {exact}: change accept_rate to exact, or run with --exact",
+        f"failing runs themselves, exactly, about {exact}: accept_rate exact (--exact)",
     )
 
 

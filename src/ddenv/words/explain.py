@@ -52,9 +52,15 @@ def explain(snapshot: Snapshot) -> Explanation:
         sentences = (snapshot.happened, *sentences)
     elif not snapshot.error:
         first = (*older_engine(snapshot), *refuted(state), *rarer(state), *to_adopt(state))
-        sentences = (*first, *sentences, *implied(state), *by_hand(state))
+        sentences = (*first, *sentences, *implied(state), *_offered(state), *by_hand(state))
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
+
+
+def _offered(state: RunState) -> tuple[str, ...]:
+    """What a rare f costs, and would cost in another way, until something is left out."""
+    rare = dict(state.notes).get("rare", "")
+    return (f"{as_sentence(plain(rare))} Press c to change it.",) if rare and not state.node and not state.ended else ()
 
 
 def _happening(snapshot: Snapshot) -> Happening:
