@@ -55,7 +55,9 @@ class World:
 
 
 def check(false, error, simulated=SIMULATED):
-    """Fails if so many false claims are unlikely where each is false with a chance of `error`."""
+    """Fails if so many false claims are unlikely where each is false with a chance of `error`. With -s it prints a table of all."""
+    kind = os.environ["PYTEST_CURRENT_TEST"].partition("::")[2].removesuffix(" (call)")
+    print(f"| {kind} | {false} of {simulated} | {false / simulated:.1%} | {error:.1%} |")
     assert binomtest(false, simulated, error, alternative="greater").pvalue > 0.001, f"{false} of {simulated} are false"
 
 
