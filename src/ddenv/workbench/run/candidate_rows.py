@@ -174,7 +174,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         return _run(snapshot, item, row + 1 - len(listing.trials))
     if isinstance(item, FreshRuns):
         return certificate_words(snapshot, item)
-    tests = [snapshot.state.tests[id - 1] for id in item.tests if 0 < id <= len(snapshot.state.tests)]
+    tests = snapshot.state.tests_of(item.tests)
     done = [test for test in tests if test.is_finished]
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
     distances = [test.distance for test in done if test.distance is not None]

@@ -8,7 +8,6 @@ from typing import ClassVar
 from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from rich.style import Style
-from rich.text import Text
 from textual import events
 from textual.binding import Binding
 from textual.geometry import Region, Size
@@ -81,10 +80,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     # What is listed.
 
     @property
-    def row_count(self) -> int:
-        return len(self._listed)
-
-    @property
     def item(self) -> Item | None:
         """What the row under the cursor is about, also in the tables of the baseline and of a certificate."""
         return self._listed.item(self.cursor_row)
@@ -99,15 +94,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         """The candidate or trial that was chosen by hand."""
         return None if self.following else self.under_cursor
 
-    def get_row_at(self, row: int) -> list[Text]:
-        """The cells of a row, in the order of the columns."""
-        cells = words(self._snapshot, self._listed, row)
-        return [_text(column, cells.get(column.name, "")) for column in self.columns]
-
-    def get_cell(self, key: str, name: str) -> Text:
-        """A cell of the candidate whose index is `key`."""
-        row = len(self._listed.trials) + int(key)
-        return Text(words(self._snapshot, self._listed, row).get(name, ""))
+    def words(self, row: int) -> Words:
+        """The words of a row by column."""
+        return words(self._snapshot, self._listed, row)
 
     def set_narrow(self, narrow: bool) -> None:
         """With little room, drops every column that can be spared."""
@@ -225,7 +214,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _redraw(self) -> None:
         top = self.scroll_offset.y
         rows = range(top, min(top + self._page, len(self._listed)))
-        drawn = {row: words(self._snapshot, self._listed, row) for row in rows}
+        drawn = {row: self.words(row) for row in rows}
         for row, cells in drawn.items():
             if self._drawn.get(row) != cells:
                 self._refresh_row(row)
@@ -240,7 +229,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         if y == 0:
             style = self.get_component_rich_style("candidates--header")
             return self._strip({column.name: column.name for column in self.columns}, style)
-        cells = words(self._snapshot, self._listed, row)
+        cells = self.words(row)
         if not cells:
             return Strip.blank(self.size.width, self.rich_style)
         is_cursor = row == self.cursor_row
@@ -271,7 +260,3 @@ def _emphasis(words: str) -> Style:
     if words.startswith(("●", "▶", "?")):
         return STRONG
     return WEAK if words.startswith(("○", "⊘")) else Style.null()
-
-
-def _text(column: Column, words: str) -> Text:
-    return Text(words, _emphasis(words), justify="right" if column.right else "left", no_wrap=True)

@@ -70,8 +70,9 @@ class Row:
 
 def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
     """The models of the environment, those nearest to f first."""
-    parts = {name: place for place, part in enumerate(_partitions(state)) for name in part}
-    sensed = _sensed(state)
+    partitions = state.round.partitions if state.round is not None and not state.round.done else ()
+    parts = {name: place for place, part in enumerate(partitions) for name in part}
+    sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
     places = {each.name: each for each in prints}
     f = None if state.f_position is None else state.f_position[:2]
     found = []
@@ -101,17 +102,6 @@ def line(row: Row, width: int) -> Text:
 def heading(width: int) -> str:
     """The names of the columns."""
     return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
-
-
-def _partitions(state: RunState) -> tuple[tuple[str, ...], ...]:
-    return state.round.partitions if state.round is not None and not state.round.done else ()
-
-
-def _sensed(state: RunState) -> dict[str, float]:
-    test = state.evidence_test
-    if test is None or not 0 < test <= len(state.tests):
-        return {}
-    return dict(state.tests[test - 1].first_sensed)
 
 
 @dataclass(frozen=True, slots=True)
