@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, fresh_runs_made, helping
@@ -69,8 +68,8 @@ def _happening(snapshot: Snapshot) -> Happening:
         return None, (snapshot.error,)
     if snapshot.status == "finished":
         return _finished(state)
-    if snapshot.status in STANDING:
-        return None, STANDING[snapshot.status](state)
+    if standing := _standing(state, snapshot.status):
+        return None, standing
     if state.settling:
         return _with_pause(state, ("baseline", _SETTLING))
     if state.baseline is None:
@@ -96,42 +95,25 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
     return step, (first, *sentences)
 
 
-def _starting(_: RunState) -> tuple[str, ...]:
-    return ("The engine starts. It is a separate process: it goes on when this screen closes.",)
-
-
-def _created(_: RunState) -> tuple[str, ...]:
-    return ("No engine has worked on this run yet. r starts one.",)
-
-
-def _failed(state: RunState) -> tuple[str, ...]:
-    return (
-        f"The engine could not go on: {plain(state.reason).rstrip('.')}.",
-        "Everything so far is kept; r tries again.",
-    )
-
-
-def _stopped(state: RunState) -> tuple[str, ...]:
+def _standing(state: RunState, status: str) -> tuple[str, ...]:
+    """Why the run stands still, and what goes on from there; none if it does not."""
     reason = plain(state.reason).rstrip(".")
-    said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
-    then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
-    return (f"The engine was {said}.", *then)
-
-
-def _lost(state: RunState) -> tuple[str, ...]:
-    unfinished = state.tally["running"]
-    lost = f" Only {count(unfinished, 'unfinished test')} must run again." if unfinished else ""
-    return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
-
-
-# The run stands still in these states.
-STANDING: dict[str, Callable[[RunState], tuple[str, ...]]] = {
-    "starting": _starting,
-    "created": _created,
-    "failed": _failed,
-    "stopped": _stopped,
-    "lost": _lost,
-}
+    match status:
+        case "starting":
+            return ("The engine starts. It is a separate process: it goes on when this screen closes.",)
+        case "created":
+            return ("No engine has worked on this run yet. r starts one.",)
+        case "failed":
+            return (f"The engine could not go on: {reason}.", "Everything so far is kept; r tries again.")
+        case "stopped":
+            said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
+            then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
+            return (f"The engine was {said}.", *then)
+        case "lost":
+            unfinished = state.tally["running"]
+            lost = f" Only {count(unfinished, 'unfinished test')} must run again." if unfinished else ""
+            return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
+    return ()
 
 
 def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:

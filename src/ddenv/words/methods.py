@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -234,7 +233,7 @@ def follows(options: Settings, last: Round) -> str:
         reason = "Nothing showed f in the last round"
         if options.algorithm not in SMALLER:
             return f"{reason}."
-        return f"{reason}, so {SMALLER[options.algorithm](last)}."
+        return f"{reason}, so {_smaller(options.algorithm, last)}."
     if options.algorithm != "ddmin":
         return ""
     if last.candidates[last.winner].kind == "partition":
@@ -250,37 +249,18 @@ def fruitless(options: Settings, current: Round, models: int) -> str:
         return "E stays as it is."
     if options.algorithm not in GROUPS and current.n_partitions >= models:
         return "The parts were single models already: nothing more can be removed."
-    return f"E stays as it is; {SMALLER[options.algorithm](current)}."
+    return f"E stays as it is; {_smaller(options.algorithm, current)}."
 
 
-def _ddenv(_: Round) -> str:
-    return "the next round splits E into smaller parts"
-
-
-def _ddmin(_: Round) -> str:
-    return "n doubles, and the parts get smaller"
-
-
-def _probdd(last: Round) -> str:
-    if _group(last) == 1:
-        return "the model that was left out is needed"
-    return "each model that was left out is more likely to be needed"
-
-
-def _splitting(last: Round) -> str:
-    if _group(last) == 1:
-        return "the model that was left out is needed"
-    return "at least one of the models left out is needed; half of them are left out next"
-
-
-SMALLER: dict[str, Callable[[Round], str]] = {
-    "ddenv": _ddenv,
-    "ddmin": _ddmin,
-    "probdd": _probdd,
-    "splitting": _splitting,
+# What that means for the next round.
+SMALLER = {
+    "ddenv": "the next round splits E into smaller parts",
+    "ddmin": "n doubles, and the parts get smaller",
+    "probdd": "each model that was left out is more likely to be needed",
+    "splitting": "at least one of the models left out is needed; half of them are left out next",
 }
 
 
-def _group(last: Round) -> int:
-    """How many models the round's only candidate leaves out."""
-    return len(last.environment) - last.candidates[0].size if last.candidates else 0
+def _smaller(algorithm: str, last: Round) -> str:
+    only = algorithm in GROUPS and last.candidates and len(last.environment) - last.candidates[0].size == 1
+    return "the model that was left out is needed" if only else SMALLER[algorithm]
