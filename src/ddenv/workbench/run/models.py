@@ -20,7 +20,7 @@ from ddenv.runfile.state import RunState, partition_letter
 from ddenv.text import count, padded, shortened
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
-from ddenv.workbench.widgets.lines import Lines, changed_lines
+from ddenv.workbench.widgets.lines import Lines
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -133,7 +133,6 @@ class Chart(Widget):
         super().__init__(id=id)
         self._course = Course()
         self._shown: tuple[object, ...] = ()
-        self._text = Text("")
 
     def show(self, snapshot: Snapshot) -> None:
         """Shows the run as it is now."""
@@ -145,15 +144,9 @@ class Chart(Widget):
             decided = tuple(decision.tests for decision in state.decisions)
             free = tuple(node.tests for node in state.nodes if node.how == "sliced")
             self._course = Course(state.history, state.tests_done, state.lower_bound, decided, free)
-            before, self._text = self._text, self._drawn()
-            if regions := changed_lines(before, self._text, self.size.width):
-                self.refresh(*regions)
+            self.refresh()
 
     def render(self) -> Text:
-        self._text = self._drawn()
-        return self._text
-
-    def _drawn(self) -> Text:
         colors = self.app.theme_variables
         top = ink(colors, "primary")
         # The terminal's own colours have no darker variants.

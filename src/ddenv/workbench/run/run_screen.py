@@ -81,7 +81,6 @@ class RunScreen(Screen[None]):
         self.following = Following(self, self.poll, self._seen, self._show)
         self.opening, self.keys = Opening(self), KeyOffers(self)
         self._pane = "map"
-        self._title: tuple[str, str] = ("", "")
 
     @property
     def snapshot(self) -> Snapshot:
@@ -189,11 +188,8 @@ class RunScreen(Screen[None]):
         self._show_models()
         # Its rows are wider than those of candidates.
         self.set_class(snapshot.state.certificate is not None, "-certificate")
-        above = round_title(snapshot.state)
-        # Even the same words would have the panel drawn again, with all that is in it.
-        if above != self._title:
-            panel = self.query_one("#round")
-            self._title = panel.border_title, panel.border_subtitle = above
+        panel = self.query_one("#round")
+        panel.border_title, panel.border_subtitle = round_title(snapshot.state)
         log, entries = self.query_one("#log", Lines), self._log.until(self.browsing.position.at)
         if len(entries) != len(log.items):
             log.show(entries)
