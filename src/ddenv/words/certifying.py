@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.evidence.claims import fresh_runs_made
-from ddenv.evidence.fresh_runs import fresh_runs
+from ddenv.evidence.claims import fresh_runs, fresh_runs_made
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, Test

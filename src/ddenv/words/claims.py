@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from itertools import islice
 
 from ddenv.evidence.claims import (
+    FreshRuns,
     current,
     expected_fresh_runs,
     fresh_runs_made,
@@ -15,7 +16,6 @@ from ddenv.evidence.claims import (
     never_left_out,
     so_far,
 )
-from ddenv.evidence.fresh_runs import FreshRuns
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState, Trial

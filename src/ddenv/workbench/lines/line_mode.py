@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.errors import UserError
-from ddenv.evidence.fresh_runs import fresh_runs
+from ddenv.evidence.claims import fresh_runs
 from ddenv.guiding.commands import Command, question, said, send, starts_engine
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer

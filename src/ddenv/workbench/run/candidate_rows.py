@@ -9,16 +9,15 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
+from ddenv.evidence.claims import FreshRuns, fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.text import count, percent, plain, shortened
 from ddenv.words.claims import made_of_usual, short
 from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
 from ddenv.words.slices import implied_words
-from ddenv.workbench.shared.poll import Snapshot
 
 # Maximum width of a model's name, in cells.
 NAME = 8

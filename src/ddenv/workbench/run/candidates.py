@@ -15,11 +15,11 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from ddenv.evidence.fresh_runs import FreshRuns
+from ddenv.evidence.claims import FreshRuns
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.text import first_of, plain
 from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
-from ddenv.workbench.shared.poll import Snapshot
 
 # The maximum number of models that a tooltip names.
 NAMED = 12

@@ -8,8 +8,8 @@ import time
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.words.explain import Explanation, explain
-from ddenv.workbench.shared.poll import Snapshot
 
 # Minimum time between two updates within a round, s.
 PERIOD = 1.0

@@ -16,9 +16,9 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.runfile.progress import Point
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.text import count, padded, shortened
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
 from ddenv.workbench.widgets.lines import Lines
 

@@ -17,6 +17,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Step
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
 from ddenv.runs.wanted import Wanted
@@ -38,7 +39,7 @@ from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
 from ddenv.workbench.shared.messages import Attention
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes

@@ -12,13 +12,13 @@ from ddenv import __version__
 from ddenv.evidence.claims import has_dropped
 from ddenv.runfile.branches import path
 from ddenv.runfile.run_settings import settings
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runs.tests_left import Remaining, remaining
 from ddenv.text import about, between, count, duration, percent, plain, rounded, shortened, truncated
 from ddenv.words.claims import drift, ended
 from ddenv.words.methods import GROUPS, labels
 from ddenv.words.signs import STATUS
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
