@@ -212,10 +212,16 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
     if item.verdict:
         implied = implied_words(state, item.tests)
         return f"{VERDICT.get(item.verdict, plain(item.verdict))}{f', {implied}' if implied else ''}"
+    return _running(snapshot, tests)
+
+
+def _running(snapshot: Snapshot, tests: Sequence[Test]) -> str:
+    """Which of some tests run, and how far the first of these is."""
     running = [test for test in tests if test.outcome == "running"]
     if not running or snapshot.engine != "alive":
         return ""
-    return "▶" * min(3, len(running)) + _seconds(snapshot, running[0])
+    seconds = snapshot.seconds(running[0].id)
+    return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)
 
 
 def _in_short(state: RunState, item: Trial | Candidate) -> Words:
@@ -228,14 +234,8 @@ def _fallen(models: Sequence[str]) -> str:
     return f"drops {len(models)} models" if len(models) > 1 else dropping(models, NAME)
 
 
-def _seconds(snapshot: Snapshot, test: Test) -> str:
-    seconds = snapshot.seconds(test.id)
-    return simulated(seconds, settings(snapshot.state).timeout)
-
-
 def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
     """One run of the whole world."""
-    running = test.outcome == "running" and snapshot.engine == "alive"
     return {
         "#": str(number),
         "candidate": f"run {test.run + 1}",
@@ -243,7 +243,7 @@ def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
         "tests": "",
         "to f": metres(test.distance),
         "real": brief(test.wall_seconds) if test.is_finished else "",
-        "verdict": f"▶{_seconds(snapshot, test)}" if running else outcome(test),
+        "verdict": _running(snapshot, [test]) or outcome(test),
     }
 
 
@@ -286,10 +286,6 @@ def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
 
 
 def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
-    if one.claim is not None:
-        return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
-    running = one.running if snapshot.engine == "alive" else ()
-    if not running:
-        return ""
-    seconds = snapshot.seconds(running[0].id)
-    return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)
+    if one.claim is None:
+        return _running(snapshot, one.running)
+    return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
