@@ -28,7 +28,7 @@ async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run,
         table, world = session.screen.query_one(Candidates), session.screen.query_one(WorldMap)
         await session.press("less_than_sign", "less_than_sign")
         assert "round 2" in session.text("#header")
-        assert table.get_cell("0", "verdict").plain == "● similar"
+        assert table.words(0)["verdict"] == "● similar"
         assert world.candidate.label == "part A"
         assert world.snapshot.state.environment == tuple(run.elements[:2])
         assert "reduced to 2 models after 6 tests" in session.text("#happening")
@@ -36,7 +36,7 @@ async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run,
         await session.press("comma", "comma", "comma")
         assert len(world.snapshot.state.environment) == 6
         assert "test 6 (round 2 · part A, seed 0) starts" in session.text("#happening")
-        assert table.get_cell("0", "verdict").plain == ""
+        assert table.words(0)["verdict"] == ""
         await session.press("space", "v", "u")
         assert session.commands() == []
         assert "this is an earlier moment" in session.said() or watch

@@ -230,12 +230,6 @@ async def test_of_many_rows_only_those_in_sight_are_made_into_text(monkeypatch):
         app.table.show(large(10_000))
         await pilot.pause()
         assert set(made) == set(range(10))
-        refreshed = []
-        monkeypatch.setattr(app.table, "refresh", lambda *regions, **_: refreshed.extend(regions))
-        app.table.show(large(10_000))
-        assert refreshed == []
-        app.table.show(large(10_000, judged=1))
-        assert [region.y for region in refreshed] == [1]
 
 
 async def test_vetoed_rows_and_the_cursor_are_seen_without_colours(run, monkeypatch):

@@ -125,7 +125,7 @@ def test_a_round_without_f_is_line_15(run):
 def test_a_full_disk_comes_first(run):
     fake_moments.mid_round(run).write("disk_space", enough=False, needed=32_000_000, free=1)
     assert told(run)[1].startswith("The disk is full: no new test starts until 32 MB are free.")
-    assert facts(snapshot(run))[0].forms[0] == "! no room on the disk"
+    assert facts(snapshot(run))["state"][0] == "! no room on the disk"
     run.write("disk_space", enough=True, needed=32_000_000, free=10**9)
     assert "disk" not in told(run)[1]
 

@@ -73,7 +73,7 @@ BEGINNINGS = {
 @pytest.mark.parametrize(("algorithm", "words"), BEGINNINGS.items())
 def test_before_a_round_each_algorithm_says_where_its_candidates_come_from(run_by, algorithm, words):
     line, told_words = told(run_by(algorithm))
-    assert line == listing(algorithm).split
+    assert line == listing(algorithm).steps["split"]
     assert words in told_words
     assert "split by" not in told_words
 

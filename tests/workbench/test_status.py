@@ -11,7 +11,7 @@ from ddenv import __version__
 from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node
-from ddenv.workbench.run.status import Header, Status, branch_of, cut_tests, facts, fitted, heading
+from ddenv.workbench.run.status import Header, Status, branch_of, facts, fitted, heading
 from ddenv.workbench.shared.poll import Snapshot
 
 
@@ -19,13 +19,19 @@ def snapshot(run, engine="alive", **changes) -> Snapshot:
     return Snapshot(fold(run.file.events()).changed(**changes), tuple(run.file.live()), engine, spent=83)
 
 
+def mid_round(run) -> Snapshot:
+    """While the user is asked before each reduction; three tests were ended early."""
+    shown = snapshot(fake_moments.mid_round(run), accept_mode="ask")
+    tests = PersistentTuple.of(replace(test, cut=test.id <= 3) for test in shown.state.tests)
+    return replace(shown, state=shown.state.changed(tests=tests))
+
+
 def said(shown, width=200, **more):
     return dict(fitted(facts(shown, **more), width))
 
 
 def test_everything_is_said_where_there_is_room(run):
-    shown = snapshot(fake_moments.mid_round(run), accept_mode="ask")
-    told = said(shown, 260, scene="http://127.0.0.1:7000/static/", asked="pause", cut=3)
+    told = said(mid_round(run), 260, scene="http://127.0.0.1:7000/static/", asked="pause")
     assert list(told) == ["state", "asked", "tests", "drift", "cut", "time", "left", "mode", "engine", "scene"]
     assert told["drift"] == "f in 1 of 1 here, 3 of 4 in the whole world"
     assert told["state"] == "▶ running"
@@ -57,8 +63,7 @@ def test_broken_tests_do_not_count_in_the_drift(run):
 
 @pytest.mark.parametrize("width", [120, 100, 80, 64, 40])
 def test_the_least_important_goes_first(run, width):
-    shown = snapshot(fake_moments.mid_round(run), accept_mode="ask")
-    told = said(shown, width, asked="pause", cut=3)
+    told = said(mid_round(run), width, asked="pause")
     assert sum(len(words) + 3 for words in told.values()) <= width
     assert told["state"] == "▶ running"
     assert ("cut" in told) <= ("time" in told) <= ("left" in told) <= ("tests" in told)
@@ -85,16 +90,6 @@ def test_an_engine_that_is_gone_or_of_another_version_is_told(run):
     assert said(snapshot(run, engine_version="99.0"))["engine"] == "engine ● 99.0, newer"
     assert said(snapshot(run, "absent", status="stopped"))["engine"] == "engine ○ off: r resumes"
     assert said(replace(snapshot(run, "absent"), gone=True))["state"] == "✗ the run file is gone"
-
-
-def test_tests_that_were_ended_early_are_counted_as_they_come(run):
-    tests = snapshot(fake_moments.mid_round(run)).state.tests
-    cut = PersistentTuple.of(replace(test, cut=test.id % 3 == 0) for test in tests)
-    once = cut_tests(cut, tests, 0)
-    assert once == 4
-    changed = cut.changed(0, replace(cut[0], distance=1.0)).added(replace(cut[0], id=len(cut) + 1, cut=True))
-    assert cut_tests(changed, cut, once) == 5
-    assert cut_tests(tests, changed, 5) == 0
 
 
 def nodes(*parents, rejected=()):

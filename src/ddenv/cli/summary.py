@@ -6,8 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ddenv.evidence.claims import current, helping, is_minimal, never_left_out
-from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
+from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.took_part import simulated
 from ddenv.runfile.progress import Claim, Node

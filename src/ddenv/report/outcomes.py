@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ddenv.evidence.claims import current, never_left_out
-from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
+from ddenv.evidence.claims import FreshRuns, current, fresh_runs, never_left_out
 from ddenv.evidence.took_part import why_sliced
 from ddenv.map.drawing import tick
 from ddenv.page.blocks import (

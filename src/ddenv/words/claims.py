@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import islice
-from typing import Protocol
 
 from ddenv.evidence.claims import (
+    FreshRuns,
     current,
     expected_fresh_runs,
     fresh_runs_made,
@@ -16,7 +16,6 @@ from ddenv.evidence.claims import (
     never_left_out,
     so_far,
 )
-from ddenv.evidence.fresh_runs import FreshRuns
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState, Trial
@@ -140,25 +139,16 @@ def what_ran(one: FreshRuns) -> str:
     return "what is left" if one.is_left else environment_named(one.node)
 
 
-class Counted(Protocol):
-    """Runs with their rate of f, as in a claim."""
-
-    @property
-    def shown(self) -> int: ...
-    @property
-    def runs(self) -> int: ...
-    @property
-    def low(self) -> float: ...
-    @property
-    def high(self) -> float: ...
-
-
-def rate(fresh: Counted) -> str:
+def rate(fresh: Claim | FreshRuns) -> str:
     """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"; without an interval, how often chosen ones did."""
-    if fresh.low == fresh.high:
-        return f"f in {fresh.shown} of {count(fresh.runs, 'chosen run')}"
-    interval = f" ({percent(fresh.low)} to {percent(fresh.high)})" if fresh.runs else ""
-    return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
+    return f"f in {_share(fresh.shown, fresh)}"
+
+
+def _share(number: int, one: Claim | FreshRuns | Returned) -> str:
+    if one.low == one.high:
+        return f"{number} of {count(one.runs, 'chosen run')}"
+    interval = f" ({percent(one.low)} to {percent(one.high)})" if one.runs else ""
+    return f"{number} of {count(one.runs, 'fresh run')}{interval}"
 
 
 def for_everyone(certificate: Certificate) -> str:
@@ -249,7 +239,7 @@ def of_passing(state: RunState, one: Isolation) -> str:
     back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
     if one.chosen:
         return f"{said}; with {back} put back it misses its goal in a chosen run"
-    return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most)}"
+    return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most.reached, most)}"
 
 
 def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
@@ -259,14 +249,7 @@ def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
 
 def _reaching(one: Isolation, claim: Returned) -> str:
     chosen = f"each of {count(len(one.chosen), 'chosen run')} and in " if one.chosen else ""
-    return f"the robot reaches its goal in {chosen}{_share(claim)}"
-
-
-def _share(claim: Returned) -> str:
-    if claim.low == claim.high:
-        return f"{claim.reached} of {count(claim.runs, 'chosen run')}"
-    interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
-    return f"{claim.reached} of {count(claim.runs, 'fresh run')}{interval}"
+    return f"the robot reaches its goal in {chosen}{_share(claim.reached, claim)}"
 
 
 def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence[str]) -> str:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import current, fresh_runs_made, helping
-from ddenv.evidence.fresh_runs import fresh_runs
+from ddenv.evidence.claims import current, helping
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
-from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.text import as_sentence, count, first_of, percent, plain
+from ddenv.text import as_sentence, count, first_of, plain
 from ddenv.words.baseline import baseline_sentence
-from ddenv.words.claims import ended, environment_named, of_runs, promise, terms, usual_runs
+from ddenv.words.certifying import certifying
+from ddenv.words.claims import ended, of_runs, promise
 from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
 from ddenv.words.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
-from ddenv.words.news import isolating
-from ddenv.words.signs import bar, metres
+from ddenv.words.signs import metres
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # Maximum number of kept models that a sentence names.
@@ -75,8 +72,8 @@ def _happening(snapshot: Snapshot) -> Happening:
         return None, (snapshot.error,)
     if snapshot.status == "finished":
         return _finished(state)
-    if snapshot.status in STANDING:
-        return None, STANDING[snapshot.status](state)
+    if standing := _standing(state, snapshot.status):
+        return None, standing
     if state.settling:
         return _with_pause(state, ("baseline", _SETTLING))
     if state.baseline is None:
@@ -102,42 +99,25 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
     return step, (first, *sentences)
 
 
-def _starting(_: RunState) -> tuple[str, ...]:
-    return ("The engine starts. It is a separate process: it goes on when this screen closes.",)
-
-
-def _created(_: RunState) -> tuple[str, ...]:
-    return ("No engine has worked on this run yet. r starts one.",)
-
-
-def _failed(state: RunState) -> tuple[str, ...]:
-    return (
-        f"The engine could not go on: {plain(state.reason).rstrip('.')}.",
-        "Everything so far is kept; r tries again.",
-    )
-
-
-def _stopped(state: RunState) -> tuple[str, ...]:
+def _standing(state: RunState, status: str) -> tuple[str, ...]:
+    """Why the run stands still, and what goes on from there; none if it does not."""
     reason = plain(state.reason).rstrip(".")
-    said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
-    then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
-    return (f"The engine was {said}.", *then)
-
-
-def _lost(state: RunState) -> tuple[str, ...]:
-    unfinished = state.tally["running"]
-    lost = f" Only {count(unfinished, 'unfinished test')} must run again." if unfinished else ""
-    return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
-
-
-# The run stands still in these states.
-STANDING: dict[str, Callable[[RunState], tuple[str, ...]]] = {
-    "starting": _starting,
-    "created": _created,
-    "failed": _failed,
-    "stopped": _stopped,
-    "lost": _lost,
-}
+    match status:
+        case "starting":
+            return ("The engine starts. It is a separate process: it goes on when this screen closes.",)
+        case "created":
+            return ("No engine has worked on this run yet. r starts one.",)
+        case "failed":
+            return (f"The engine could not go on: {reason}.", "Everything so far is kept; r tries again.")
+        case "stopped":
+            said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
+            then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
+            return (f"The engine was {said}.", *then)
+        case "lost":
+            unfinished = state.tally["running"]
+            lost = f" Only {count(unfinished, 'unfinished test')} must run again." if unfinished else ""
+            return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
+    return ()
 
 
 def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
@@ -361,68 +341,3 @@ def refuted(state: RunState) -> tuple[str, ...]:
     """That slices are wrong here."""
     words = refuted_words(state)
     return (as_sentence(words),) if words else ()
-
-
-def certifying(snapshot: Snapshot) -> tuple[str, ...]:
-    """Fresh runs show what the result of the rounds is worth."""
-    state = snapshot.state
-    if state.isolating is not None:
-        now = plain(isolating(state))
-        return (
-            "Isolation: as few models as can be are removed from the whole world so that the robot reaches its goal.",
-            f"Now {now}. The result of the reduction stays as it is.",
-        )
-    certificate = state.certificate
-    if certificate is None:
-        return ("The rounds are over.",)
-    if certificate.claims:
-        return (_after(certificate), *_now(snapshot, certificate))
-    made = fresh_runs_made(state, certificate)
-    return (
-        *(() if certificate.seeds else (_bar(state, certificate),)),
-        f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
-        f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
-        *_so_far(state),
-        *_now(snapshot, certificate),
-    )
-
-
-def _so_far(state: RunState) -> tuple[str, ...]:
-    """How often f showed in what is left and in the whole world."""
-    rows = fresh_runs(state)
-    if not rows or not rows[0].runs:
-        return ()
-    left, whole = rows[0], rows[-1]
-    beside = ""
-    if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
-        beside = f", and in {of_runs(whole.shown, whole.runs)} of {environment_named(whole.node)}"
-    return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
-
-
-def _bar(state: RunState, certificate: Certificate) -> str:
-    """What is shown to be kept by now, and where it has to come."""
-    shown = fresh_runs(state)[0].bound or 0.0
-    kept = f"at least {percent(shown)} is kept" if shown else "nothing is shown yet"
-    return f"{bar(shown, certificate.certify_rate)} {kept}, aim {percent(certificate.certify_rate)}"
-
-
-def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
-    # A test of the certificate before may still run.
-    running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
-    if not running:
-        return ()
-    return (f"Now run {running[0].run - certificate.first_run + 1} of {_what(running[0], certificate)}.",)
-
-
-def _what(test: Test, certificate: Certificate) -> str:
-    if test.without is not None:
-        return f"all that is left except {plain(test.without)}"
-    if test.node == certificate.node:
-        return "all that is left"
-    return environment_named(test.node)
-
-
-def _after(certificate: Certificate) -> str:
-    if certificate.claims[0].verdict == "lost":
-        return "What is left keeps too little of the rate. Earlier environments run, to find the last one not shown to lose it."
-    return "The certificate is finished."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,32 +13,33 @@ from ddenv.text import count, plain
 Step = Literal["baseline", "split", "next", "test", "rerun", "waiting", "reduced", "nothing", "returned"]
 Lines = tuple[tuple[int, str], ...]
 
-# Before any algorithm begins.
-FIX_F = (0, "f ← failure of R(E, goal, timeout), several runs")
-
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """`lines` with their numbers; the line of each step; `sweep` is the one that leaves out each model in turn at the end."""
+    """`lines` with their numbers, and the number of the line at each of the `steps`.
+
+    At "sweep" each model is left out in turn at the end, whatever the step.
+    """
 
     lines: Lines
-    split: int
-    next: int
-    test: int
-    rerun: int
-    waiting: int
-    reduced: int
-    nothing: int
-    returned: int
-    sweep: int | None = None
-    baseline: int = 0
+    steps: dict[str, int]
 
     def line(self, step: Step, current: Round | None) -> int:
         """The line of a step in the round `current`."""
-        if self.sweep is not None and step not in ("baseline", "returned") and is_sweep(current):
-            return self.sweep
-        line: int = getattr(self, step)
-        return line
+        if "sweep" in self.steps and step not in ("baseline", "returned") and is_sweep(current):
+            return self.steps["sweep"]
+        return self.steps[step]
+
+    def but(self, lines: dict[int, str]) -> Listing:
+        """The same with other `lines`, by their numbers."""
+        return replace(self, lines=tuple((number, lines.get(number, code)) for number, code in self.lines))
+
+
+def _listing(*lines: tuple[int, str, str]) -> Listing:
+    """From (number, code, steps) of the lines after the first one, which is at work before any algorithm begins."""
+    lines = ((0, "f ← failure of R(E, goal, timeout), several runs", "baseline"), *lines)
+    steps = {step: number for number, _, steps in lines for step in steps.split()}
+    return Listing(tuple((number, code) for number, code, _ in lines), steps)
 
 
 def is_sweep(current: Round | None) -> bool:
@@ -50,112 +50,61 @@ def is_sweep(current: Round | None) -> bool:
 
 
 # The paper's Algorithm 1 with the paper's numbers.
-DDENV = Listing(
-    (
-        FIX_F,
-        (1, "while E' not reached do"),
-        (2, " subenvironments ← partition(E, f, n_partitions)"),
-        (3, " subenvironments ← prioritize(subenvironments)"),
-        (4, " for s in subenvironments do"),
-        (5, "   result ← R(s, f, timeout)"),
-        (6, "   if is_new_failure or is_success then"),
-        (7, "     results ← deflake(s, R, iterations, timeout)"),
-        (8, "     result ← find_similar_failure(results, f)"),
-        (10, "   if is_similar_failure(result, f) then"),
-        (11, "     E ← s; break"),
-        (15, " n_partitions ← n_partitions + 1"),
-        (16, " if none similar and n_partitions = E.size then"),
-        (17, "   E' ← E; break"),
-        (21, "return E'"),
-    ),
-    split=2,
-    next=4,
-    test=5,
-    rerun=7,
-    waiting=10,
-    reduced=11,
-    nothing=15,
-    returned=21,
+DDENV = _listing(
+    (1, "while E' not reached do", ""),
+    (2, " subenvironments ← partition(E, f, n_partitions)", "split"),
+    (3, " subenvironments ← prioritize(subenvironments)", ""),
+    (4, " for s in subenvironments do", "next"),
+    (5, "   result ← R(s, f, timeout)", "test"),
+    (6, "   if is_new_failure or is_success then", ""),
+    (7, "     results ← deflake(s, R, iterations, timeout)", "rerun"),
+    (8, "     result ← find_similar_failure(results, f)", ""),
+    (10, "   if is_similar_failure(result, f) then", "waiting"),
+    (11, "     E ← s; break", "reduced"),
+    (15, " n_partitions ← n_partitions + 1", "nothing"),
+    (16, " if none similar and n_partitions = E.size then", ""),
+    (17, "   E' ← E; break", ""),
+    (21, "return E'", "returned"),
 )
-DDMIN = Listing(
-    (
-        FIX_F,
-        (1, "while E' not reached do"),
-        (2, " parts ← cut(E, n), in the order of the file"),
-        (3, " for s in parts, then in their complements do"),
-        (4, "   result ← R(s, f, timeout)"),
-        (5, "   if not similar: deflake(s, R, iterations)"),
-        (6, "   if similar: E ← s; n ← 2, or n - 1; break"),
-        (7, " nothing similar: n ← 2 n; at E.size: E' ← E"),
-        (8, "return E'"),
-    ),
-    split=2,
-    next=3,
-    test=4,
-    rerun=5,
-    waiting=6,
-    reduced=6,
-    nothing=7,
-    returned=8,
+DDMIN = _listing(
+    (1, "while E' not reached do", ""),
+    (2, " parts ← cut(E, n), in the order of the file", "split"),
+    (3, " for s in parts, then in their complements do", "next"),
+    (4, "   result ← R(s, f, timeout)", "test"),
+    (5, "   if not similar: deflake(s, R, iterations)", "rerun"),
+    (6, "   if similar: E ← s; n ← 2, or n - 1; break", "waiting reduced"),
+    (7, " nothing similar: n ← 2 n; at E.size: E' ← E", "nothing"),
+    (8, "return E'", "returned"),
 )
-PROBDD = Listing(
-    (
-        FIX_F,
-        (1, "while some model's chance p of being needed < 1"),
-        (2, " group ← models with the greatest expected gain"),
-        (3, " result ← R(E without group, f, timeout)"),
-        (4, " if not similar: deflake(E without group, ...)"),
-        (5, " if similar: E ← E without group"),
-        (6, " else: p rises for each model of the group"),
-        (7, "for m in E: if similar without m, remove m"),
-        (8, "return E'"),
-    ),
-    split=2,
-    next=3,
-    test=3,
-    rerun=4,
-    waiting=5,
-    reduced=5,
-    nothing=6,
-    returned=8,
-    sweep=7,
+PROBDD = _listing(
+    (1, "while some model's chance p of being needed < 1", ""),
+    (2, " group ← models with the greatest expected gain", "split"),
+    (3, " result ← R(E without group, f, timeout)", "next test"),
+    (4, " if not similar: deflake(E without group, ...)", "rerun"),
+    (5, " if similar: E ← E without group", "waiting reduced"),
+    (6, " else: p rises for each model of the group", "nothing"),
+    (7, "for m in E: if similar without m, remove m", "sweep"),
+    (8, "return E'", "returned"),
 )
 # It chooses the group otherwise, and concludes something else when f does not show.
-SPLITTING = replace(
-    PROBDD,
-    lines=tuple(
-        {
-            1: (1, "while a model of E, far to near, is undecided"),
-            2: (2, " group ← farthest undecided, or half the suspects"),
-            6: (6, " else: suspects ← group; a single one is needed"),
-        }.get(number, (number, code))
-        for number, code in PROBDD.lines
-    ),
+SPLITTING = PROBDD.but(
+    {
+        1: "while a model of E, far to near, is undecided",
+        2: " group ← farthest undecided, or half the suspects",
+        6: " else: suspects ← group; a single one is needed",
+    }
 )
 # What all algorithms share, for those of other packages.
-ANY = Listing(
-    (
-        FIX_F,
-        (1, "while the algorithm makes a round do"),
-        (2, " for s in its candidates do"),
-        (3, "   result ← R(s, f, timeout)"),
-        (4, "   if not similar: deflake(s, R, iterations)"),
-        (5, "   if similar: E ← s; break"),
-        (6, "return E'"),
-    ),
-    split=1,
-    next=2,
-    test=3,
-    rerun=4,
-    waiting=5,
-    reduced=5,
-    nothing=1,
-    returned=6,
+ANY = _listing(
+    (1, "while the algorithm makes a round do", "split nothing"),
+    (2, " for s in its candidates do", "next"),
+    (3, "   result ← R(s, f, timeout)", "test"),
+    (4, "   if not similar: deflake(s, R, iterations)", "rerun"),
+    (5, "   if similar: E ← s; break", "waiting reduced"),
+    (6, "return E'", "returned"),
 )
 # With the scenario's `growth: steady`.
-STEADY = replace(
-    DDENV, lines=tuple((15, " if none similar: n_partitions + 1") if line[0] == 15 else line for line in DDENV.lines)
-)
+STEADY = DDENV.but({15: " if none similar: n_partitions + 1"})
 LISTINGS = {"ddenv": DDENV, "ddmin": DDMIN, "probdd": PROBDD, "splitting": SPLITTING}
 
 
@@ -234,7 +183,7 @@ def follows(options: Settings, last: Round) -> str:
         reason = "Nothing showed f in the last round"
         if options.algorithm not in SMALLER:
             return f"{reason}."
-        return f"{reason}, so {SMALLER[options.algorithm](last)}."
+        return f"{reason}, so {_smaller(options.algorithm, last)}."
     if options.algorithm != "ddmin":
         return ""
     if last.candidates[last.winner].kind == "partition":
@@ -250,37 +199,18 @@ def fruitless(options: Settings, current: Round, models: int) -> str:
         return "E stays as it is."
     if options.algorithm not in GROUPS and current.n_partitions >= models:
         return "The parts were single models already: nothing more can be removed."
-    return f"E stays as it is; {SMALLER[options.algorithm](current)}."
+    return f"E stays as it is; {_smaller(options.algorithm, current)}."
 
 
-def _ddenv(_: Round) -> str:
-    return "the next round splits E into smaller parts"
-
-
-def _ddmin(_: Round) -> str:
-    return "n doubles, and the parts get smaller"
-
-
-def _probdd(last: Round) -> str:
-    if _group(last) == 1:
-        return "the model that was left out is needed"
-    return "each model that was left out is more likely to be needed"
-
-
-def _splitting(last: Round) -> str:
-    if _group(last) == 1:
-        return "the model that was left out is needed"
-    return "at least one of the models left out is needed; half of them are left out next"
-
-
-SMALLER: dict[str, Callable[[Round], str]] = {
-    "ddenv": _ddenv,
-    "ddmin": _ddmin,
-    "probdd": _probdd,
-    "splitting": _splitting,
+# What that means for the next round.
+SMALLER = {
+    "ddenv": "the next round splits E into smaller parts",
+    "ddmin": "n doubles, and the parts get smaller",
+    "probdd": "each model that was left out is more likely to be needed",
+    "splitting": "at least one of the models left out is needed; half of them are left out next",
 }
 
 
-def _group(last: Round) -> int:
-    """How many models the round's only candidate leaves out."""
-    return len(last.environment) - last.candidates[0].size if last.candidates else 0
+def _smaller(algorithm: str, last: Round) -> str:
+    only = algorithm in GROUPS and last.candidates and len(last.environment) - last.candidates[0].size == 1
+    return "the model that was left out is needed" if only else SMALLER[algorithm]

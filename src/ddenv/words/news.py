@@ -5,11 +5,12 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
+from collections.abc import Callable, Iterable
 
 from ddenv.evidence.claims import in_the_making, never_left_out
 from ddenv.runfile.events import DEEDS, Implied, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
-from ddenv.runfile.progress import Removal
+from ddenv.runfile.progress import Removal, Returned
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import purpose
 from ddenv.text import count, first_of, plain
@@ -70,153 +71,147 @@ def isolating(state: RunState) -> str:
 
 def news(kind: str, before: RunState, after: RunState, attached: bool = False) -> str:
     """What one event changed, or "" if it is not worth a line; with a hint how to attach unless the reader is `attached`."""
-    line = _news(kind, before, after)
+    if kind in NEWS:
+        line = NEWS[kind](before, after)
+    else:
+        # All other decisions of the user carry their own words.
+        line = after.decisions[-1].words if len(after.decisions) > len(before.decisions) else SAID.get(kind, "")
     return line if attached or not line else f"{line}{HINTS.get(kind, '')}"
 
 
-def _news(kind: str, before: RunState, after: RunState) -> str:
-    match kind:
-        case "baseline_finished":
-            return baseline(after)
-        case "round_started" if (round := after.round) is not None:
-            return (
-                f"round {round.number}: {count(len(round.environment), 'model')} in "
-                f"{count(len(round.partitions), 'partition')}, {count(len(round.candidates), 'candidate')}"
-            )
-        case "candidate_judged" if after.round is not None and before.round is not None:
-            changed = after.round.candidates.changed_since(before.round.candidates)
-            return "".join(_judged(after, one) for one in changed)
-        case "waiting" if after.round is not None and after.waiting_candidate is not None:
-            waiting = after.round.candidates[after.waiting_candidate]
-            return f"  {waiting.label} shows f and waits for accept or reject"
-        case "reduced":
-            return f"  reduced to {count(len(after.environment), 'model')} after {after.tests_done} tests"
-        case "sliced" | "slices_refuted":
-            return _slices(kind, after)
-        case "certificate_started" | "certificate_finished" | "rate_lost" | "left_out":
-            return _certificate(kind, after)
-        case "engine_started" | "comparing" | "compared" | "cluster":
-            return _engine(kind, before, after)
-        case "finished" | "engine_stopped" | "engine_failed":
-            known = smaller_known(after)
-            return f"{after.status}: {after.reason}{f'; {known}' if known else ''}"
-    return _night(kind, before, after) or _isolation(kind, before, after) or _news_by_hand(kind, before, after)
+def _engine_started(before: RunState, after: RunState) -> str:
+    resumed = " again" if before.tests else ""
+    # A cluster says later how many there are.
+    workers = f" with {count(after.jobs, 'worker')}" if after.jobs else ""
+    return f"engine started{resumed}{workers}; {count(len(after.elements), 'model')} can be removed"
 
 
-def _slices(kind: str, after: RunState) -> str:
-    """What went without a test, or why nothing goes so any more."""
-    if kind == "slices_refuted":
-        return refuted_words(after)
-    models = count(len(after.environment), "model")
-    return f"  reduced to {models} without a test: {slice_words(after, after.nodes[after.node])}"
+def _comparing(_: RunState, after: RunState) -> str:
+    if after.physics.now == after.physics.proven:
+        return "a failing run is made again with its seed, to see whether it repeats"
+    return f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
 
 
-def _engine(kind: str, before: RunState, after: RunState) -> str:
-    """What an engine does before it goes on."""
-    match kind:
-        case "engine_started":
-            resumed = " again" if before.tests else ""
-            # A cluster says later how many there are.
-            workers = f" with {count(after.jobs, 'worker')}" if after.jobs else ""
-            return f"engine started{resumed}{workers}; {count(len(after.elements), 'model')} can be removed"
-        case "cluster":
-            return after.cluster
-        case "comparing" if after.physics.now == after.physics.proven:
-            return "a failing run is made again with its seed, to see whether it repeats"
-        case "comparing":
-            return (
-                f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
-            )
-        case "compared":
-            same = after.physics.mixed == before.physics.mixed
-            return f"  {'the same bits' if same else 'other bits: from here on the tests are mixed'}"
-    return ""
+def _compared(before: RunState, after: RunState) -> str:
+    same = after.physics.mixed == before.physics.mixed
+    return f"  {'the same bits' if same else 'other bits: from here on the tests are mixed'}"
 
 
-def _night(kind: str, before: RunState, after: RunState) -> str:
-    """What came to an engine from outside."""
-    if kind == "clock_jumped":
-        return "  the machine slept, or its clock was set: that time does not count"
-    if kind == "disk_space" and after.needs_room:
+def _disk_space(before: RunState, after: RunState) -> str:
+    if after.needs_room:
         return f"  no room on the disk: waits until {after.needs_room / 1e6:.0f} MB are free"
-    return "  there is room on the disk again" if kind == "disk_space" and before.needs_room else ""
+    return "  there is room on the disk again" if before.needs_room else ""
 
 
-def _certificate(kind: str, after: RunState) -> str:
-    """What a certificate does, and what follows from it."""
-    last, models = after.certificates[-1], count(len(after.environment), "model")
-    match kind:
-        case "certificate_started":
-            what = f"fresh runs of what is left ({models}), without each model, and of the whole world"
-            if last.seeds:
-                what = f"the chosen seeds show what is left ({models}); fresh runs show how often f shows with others"
-            return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
-        case "certificate_finished":
-            return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
-        case "rate_lost":
-            return f"  back to {models}, the last environment not shown to have lost the rate"
-    return (
-        f"  reduced to {models} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
-    )
-
-
-def _isolation(kind: str, before: RunState, after: RunState) -> str:
-    """What isolation does, and what it finds."""
-    match kind:
-        case "isolation_started":
-            return (
-                f"{ISOLATING}: as few models as can be removed from the whole world so that the robot reaches its goal"
-            )
-        case "removal_judged":
-            return "".join(_removal(after, each) for each in after.removals.changed_since(before.removals))
-        case "isolation_checked":
-            first = after.isolations[-1].checks[-1].claims[0]
-            return f"  fresh runs: the robot reaches its goal in {first.reached} of {first.runs}: {first.verdict}"
-        case "isolation_given_up":
-            return "the search for the nearest world that passes is given up; the reduction is as it was"
-        case "isolation_finished":
-            return of_passing(after, after.isolations[-1])
-    return ""
-
-
-def _removal(state: RunState, one: Removal) -> str:
-    what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
-    return f"  {what}: {_verdict(state, one)}"
-
-
-def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
-    if kind == "trial_judged":
-        changed = (one for one, was in zip(after.trials, before.trials, strict=True) if one != was)
-        return "".join(_judged(after, one) for one in changed)
-    if kind == "supports":
-        return _supports(after)
-    if kind == "noted":
-        return after.notes[-1][1]
-    if kind == "command_refused":
-        return f"not done: {after.refusal[1]}"
-    # All other decisions of the user carry their own words.
-    if len(after.decisions) > len(before.decisions):
-        return after.decisions[-1].words
-    return SAID.get(kind, "")
-
-
-def _supports(state: RunState) -> str:
-    if state.unsettled:
-        return f"it is not known which models rest on which: {state.unsettled}"
-    resting = len({upper for upper, _ in state.supports})
+def _supports(_: RunState, after: RunState) -> str:
+    if after.unsettled:
+        return f"it is not known which models rest on which: {after.unsettled}"
+    resting = len({upper for upper, _ in after.supports})
     return f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others" if resting else ""
 
 
-def _judged(state: RunState, one: Candidate | Trial) -> str:
-    return f"  {one.label} ({count(one.size, 'model')}): {_verdict(state, one)}"
+def _round_started(_: RunState, after: RunState) -> str:
+    round = after.round
+    if round is None:
+        return ""
+    models, parts = count(len(round.environment), "model"), count(len(round.partitions), "partition")
+    return f"round {round.number}: {models} in {parts}, {count(len(round.candidates), 'candidate')}"
 
 
-def _verdict(state: RunState, one: Candidate | Trial | Removal) -> str:
-    """A verdict, and how its tests ended: "dissimilar after 4 tests (2 pass, 1 stuck, 1 tipped over), implied by test 3"."""
+def _candidate_judged(before: RunState, after: RunState) -> str:
+    if before.round is None or after.round is None:
+        return ""
+    return _judged(after, after.round.candidates.changed_since(before.round.candidates))
+
+
+def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> str:
+    return "".join(f"  {_judgement(state, one)}" for one in judged)
+
+
+def _judgement(state: RunState, one: Candidate | Trial | Removal) -> str:
+    """A verdict, and how its tests ended: "part A (3 models): dissimilar after 4 tests (2 pass, 2 stuck), implied by test 3"."""
+    if isinstance(one, Removal):
+        what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
+    else:
+        what = f"{one.label} ({count(one.size, 'model')})"
     tests, implied = [test for test in state.tests_of(one.tests) if test.is_finished], implied_words(state, one.tests)
     endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests)
     ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
-    return f"{one.verdict} after {count(len(one.tests), 'test')}{ways}{f', {implied}' if implied else ''}"
+    return f"{what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{f', {implied}' if implied else ''}"
+
+
+def _waiting(_: RunState, after: RunState) -> str:
+    if after.round is None or after.waiting_candidate is None:
+        return ""
+    return f"  {after.round.candidates[after.waiting_candidate].label} shows f and waits for accept or reject"
+
+
+def _left(state: RunState) -> str:
+    return count(len(state.environment), "model")
+
+
+def _certificate_started(_: RunState, after: RunState) -> str:
+    last = after.certificates[-1]
+    what = f"fresh runs of what is left ({_left(after)}), without each model, and of the whole world"
+    if last.seeds:
+        what = f"the chosen seeds show what is left ({_left(after)}); fresh runs show how often f shows with others"
+    return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
+
+
+def _certificate_finished(_: RunState, after: RunState) -> str:
+    last = after.certificates[-1]
+    return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
+
+
+def _passes(first: Returned) -> str:
+    return f"  fresh runs: the robot reaches its goal in {first.reached} of {first.runs}: {first.verdict}"
+
+
+def _ended(_: RunState, after: RunState) -> str:
+    known = smaller_known(after)
+    return f"{after.status}: {after.reason}{f'; {known}' if known else ''}"
+
+
+# The line of each event, from the states before and after it.
+NEWS: dict[str, Callable[[RunState, RunState], str]] = {
+    "engine_started": _engine_started,
+    "cluster": lambda _, after: after.cluster,
+    "comparing": _comparing,
+    "compared": _compared,
+    "clock_jumped": lambda *_: "  the machine slept, or its clock was set: that time does not count",
+    "disk_space": _disk_space,
+    "supports": _supports,
+    "noted": lambda _, after: after.notes[-1][1],
+    "command_refused": lambda _, after: f"not done: {after.refusal[1]}",
+    "baseline_finished": lambda _, after: baseline(after),
+    "round_started": _round_started,
+    "candidate_judged": _candidate_judged,
+    "trial_judged": lambda before, after: _judged(after, (one for one in after.trials if one not in before.trials)),
+    "waiting": _waiting,
+    "reduced": lambda _, after: f"  reduced to {_left(after)} after {after.tests_done} tests",
+    "sliced": lambda _, after: (
+        f"  reduced to {_left(after)} without a test: {slice_words(after, after.nodes[after.node])}"
+    ),
+    "slices_refuted": lambda _, after: refuted_words(after),
+    "certificate_started": _certificate_started,
+    "certificate_finished": _certificate_finished,
+    "rate_lost": lambda _, after: f"  back to {_left(after)}, the last environment not shown to have lost the rate",
+    "left_out": lambda _, after: (
+        f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
+    ),
+    "isolation_started": lambda *_: (
+        f"{ISOLATING}: as few models as can be removed from the whole world so that the robot reaches its goal"
+    ),
+    "removal_judged": lambda before, after: _judged(after, after.removals.changed_since(before.removals)),
+    "isolation_checked": lambda _, after: _passes(after.isolations[-1].checks[-1].claims[0]),
+    "isolation_given_up": lambda *_: (
+        "the search for the nearest world that passes is given up; the reduction is as it was"
+    ),
+    "isolation_finished": lambda _, after: of_passing(after, after.isolations[-1]),
+    "finished": _ended,
+    "engine_stopped": _ended,
+    "engine_failed": _ended,
+}
 
 
 def happened(moment: Moment) -> str:

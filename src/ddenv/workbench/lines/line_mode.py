@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.errors import UserError
-from ddenv.evidence.fresh_runs import fresh_runs
+from ddenv.evidence.claims import fresh_runs
 from ddenv.guiding.commands import Command, question, said, send, starts_engine
 from ddenv.guiding.course import StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
@@ -91,7 +91,7 @@ def table(snapshot: Snapshot) -> Iterator[str]:
 
 
 def _said_of(state: RunState, row: Candidate | Trial) -> str:
-    running = any(state.tests[id - 1].outcome == "running" for id in row.tests if 0 < id <= len(state.tests))
+    running = any(test.outcome == "running" for test in state.tests_of(row.tests))
     verdict = row.verdict or ("in test" if running else "not judged yet")
     distance = row.distance if isinstance(row, Candidate) else None
     away = "" if distance is None else f", ranked by {distance:.1f}"

@@ -17,12 +17,13 @@ from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, question, refusal, said, send, starts_engine
 from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Trial
 from ddenv.runs import processor
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, duration, plain
 from ddenv.words.decisions import shows_f
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine
 
 # After this time without an answer the screen says that there is none, s.

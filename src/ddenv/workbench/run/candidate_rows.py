@@ -9,16 +9,15 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.evidence.fresh_runs import FreshRuns, fresh_runs
+from ddenv.evidence.claims import FreshRuns, fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.text import count, percent, plain, shortened
 from ddenv.words.claims import made_of_usual, short
 from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
 from ddenv.words.slices import implied_words
-from ddenv.workbench.shared.poll import Snapshot
 
 # Maximum width of a model's name, in cells.
 NAME = 8
@@ -174,7 +173,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         return _run(snapshot, item, row + 1 - len(listing.trials))
     if isinstance(item, FreshRuns):
         return certificate_words(snapshot, item)
-    tests = [snapshot.state.tests[id - 1] for id in item.tests if 0 < id <= len(snapshot.state.tests)]
+    tests = snapshot.state.tests_of(item.tests)
     done = [test for test in tests if test.is_finished]
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
     distances = [test.distance for test in done if test.distance is not None]
@@ -213,10 +212,16 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
     if item.verdict:
         implied = implied_words(state, item.tests)
         return f"{VERDICT.get(item.verdict, plain(item.verdict))}{f', {implied}' if implied else ''}"
+    return _running(snapshot, tests)
+
+
+def _running(snapshot: Snapshot, tests: Sequence[Test]) -> str:
+    """Which of some tests run, and how far the first of these is."""
     running = [test for test in tests if test.outcome == "running"]
     if not running or snapshot.engine != "alive":
         return ""
-    return "▶" * min(3, len(running)) + _seconds(snapshot, running[0])
+    seconds = snapshot.seconds(running[0].id)
+    return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)
 
 
 def _in_short(state: RunState, item: Trial | Candidate) -> Words:
@@ -229,14 +234,8 @@ def _fallen(models: Sequence[str]) -> str:
     return f"drops {len(models)} models" if len(models) > 1 else dropping(models, NAME)
 
 
-def _seconds(snapshot: Snapshot, test: Test) -> str:
-    seconds = snapshot.seconds(test.id)
-    return simulated(seconds, settings(snapshot.state).timeout)
-
-
 def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
     """One run of the whole world."""
-    running = test.outcome == "running" and snapshot.engine == "alive"
     return {
         "#": str(number),
         "candidate": f"run {test.run + 1}",
@@ -244,7 +243,7 @@ def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
         "tests": "",
         "to f": metres(test.distance),
         "real": brief(test.wall_seconds) if test.is_finished else "",
-        "verdict": f"▶{_seconds(snapshot, test)}" if running else outcome(test),
+        "verdict": _running(snapshot, [test]) or outcome(test),
     }
 
 
@@ -287,10 +286,6 @@ def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
 
 
 def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
-    if one.claim is not None:
-        return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
-    running = one.running if snapshot.engine == "alive" else ()
-    if not running:
-        return ""
-    seconds = snapshot.seconds(running[0].id)
-    return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)
+    if one.claim is None:
+        return _running(snapshot, one.running)
+    return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"

@@ -8,19 +8,18 @@ from typing import ClassVar
 from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from rich.style import Style
-from rich.text import Text
 from textual import events
 from textual.binding import Binding
-from textual.geometry import Region, Size
+from textual.geometry import Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from ddenv.evidence.fresh_runs import FreshRuns
+from ddenv.evidence.claims import FreshRuns
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.text import first_of, plain
 from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
-from ddenv.workbench.shared.poll import Snapshot
 
 # The maximum number of models that a tooltip names.
 NAMED = 12
@@ -32,7 +31,7 @@ def _binding(keys: str, action: str, name: str, tooltip: str) -> Binding:
 
 
 class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
-    """Only rows in sight become text, and only lines that changed are drawn again.
+    """Only rows in sight become text: a DataTable takes seconds to list 5,000 candidates, at each round.
 
     The cursor follows the run until it is moved by hand.
     """
@@ -76,13 +75,8 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._snapshot = Snapshot()
         self._listed = Listed()
         self._narrow = False
-        self._drawn: dict[int, Words] = {}
 
     # What is listed.
-
-    @property
-    def row_count(self) -> int:
-        return len(self._listed)
 
     @property
     def item(self) -> Item | None:
@@ -99,15 +93,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         """The candidate or trial that was chosen by hand."""
         return None if self.following else self.under_cursor
 
-    def get_row_at(self, row: int) -> list[Text]:
-        """The cells of a row, in the order of the columns."""
-        cells = words(self._snapshot, self._listed, row)
-        return [_text(column, cells.get(column.name, "")) for column in self.columns]
-
-    def get_cell(self, key: str, name: str) -> Text:
-        """A cell of the candidate whose index is `key`."""
-        row = len(self._listed.trials) + int(key)
-        return Text(words(self._snapshot, self._listed, row).get(name, ""))
+    def words(self, row: int) -> Words:
+        """The words of a row by column."""
+        return words(self._snapshot, self._listed, row)
 
     def set_narrow(self, narrow: bool) -> None:
         """With little room, drops every column that can be spared."""
@@ -129,7 +117,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._arrange()
         if self.following and snapshot.focus is not None:
             self._put(self._listed.row(snapshot.focus))
-        self._redraw()
+        self.refresh()
 
     def follow(self) -> None:
         """Gives the cursor back to the run."""
@@ -186,26 +174,24 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _page(self) -> int:
         return max(1, self.size.height - 1)
 
-    def _in_sight(self, row: int) -> bool:
-        return self.scroll_offset.y <= row < self.scroll_offset.y + self._page
+    @property
+    def _in_sight(self) -> bool:
+        """Whether the cursor is."""
+        return self.scroll_offset.y <= self.cursor_row < self.scroll_offset.y + self._page
 
     def _put(self, row: int | None, reveal: bool = False) -> None:
         """Moves the cursor. The view goes with it, if the cursor was in sight."""
-        if row is None:
-            return
-        reveal = reveal or self._in_sight(self.cursor_row)
-        for each in (self.cursor_row, row) if row != self.cursor_row else ():
-            self._refresh_row(each)
-        self.cursor_row = row
-        if reveal:
-            self._reveal()
+        if row is not None:
+            reveal = reveal or self._in_sight
+            self.cursor_row = row
+            self.refresh()
+            if reveal:
+                self._reveal()
 
     def _reveal(self) -> None:
-        top = self.scroll_offset.y
-        if not self.size.height or self._in_sight(self.cursor_row):
-            return
-        y = self.cursor_row if self.cursor_row < top else self.cursor_row - self._page + 1
-        self.scroll_to(y=y, animate=False, force=True)
+        if self.size.height and not self._in_sight:
+            above = self.cursor_row < self.scroll_offset.y
+            self.scroll_to(y=self.cursor_row - (0 if above else self._page - 1), animate=False, force=True)
 
     def on_resize(self) -> None:
         self._arrange()
@@ -213,34 +199,16 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     def _arrange(self) -> None:
         """Fits the columns and the scroll area."""
-        columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
-        if columns != self.columns:
-            self.columns = columns
-            self.refresh()
-        size = Size(0, len(self._listed) + 1)
-        if size != self.virtual_size:
-            self.virtual_size = size
-            self.refresh()
-
-    def _redraw(self) -> None:
-        top = self.scroll_offset.y
-        rows = range(top, min(top + self._page, len(self._listed)))
-        drawn = {row: words(self._snapshot, self._listed, row) for row in rows}
-        for row, cells in drawn.items():
-            if self._drawn.get(row) != cells:
-                self._refresh_row(row)
-        self._drawn = drawn
-
-    def _refresh_row(self, row: int) -> None:
-        if self._in_sight(row):
-            self.refresh(Region(0, row + 1 - self.scroll_offset.y, self.size.width, 1))
+        self.columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
+        self.virtual_size = Size(0, len(self._listed) + 1)
+        self.refresh()
 
     def render_line(self, y: int) -> Strip:
         row = y - 1 + self.scroll_offset.y
         if y == 0:
             style = self.get_component_rich_style("candidates--header")
             return self._strip({column.name: column.name for column in self.columns}, style)
-        cells = words(self._snapshot, self._listed, row)
+        cells = self.words(row)
         if not cells:
             return Strip.blank(self.size.width, self.rich_style)
         is_cursor = row == self.cursor_row
@@ -271,7 +239,3 @@ def _emphasis(words: str) -> Style:
     if words.startswith(("●", "▶", "?")):
         return STRONG
     return WEAK if words.startswith(("○", "⊘")) else Style.null()
-
-
-def _text(column: Column, words: str) -> Text:
-    return Text(words, _emphasis(words), justify="right" if column.right else "left", no_wrap=True)

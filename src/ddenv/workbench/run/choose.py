@@ -47,7 +47,9 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._pinned = frozenset(pinned)
         self._chosen = set(chosen)
         self._names = tuple(sorted(names, key=lambda name: name not in self._chosen))
+        # The names that are listed, and how many there are with the typed part.
         self._listed: list[str] = []
+        self._found = 0
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
@@ -71,22 +73,21 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
 
     def _list(self, part: str) -> None:
         found = [name for name in self._names if part in name.casefold()]
-        self._listed = found[:LISTED]
+        self._listed, self._found = found[:LISTED], len(found)
         options = self.query_one(OptionList)
         options.clear_options()
         options.add_options([Option(self._prompt(name)) for name in self._listed])
         if self._listed:
             options.highlighted = 0
-        self._show_found(len(found))
+        self._show_found()
 
-    def _show_found(self, found: int | None = None) -> None:
-        words = f"{count(len(self._chosen), 'model')} chosen" if self._several else ""
-        if found is not None:
-            self._rest = f"{found - len(self._listed)} more: type to see them" if found > len(self._listed) else ""
-            self._rest = self._rest or ("" if found else "no name contains this")
-        self.query_one("#found", Static).update(Text("   ".join(part for part in (words, self._rest) if part)))
-
-    _rest = ""
+    def _show_found(self) -> None:
+        words = [f"{count(len(self._chosen), 'model')} chosen"] if self._several else []
+        if not self._found:
+            words.append("no name contains this")
+        elif more := self._found - len(self._listed):
+            words.append(f"{more} more: type to see them")
+        self.query_one("#found", Static).update(Text("   ".join(words)))
 
     def _prompt(self, name: str) -> Text:
         mark = ("[x] " if name in self._chosen else "[ ] ") if self._several else ""

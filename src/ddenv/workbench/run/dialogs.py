@@ -5,7 +5,7 @@ from __future__ import annotations
 import getpass
 import socket
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 from urllib.parse import urlsplit
 
 from rich.style import Style
@@ -18,12 +18,11 @@ from textual.widgets import Button, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.runfile.position import Chapter
+from ddenv.schemas import Kind
 from ddenv.text import count, plain
+from ddenv.words.methods import chosen, note, paragraph
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.processes import Scene
-
-if TYPE_CHECKING:
-    from ddenv.schemas import Kind
 
 NAME, MODELS, LEFT, TESTS = 16, 8, 10, 14
 
@@ -45,17 +44,11 @@ class Method(ModalScreen[None]):
             yield Static(self._words(), markup=False)
 
     def _words(self) -> Text:
-        from ddenv.words.methods import chosen
-
-        names = chosen(self._algorithm, self._pair)
-        return Text("\n\n").join(self._paragraph(kind, name) for kind, name in names.items())
+        return Text("\n\n").join(self._paragraph(*each) for each in chosen(self._algorithm, self._pair).items())
 
     def _paragraph(self, kind: Kind, name: str) -> Text:
-        from ddenv.words.methods import note, paragraph
-
         text = Text(f"{kind} ").append(plain(name), "bold").append("\n")
-        unused = note(kind, self._algorithm)
-        if unused:
+        if unused := note(kind, self._algorithm):
             text.append(unused, "bold").append(" ")
         return text.append(paragraph(kind, name))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar
 
 from rich.text import Text
@@ -28,20 +27,10 @@ NAMED = 12
 WIDTH = 11
 
 
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """`title`, then (name, words) of each fact; `log` has (simulated s, words); `command` makes the test again."""
+def facts(position: Position, number: int, command: str) -> tuple[str, Text] | None:
+    """A title and the facts of the test with this number, as the run file has them now; None if there is no such test.
 
-    title: str
-    facts: tuple[tuple[str, str], ...]
-    log: tuple[tuple[float, str], ...]
-    command: str
-
-
-def facts(position: Position, number: int, run: str) -> Facts | None:
-    """The facts of the test with this number, as the run file has them now; None if there is no such test.
-
-    `run` is what a shell calls the run. Raises UserError if the file cannot be read.
+    `command` makes it again. Raises UserError if the file cannot be read.
     """
     start = position.start_of(number)
     if start is None:
@@ -60,8 +49,14 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
         ("counts in", _counts(position, state, test)),
     )
     title = f"Test {number} of {len(state.tests)} · {purpose(start.after, test)}{again}"
-    command = f"ddenv test {run} --test {number}"
-    return Facts(title, tuple((name, words) for name, words in said if words), met(test), command)
+    text = Text()
+    for name, words in said:
+        if words:
+            text.append(f"{name:<{WIDTH}}", "dim").append(f"{words}\n")
+    text.append("\nlog\n", "bold")
+    for at, words in met(test):
+        text.append(f"{at:>8.1f} s  ", "dim").append(f"{words}\n")
+    return title, text.append("\nto make it again\n", "bold").append(f"  {command}")
 
 
 def _place(test: Test) -> str:
@@ -117,7 +112,6 @@ class FactsDialog(ModalScreen[None]):
         """`run` is what a shell calls the run. `play` plays a test back, or returns why it cannot."""
         super().__init__()
         self._position, self._test, self._run, self._play = position, test, run, play
-        self._facts: Facts | None = None
 
     def compose(self) -> ComposeResult:
         hints = "← → other tests   p plays it   c copies the command   escape closes"
@@ -129,14 +123,14 @@ class FactsDialog(ModalScreen[None]):
 
     def _show(self, test: int) -> None:
         try:
-            found = facts(self._position, test, self._run)
+            found = facts(self._position, test, self._command(test))
         except UserError as error:
             self.query_one(Framed).say(plain(str(error)))
             return
         if found is not None:
-            self._test, self._facts = test, found
-            self.query_one(".dialog").border_title = Text(found.title)
-            self.query_one("#facts", Static).update(_text(found))
+            self._test, (title, words) = test, found
+            self.query_one(".dialog").border_title = Text(title)
+            self.query_one("#facts", Static).update(words)
             self.query_one(VerticalScroll).scroll_home(animate=False)
 
     def action_step(self, by: int) -> None:
@@ -147,16 +141,9 @@ class FactsDialog(ModalScreen[None]):
             self.query_one(Framed).say(plain(why))
 
     def action_copy(self) -> None:
-        if self._facts is not None:
-            self.app.copy_to_clipboard(self._facts.command)
-            self.query_one(Framed).say("command copied, if the terminal allows it")
+        self.app.copy_to_clipboard(self._command(self._test))
+        self.query_one(Framed).say("command copied, if the terminal allows it")
 
-
-def _text(found: Facts) -> Text:
-    text = Text()
-    for name, words in found.facts:
-        text.append(f"{name:<{WIDTH}}", "dim").append(f"{words}\n")
-    text.append("\nlog\n", "bold")
-    for at, words in found.log:
-        text.append(f"{at:>8.1f} s  ", "dim").append(f"{words}\n")
-    return text.append("\nto make it again\n", "bold").append(f"  {found.command}")
+    def _command(self, test: int) -> str:
+        """What makes a test again."""
+        return f"ddenv test {self._run} --test {test}"

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 import time
 
-from rich.containers import Lines
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.words.explain import Explanation, explain
-from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.widgets.lines import changed_lines
 
 # Minimum time between two updates within a round, s.
 PERIOD = 1.0
@@ -28,7 +26,6 @@ class Happening(Widget):
         self._urgent: tuple[object, ...] = ()
         self._shown_at = -math.inf
         self._first = 0
-        self._lines = Text("")
 
     def show(self, snapshot: Snapshot, trouble: str = "") -> None:
         """`trouble` comes first: what went wrong with the engine itself."""
@@ -42,36 +39,18 @@ class Happening(Widget):
         explanation = explain(snapshot)
         if (explanation, trouble) != (self._explanation, self.trouble):
             self._explanation, self.trouble = explanation, trouble
-            if not self.size.width:
-                return
-            before, self._lines = self._lines, self._drawn()
-            if regions := changed_lines(before, self._lines, self.size.width):
-                self.refresh(*regions)
+            self.refresh()
 
     def render(self) -> Text:
-        self._lines = self._drawn()
-        return self._window(self._wrapped()).append_text(self._sentences())
-
-    def _drawn(self) -> Text:
-        """All lines as the screen shows them."""
-        wrapped = self._wrapped()
-        return self._window(wrapped).append_text(Text("\n").join(wrapped))
-
-    def _wrapped(self) -> Lines:
-        return self._sentences().wrap(self.app.console, max(1, self.size.width))
-
-    def _window(self, sentences: Lines) -> Text:
         """As many lines of the algorithm as there is room for above the sentences."""
-        width, height = self.size
-        room = height - len(sentences)
-        self._first = _scrolled(self._explanation, room, self._first)
-        return _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
-
-    def _sentences(self) -> Text:
         sentences = [Text(sentence) for sentence in self._explanation.sentences]
         if self.trouble:
             sentences.insert(0, Text(self.trouble, self.app.theme_variables["text-error"]))
-        return Text("\n").join(sentences)
+        said, (width, height) = Text("\n").join(sentences), self.size
+        room = height - len(said.wrap(self.app.console, max(1, width)))
+        self._first = _scrolled(self._explanation, room, self._first)
+        code = _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
+        return code.append_text(said)
 
 
 def _urgent(snapshot: Snapshot) -> tuple[object, ...]:

@@ -16,11 +16,11 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.runfile.progress import Point
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.text import count, padded, shortened
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
-from ddenv.workbench.widgets.lines import Lines, changed_lines
+from ddenv.workbench.widgets.lines import Lines
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -70,8 +70,9 @@ class Row:
 
 def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
     """The models of the environment, those nearest to f first."""
-    parts = {name: place for place, part in enumerate(_partitions(state)) for name in part}
-    sensed = _sensed(state)
+    partitions = state.round.partitions if state.round is not None and not state.round.done else ()
+    parts = {name: place for place, part in enumerate(partitions) for name in part}
+    sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
     places = {each.name: each for each in prints}
     f = None if state.f_position is None else state.f_position[:2]
     found = []
@@ -103,17 +104,6 @@ def heading(width: int) -> str:
     return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
 
 
-def _partitions(state: RunState) -> tuple[tuple[str, ...], ...]:
-    return state.round.partitions if state.round is not None and not state.round.done else ()
-
-
-def _sensed(state: RunState) -> dict[str, float]:
-    test = state.evidence_test
-    if test is None or not 0 < test <= len(state.tests):
-        return {}
-    return dict(state.tests[test - 1].first_sensed)
-
-
 @dataclass(frozen=True, slots=True)
 class Course:
     """What the chart shows: the size of the environment over `tests`; after how many tests the user `decided` something; and when
@@ -143,7 +133,6 @@ class Chart(Widget):
         super().__init__(id=id)
         self._course = Course()
         self._shown: tuple[object, ...] = ()
-        self._text = Text("")
 
     def show(self, snapshot: Snapshot) -> None:
         """Shows the run as it is now."""
@@ -155,15 +144,9 @@ class Chart(Widget):
             decided = tuple(decision.tests for decision in state.decisions)
             free = tuple(node.tests for node in state.nodes if node.how == "sliced")
             self._course = Course(state.history, state.tests_done, state.lower_bound, decided, free)
-            before, self._text = self._text, self._drawn()
-            if regions := changed_lines(before, self._text, self.size.width):
-                self.refresh(*regions)
+            self.refresh()
 
     def render(self) -> Text:
-        self._text = self._drawn()
-        return self._text
-
-    def _drawn(self) -> Text:
         colors = self.app.theme_variables
         top = ink(colors, "primary")
         # The terminal's own colours have no darker variants.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from ddenv.errors import UserError
-from ddenv.evidence.fresh_runs import FreshRuns
+from ddenv.evidence.claims import FreshRuns
 from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.run_settings import settings

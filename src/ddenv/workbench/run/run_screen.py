@@ -17,6 +17,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Step
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
 from ddenv.runs.wanted import Wanted
@@ -38,7 +39,7 @@ from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
 from ddenv.workbench.shared.messages import Attention
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
@@ -81,7 +82,6 @@ class RunScreen(Screen[None]):
         self.following = Following(self, self.poll, self._seen, self._show)
         self.opening, self.keys = Opening(self), KeyOffers(self)
         self._pane = "map"
-        self._title: tuple[str, str] = ("", "")
 
     @property
     def snapshot(self) -> Snapshot:
@@ -189,11 +189,8 @@ class RunScreen(Screen[None]):
         self._show_models()
         # Its rows are wider than those of candidates.
         self.set_class(snapshot.state.certificate is not None, "-certificate")
-        above = round_title(snapshot.state)
-        # Even the same words would have the panel drawn again, with all that is in it.
-        if above != self._title:
-            panel = self.query_one("#round")
-            self._title = panel.border_title, panel.border_subtitle = above
+        panel = self.query_one("#round")
+        panel.border_title, panel.border_subtitle = round_title(snapshot.state)
         log, entries = self.query_one("#log", Lines), self._log.until(self.browsing.position.at)
         if len(entries) != len(log.items):
             log.show(entries)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.style import Style
@@ -12,15 +11,14 @@ from textual.widget import Widget
 from ddenv import __version__
 from ddenv.evidence.claims import has_dropped
 from ddenv.runfile.branches import path
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.snapshot import Snapshot
+from ddenv.runfile.state import RunState
 from ddenv.runs.tests_left import Remaining, remaining
 from ddenv.text import about, between, count, duration, percent, plain, rounded, shortened, truncated
 from ddenv.words.claims import drift, ended
 from ddenv.words.methods import GROUPS, labels
 from ddenv.words.signs import STATUS
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
@@ -43,12 +41,8 @@ class Heading:
     rights: tuple[str, ...] = ("",)
 
 
-@dataclass(frozen=True, slots=True)
-class Fact:
-    """Something that the status line says, in the longest of its `forms` that fits."""
-
-    name: str
-    forms: tuple[str, ...]
+# What the status line says, by name, from the longest form to the shortest.
+Facts = dict[str, tuple[str, ...]]
 
 
 class Header(Widget):
@@ -83,11 +77,9 @@ class Status(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._facts: tuple[Fact, ...] = ()
+        self._facts: Facts = {}
         self._snapshot: Snapshot | None = None
         self._besides: tuple[str, str, tuple[int, int] | None] = ("", "", None)
-        self._tests: PersistentTuple[Test] = PersistentTuple()
-        self._cut = 0
 
     def show(self, snapshot: Snapshot, scene: str = "", asked: str = "", place: tuple[int, int] | None = None) -> None:
         """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for its answer.
@@ -96,11 +88,8 @@ class Status(Widget):
         """
         if (scene, asked, place) == self._besides and snapshot is self._snapshot:
             return
-        tests = snapshot.state.tests
-        if not snapshot.past:
-            self._cut = cut_tests(tests, self._tests, self._cut)
-        self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked, place)
-        now = facts(snapshot, scene, asked, self._cut) if place is None else facts_of_past(snapshot, scene, *place)
+        self._snapshot, self._besides = snapshot, (scene, asked, place)
+        now = facts(snapshot, scene, asked) if place is None else facts_of_past(snapshot, scene, *place)
         if now != self._facts:
             self._facts = now
             self.refresh()
@@ -156,12 +145,7 @@ def branch_of(state: RunState) -> int | None:
     return next((place for place, leaf in enumerate(leaves, start=1) if state.node in path(nodes, leaf)), None)
 
 
-def facts(
-    snapshot: Snapshot,
-    scene: str = "",
-    asked: str = "",
-    cut: int = 0,
-) -> tuple[Fact, ...]:
+def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
     """What the status line says, in its order."""
     state = snapshot.state
     status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
@@ -174,52 +158,44 @@ def facts(
         way_on = ": r resumes"
     elif state.needs_room and not state.ended:
         sign, word = "!", "no room on the disk"
-    mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
-    said = (
-        Fact("state", (f"{sign} {word}{way_on}", f"{sign} {word}")),
-        Fact("asked", (f"… {asked}" if asked else "", "…" if asked else "")),
-        Fact("tests", tests_said(state)),
-        Fact("drift", drift_said(state)),
-        Fact("cut", (f"{cut} ended early" if cut else "", "")),
-        Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", left_said(remaining(state, snapshot.engine == "alive"))),
-        Fact("mode", (mode, "")),
-        Fact("engine", engine_said(snapshot)),
-        Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
-    )
-    return tuple(fact for fact in said if fact.forms[0])
+    return {
+        "state": (f"{sign} {word}{way_on}", f"{sign} {word}"),
+        "asked": (f"… {asked}", "…") if asked else (),
+        "tests": tests_said(state),
+        "drift": drift_said(state),
+        "cut": (f"{cut} ended early", "") if (cut := state.cut_tests) else (),
+        "time": _time(snapshot),
+        "left": left_said(remaining(state, snapshot.engine == "alive")),
+        "mode": ("accept: ask", "") if state.accept_mode == "ask" and not state.ended else (),
+        "engine": engine_said(snapshot),
+        "scene": (f"scene {scene}", "scene") if scene else (),
+    }
 
 
-def facts_of_past(snapshot: Snapshot, scene: str, moment: int, moments: int) -> tuple[Fact, ...]:
+def facts_of_past(snapshot: Snapshot, scene: str, moment: int, moments: int) -> Facts:
     """What the status line says at an earlier moment of the run."""
-    scene_said = ("scene shows it", "") if scene else ("", "")
-    return (
-        Fact("state", (f"◂ moment {moment} of {moments}",)),
-        Fact("mode", ("escape: now",)),
-        Fact("tests", tests_said(snapshot.state)),
-        Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", scene_said),
-    )
+    return {
+        "state": (f"◂ moment {moment} of {moments}",),
+        "mode": ("escape: now",),
+        "tests": tests_said(snapshot.state),
+        "time": _time(snapshot),
+        "left": ("scene shows it", "") if scene else (),
+    }
 
 
-def fitted(said: Sequence[Fact], width: int) -> list[tuple[str, str]]:
+def _time(snapshot: Snapshot) -> tuple[str, ...]:
+    return (duration(snapshot.spent), "") if snapshot.spent else ()
+
+
+def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
     """(name, words) of what fits into `width` cells."""
-    forms = {fact.name: list(fact.forms) for fact in said}
+    forms = {name: list(each) for name, each in said.items() if each}
     for name in SHRINK:
         if sum(len(each[0]) + 3 for each in forms.values() if each[0]) <= width:
             break
         if len(forms.get(name, ())) > 1:
             del forms[name][0]
     return [(name, each[0]) for name, each in forms.items() if each[0]]
-
-
-def cut_tests(tests: PersistentTuple[Test], before: PersistentTuple[Test], cut: int) -> int:
-    """How many of `tests` were ended early, if `cut` of those of `before` were: it reads only tests that changed."""
-    if len(tests) < len(before):
-        before, cut = PersistentTuple(), 0
-    for test in tests.changed_since(before):
-        cut += test.cut - (test.id <= len(before) and before[test.id - 1].cut)
-    return cut
 
 
 def tests_said(state: RunState) -> tuple[str, ...]:
@@ -237,17 +213,15 @@ def tests_said(state: RunState) -> tuple[str, ...]:
 def drift_said(state: RunState) -> tuple[str, ...]:
     """How often f shows here, beside the whole world; marked where it has dropped, with the key that goes back."""
     forms = drift(state)
-    if not forms:
-        return ("",)
-    if not has_dropped(state):
-        return (*forms, "")
-    return tuple(f"▼ {form}: u goes back" for form in forms)
+    if has_dropped(state):
+        return tuple(f"▼ {form}: u goes back" for form in forms)
+    return (*forms, "") if forms else ()
 
 
 def left_said(left: Remaining | None) -> tuple[str, ...]:
     """What is left, with its interval, then without."""
     if left is None:
-        return ("",)
+        return ()
     low, middle, high = left.tests
     if left.seconds is None:
         words = f"about {count(rounded(middle), 'test')} left"
@@ -264,7 +238,7 @@ def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
         return ("engine ◌", "")
     if snapshot.engine != "alive":
         silent = state.status == "finished" or snapshot.status == "lost" or snapshot.gone
-        return ("",) if silent else ("engine ○ off: r resumes", "")
+        return () if silent else ("engine ○ off: r resumes", "")
     version = plain(state.engine_version)
     if version in ("", __version__):
         return ("engine ●", "")

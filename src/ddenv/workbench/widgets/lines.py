@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import zip_longest
 from typing import Any
 
 from rich.segment import Segment
 from rich.text import Text
 from textual import events
-from textual.geometry import Region, Size
+from textual.geometry import Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
-
-
-def changed_lines(before: Text, now: Text, width: int) -> list[Region]:
-    """The lines in which two texts differ, as regions of a widget that is `width` columns wide."""
-    pairs = zip_longest(before.split("\n"), now.split("\n"))
-    return [Region(0, y, width, 1) for y, (old, new) in enumerate(pairs) if old != new]
 
 
 class Lines(ScrollView, can_focus=True):
