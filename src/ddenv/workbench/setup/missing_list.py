@@ -29,21 +29,17 @@ box:x,y,z  or cylinder:radius,length, or sphere:radius (m)
 It is used in every world that names this file."""
 
 
+def _key(key: str, action: str, words: str, tooltip: str) -> Binding:
+    return Binding(key, action, words, id=f"missing.{'choose' if key == 'enter' else words}", tooltip=tooltip)
+
+
 class MissingList(OptionList):
     """A row for each missing file; hidden while there is none."""
 
     BINDINGS: ClassVar = [
-        Binding(
-            "enter", "select", "remedy", id="missing.choose", tooltip="choose a folder or a shape, or leave it out"
-        ),
-        Binding(
-            "a",
-            "guess",
-            "guess",
-            id="missing.guess",
-            tooltip="take the guessed shape wherever nothing is chosen, or else for this one",
-        ),
-        Binding("w", "without", "without", id="missing.without", tooltip="leave this one out"),
+        _key("enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
+        _key("a", "guess", "guess", "take the guessed shape wherever nothing is chosen, or else for this one"),
+        _key("w", "without", "without", "leave this one out"),
     ]
 
     class Chosen(Message):
@@ -62,34 +58,34 @@ class MissingList(OptionList):
         """Shows other rows; the cursor stays where it was, or goes to the first row without a remedy."""
         same = [row.uri for row in rows] == [row.uri for row in self._rows]
         place, self._rows = self.highlighted if same else None, rows
-        self.clear_options()
-        self.add_options(Option(self._line(row), id=row.uri) for row in rows)
-        undecided = next((index for index, row in enumerate(rows) if not row.remedy), 0)
-        self.highlighted = (undecided if place is None else place) if rows else None
+        self.set_options(Option(self._line(row), id=row.uri) for row in rows)
+        undecided = [index for index, row in enumerate(rows) if not row.remedy]
+        self.highlighted = (next(iter(undecided), 0) if place is None else place) if rows else None
         self.display = bool(rows)
-        still = sum(not row.remedy for row in rows)
-        self.border_title = f"{count(len(rows), 'file')} missing (m)" + (f", {still} without a remedy" if still else "")
+        still = f", {len(undecided)} without a remedy" if undecided else ""
+        self.border_title = f"{count(len(rows), 'file')} missing (m){still}"
 
     def _line(self, row: Missing) -> Text:
         color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
         text = Text(no_wrap=True, overflow="ellipsis").append(DONE if row.remedy else OPEN, f"bold {color}")
-        return text.append(f" {_short(row.uri)}  ").append(plain(row.words), "dim")
+        # The last word of a URI tells models and meshes apart.
+        name = plain(unquote(row.uri).rstrip("/").rsplit("/", 1)[-1]) or plain(row.uri)
+        return text.append(f" {name}  ").append(plain(row.words), "dim")
 
     @on(OptionList.OptionSelected)
     def _selected(self, event: OptionList.OptionSelected) -> None:
         event.stop()
         row = self._rows[event.option_index]
-        self.app.push_screen(AskRemedy(row), lambda text: self._take(row.uri, text))
 
-    def _take(self, uri: str, text: str | None) -> None:
-        if text is not None:
-            self.post_message(self.Chosen({uri: text}))
+        def take(text: str | None) -> None:
+            if text is not None:
+                self.post_message(self.Chosen({row.uri: text}))
+
+        self.app.push_screen(AskRemedy(row), take)
 
     def action_guess(self) -> None:
-        undecided = [row.uri for row in self._rows if not row.remedy]
-        if not undecided and self.highlighted is not None:
-            undecided = [self._rows[self.highlighted].uri]
-        self.post_message(self.Chosen(dict.fromkeys(undecided, "auto")))
+        here = [] if self.highlighted is None else [self._rows[self.highlighted].uri]
+        self.post_message(self.Chosen(dict.fromkeys([row.uri for row in self._rows if not row.remedy] or here, "auto")))
 
     def action_without(self) -> None:
         if self.highlighted is not None:
@@ -99,7 +95,7 @@ class MissingList(OptionList):
 class AskRemedy(ModalScreen[str | None]):
     """Asks for the remedy of one missing file."""
 
-    BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="remedy.cancel", tooltip="change nothing")]
+    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="remedy.cancel", tooltip="change nothing")]
 
     def __init__(self, row: Missing) -> None:
         super().__init__()
@@ -118,16 +114,6 @@ class AskRemedy(ModalScreen[str | None]):
         try:
             if not event.value.strip() and not self._row.remedy:
                 raise UserError("type one of these, or press escape to change nothing")
-            text = remedy(event.value)
+            self.dismiss(remedy(event.value))
         except UserError as error:
             self.query_one("#wrong", Static).update(Text(str(error).removeprefix("remedy: ")))
-            return
-        self.dismiss(text)
-
-    def action_cancel(self) -> None:
-        self.dismiss(None)
-
-
-def _short(uri: str) -> str:
-    """The last word of a URI, which tells models and meshes apart."""
-    return plain(unquote(uri).rstrip("/").rsplit("/", 1)[-1]) or plain(uri)
