@@ -18,7 +18,6 @@ from ddenv.runfile.store import COLUMNS
 from ddenv.workbench.map.map_colors import Palette
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
-from ddenv.workbench.map.moved_prints import MovedPrints
 from ddenv.workbench.map.picture import (
     Line,
     Mark,
@@ -32,7 +31,7 @@ from ddenv.workbench.map.picture import (
     robots,
     seen,
 )
-from ddenv.workbench.map.place import Point, Shown
+from ddenv.workbench.map.place import MovedPrints, Point, Shown
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.pose import pose_of
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.text import plain
-from ddenv.workbench.setup.remedies import Missing, read_with_remedies
+from ddenv.workbench.setup.missing_files import Missing, read_with_remedies
 from ddenv.workbench.shared.wording import count
 
 if TYPE_CHECKING:

@@ -29,8 +29,7 @@ from ddenv.workbench.setup.choice import Choice, read_choice, spawn_height
 from ddenv.workbench.setup.costs import Past, past_of
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import remember
-from ddenv.workbench.setup.missing_list import MissingList
-from ddenv.workbench.setup.remedies import remember_remedies
+from ddenv.workbench.setup.missing_files import MissingList, remember_remedies
 from ddenv.workbench.shared.background import call_if_open
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.

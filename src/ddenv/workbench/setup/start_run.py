@@ -100,7 +100,7 @@ class Saved:
 def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
     """Calls `then` with whether what the run starts is trusted. A run file is never the user's own: somebody may have sent it."""
     from ddenv.runs.trust import trust_own
-    from ddenv.workbench.widgets.trust_question import once_trusted
+    from ddenv.workbench.widgets.question import once_trusted
 
     if not new.choice.run:
         trust_own(new.scenario, new.choice.path)

@@ -16,8 +16,6 @@ from ddenv.text import plain
 GOOD_ENDS = (0, 1)
 # Maximum time that the screen waits for a program to end, s.
 A_MOMENT = 0.3
-# How much of the end of a log is read, bytes.
-TAIL = 4000
 
 
 class Engine:
@@ -144,9 +142,7 @@ def _close(process: subprocess.Popen[str]) -> None:
 def last_line(log: Path) -> str:
     """The last line of a log that is not empty."""
     try:
-        with log.open("rb") as file:
-            file.seek(max(0, log.stat().st_size - TAIL))
-            lines = file.read().decode(errors="replace").splitlines()
+        lines = log.read_text(errors="replace").splitlines()
     except OSError:
         return ""
     return next((plain(line) for line in reversed(lines) if line.strip()), "")
