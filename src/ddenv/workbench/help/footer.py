@@ -98,7 +98,7 @@ class KeyFooter(Keys):
         return tuple(found[id] for id in instead or self._order if id in found)
 
     def render(self) -> Content:
-        return Content(" ").join(map(self._drawn, self.entries))
+        return Content.assemble(*(part for entry in self.entries for part in (self._drawn(entry), " ")))
 
     def _drawn(self, entry: Entry) -> Content:
         drawn = Content.assemble((entry.shown, "bold $footer-key-foreground"), f" {entry.words}")
