@@ -172,7 +172,7 @@ async def test_notices_wait_until_a_dialog_is_closed(run):
         assert session.said() == "notice 2\nnotice 3\nnotice 4"
         await eventually(lambda: len(session.screen.query("Toast")) == 3)
         await session.press("q")
-        assert not session.app.screen.query("Toast")
+        assert not any(toast.is_on_screen for toast in session.app.screen.query("Toast"))
 
 
 async def test_settings_are_changed_in_a_dialog_that_checks_them(run):

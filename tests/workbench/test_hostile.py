@@ -31,7 +31,7 @@ from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
-from ddenv.workbench.setup.open_file import WorldTree, complain_about
+from ddenv.workbench.setup.files import WorldTree, complain_about
 from ddenv.workbench.setup.save_scenario import scenario_path
 from ddenv.workbench.shared.poll import Snapshot
 from tests.tiers import slow

@@ -17,7 +17,6 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.subject import read_parts
-from ddenv.workbench.map import map_drawing
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Poll, Snapshot
@@ -255,10 +254,8 @@ async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
         assert (world.picture.canvas.chars == before).all()
 
 
-async def test_only_the_robot_is_drawn_again_when_only_it_moves(busy, monkeypatch):
+async def test_only_the_rows_of_the_robot_are_drawn_when_only_it_moves(busy, monkeypatch):
     async with Shown(busy) as (_, world):
-        for name in ("picture", "looks", "seen", "kept"):
-            monkeypatch.setattr(map_drawing, name, lambda *_, **__: pytest.fail("drawn again"))
         regions = []
         monkeypatch.setattr(world, "refresh", lambda *changed, **_: regions.extend(changed))
         snapshot = world.snapshot

@@ -11,8 +11,15 @@ from ddenv.errors import UserError
 from ddenv.runs.remembered import state_file
 from ddenv.runs.subject import load_parts
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.setup.missing_list import AskRemedy, MissingList
-from ddenv.workbench.setup.remedies import KEPT, REMEDIES, remedy, remember_remedies, remembered
+from ddenv.workbench.setup.missing_files import (
+    KEPT,
+    REMEDIES,
+    AskRemedy,
+    MissingList,
+    remedy,
+    remember_remedies,
+    remembered,
+)
 from ddenv.world.model import Box, Cylinder
 from tests.workbench.setup.setup_session import Opened
 

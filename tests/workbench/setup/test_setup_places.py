@@ -7,8 +7,8 @@ import yaml
 from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.file_list import remember
-from ddenv.workbench.setup.places import places_of, remember_places
+from ddenv.workbench.setup.files import remember
+from ddenv.workbench.setup.preview import places_of, remember_places
 from tests.tiers import slow
 from tests.workbench.setup.setup_session import Opened
 
@@ -116,7 +116,7 @@ async def test_keys_for_the_map_are_letters_in_a_field(scenarios):
         field.value = ""
         await session.press("s", "g", "h", "0", "minus")
         assert field.value == "sgh0-"
-        assert session.screen.preview.picker.picked_next == ""
+        assert session.screen.preview.picked_next == ""
 
 
 async def test_the_crosshair_and_the_mouse_pick(scenarios):

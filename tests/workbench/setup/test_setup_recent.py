@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.runs.remembered import state_file
-from ddenv.workbench.setup.file_list import KEPT, RECENT, FileList, recent_files, remember
+from ddenv.workbench.setup.files import KEPT, RECENT, FileList, recent_files, remember
 from tests.workbench.setup.setup_session import Opened
 
 

@@ -6,7 +6,7 @@ import pytest
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.setup.file_list import recent_files
+from ddenv.workbench.setup.files import recent_files
 from ddenv.workbench.setup.save_scenario import SaveScenario, save_scenario, scenario_path
 from ddenv.world.load import load_scenario
 from tests.workbench.setup.setup_session import Opened

@@ -6,7 +6,7 @@ import yaml
 from textual.widgets import Input, OptionList, Static
 
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.setup.open_file import OpenFile
+from ddenv.workbench.setup.files import OpenFile
 from tests.workbench.setup.setup_session import Opened
 
 

@@ -4,7 +4,6 @@ import fake_run
 import pytest
 import yaml
 
-from ddenv.workbench.setup.preview import StartNotes
 from tests.waiting import eventually
 from tests.workbench.setup.setup_session import Opened
 
@@ -16,7 +15,7 @@ def world(*models):
 
 
 async def says(session, words):
-    line = session.screen.query_one(StartNotes)
+    line = session.screen.query_one("#start-notes")
     await eventually(lambda: line.display == bool(words) and (not words or line.render().plain == words))
     return line
 

@@ -1,4 +1,4 @@
-"""The frame of dialogs and panes: a title above, keys below. A click on a key presses it."""
+"""Keys with their words, which a click presses: below the frames of dialogs and panes, and in the footer."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from textual.binding import Binding
 from textual.containers import Vertical
 from textual.content import Content
 from textual.style import Style
+from textual.widget import Widget
 
 from ddenv.workbench.help.key_names import shown_key
 
@@ -24,7 +25,39 @@ GAP = "   "
 SAID = 3.0
 
 
-class Framed(Vertical):
+class Keys(Widget):
+    """A widget that shows keys as `pressing` marks them: a click presses a key, and a tooltip explains it."""
+
+    def action_press(self, key: str) -> None:
+        """Presses a key here: a pane without the focus gets it first."""
+        focused = self.screen.focused
+        if focused is None or self not in focused.ancestors:
+            inside = next((node for node in self.screen.focus_chain if self in node.ancestors), None)
+            if inside is not None:
+                self.screen.set_focus(inside)
+        # By the app itself: a key that this widget sends would not come further up than to it.
+        self.app.call_later(self.app.simulate_key, key)
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        self._explain(event.style.meta.get("key", ""))
+
+    def on_leave(self) -> None:
+        self._explain("")
+
+    def _explain(self, key: str) -> None:
+        """The tooltip of a key. Only another one is set: it is drawn at once."""
+        active = self.screen.active_bindings.get(key) if key else None
+        words = (active.tooltip or None) if active is not None else None
+        if words != self.tooltip:
+            self.tooltip = words
+
+
+def pressing(key: str, action: str = "") -> Style:
+    """The style of words that press `key` when they are clicked, or do `action` instead."""
+    return Style.from_meta({"@click": action or f"press({key!r})", "key": key})
+
+
+class Framed(Keys, Vertical):
     """`hints` are keys with what they do, three spaces apart: `enter opens   escape cancels`."""
 
     def __init__(self, title: str | Text, hints: str = "", *, id: str | None = None, classes: str = "dialog") -> None:
@@ -46,32 +79,11 @@ class Framed(Vertical):
 
     def _own_keys(self) -> dict[str, str]:
         """The user's own keys of this screen, by the usual ones."""
-        own = self.app._keymap
-        bindings = Binding.make_bindings(self.screen.BINDINGS) if own else ()
-        return {each.key: own[each.id].split(",")[0] for each in bindings if each.id and each.id in own}
-
-    def action_press(self, key: str) -> None:
-        """Presses a key here: a pane without the focus gets it first."""
-        focused = self.screen.focused
-        if focused is None or self not in focused.ancestors:
-            inside = next((node for node in self.screen.focus_chain if self in node.ancestors), None)
-            if inside is not None:
-                self.screen.set_focus(inside)
-        # By the app itself: a key that this widget sends would not come further up than to it.
-        self.app.call_later(self.app.simulate_key, key)
-
-    def on_mouse_move(self, event: events.MouseMove) -> None:
-        self._explain(event.style.meta.get("key", ""))
-
-    def on_leave(self) -> None:
-        self._explain("")
-
-    def _explain(self, key: str) -> None:
-        """The tooltip of a hint. Only another one is set: it is drawn at once."""
-        active = self.screen.active_bindings.get(key) if key else None
-        words = (active.tooltip or None) if active is not None else None
-        if words != self.tooltip:
-            self.tooltip = words
+        now: dict[str | None, list[str]] = {}
+        for active in self.screen.active_bindings.values():
+            now.setdefault(active.binding.id, []).append(active.binding.key)
+        usual = [each for each in Binding.make_bindings(self.screen.BINDINGS) if each.id in now]
+        return {each.key: now[each.id][0] for each in usual if each.key not in now[each.id]}
 
 
 def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:
@@ -82,7 +94,7 @@ def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:
             parts.append(GAP)
         for key, words in _by_key(hint, own):
             said = words.rstrip()
-            parts.append((said, Style.from_meta({"@click": f"press({key!r})", "key": key})) if key else said)
+            parts.append((said, pressing(key)) if key else said)
             parts.append(words[len(said) :])
     return Content.assemble(*parts)
 

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import string
 
-from textual.keys import Keys, _character_to_key
+from textual.binding import Binding
+from textual.keys import Keys
 
 from ddenv.errors import UserError
+
+
+def _named(character: str) -> str:
+    """Textual's name of a character, such as question_mark."""
+    return next(iter(Binding.make_bindings([Binding(character, "")]))).key
+
 
 _MODIFIERS = ("ctrl", "shift", "alt", "meta", "super", "hyper")
 _NAMED = {key.value for key in Keys}
 # Punctuation of every keyboard, by names such as question_mark.
-_SIGNS = {_character_to_key(sign): sign for sign in string.punctuation}
+_SIGNS = {_named(sign): sign for sign in string.punctuation if sign != ","} | {"comma": ","}
 _ARROWS = {"up": "↑", "down": "↓", "left": "←", "right": "→"}
 # Terminals send the same code for both keys of a pair.
 _SAME = {"ctrl+i": "tab", "ctrl+m": "enter", "ctrl+h": "backspace", "ctrl+left_square_bracket": "escape"}
@@ -49,7 +56,7 @@ def _textual_key(key: str, where: str) -> str:
     if len(name) == 1:
         if modifiers == ["shift"] and name.isalpha():
             return name.upper()
-        name = _character_to_key(name)
+        name = "comma" if name == "," else _named(name)
     elif name.lower() in _NAMED or name.lower() in _SIGNS:
         name = name.lower()
     else:

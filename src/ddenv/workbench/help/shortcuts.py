@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -61,20 +61,15 @@ class Group:
     hints: tuple[str, ...] = ()
 
 
-def offered(screen: Screen[Any]) -> list[ActiveBinding]:
-    """The keys that a screen offers now, those of the focused widget first.
+def groups(screen: Screen[Any]) -> list[Group]:
+    """The focused pane's shortcuts first, then the screen's, then the app's.
 
     An action whose `check_action` returns False is left out; one with None is shown, but not enabled.
     """
-    return list(screen.active_bindings.values())
-
-
-def groups(screen: Screen[Any]) -> list[Group]:
-    """The focused pane's shortcuts first, then the screen's, then the app's."""
     panes: list[ActiveBinding] = []
     own: list[ActiveBinding] = []
     everywhere: list[ActiveBinding] = []
-    for active in offered(screen):
+    for active in screen.active_bindings.values():
         if not _words(active):
             continue
         if isinstance(active.node, App) or (active.node is screen and not active.binding.id):
@@ -133,7 +128,28 @@ def _pane(focused: DOMNode | None) -> tuple[str, tuple[str, ...]]:
     return plain(title), tuple(plain(line) for line in hints if line.strip())
 
 
-class Help(ModalScreen[None]):
+class Reading(ModalScreen[None]):
+    """A dialog with rows under titles: what stands there, in bold, and what it means."""
+
+    def __init__(self, title: str, groups: Iterable[tuple[str, Iterable[tuple[str | Text, str | Text]]]]) -> None:
+        super().__init__()
+        self._title, self._groups = title, groups
+
+    def compose(self) -> ComposeResult:
+        table = Table.grid(padding=(0, 2))
+        table.add_column(justify="right", style="bold", min_width=4, max_width=24)
+        table.add_column(overflow="fold")
+        for title, rows in self._groups:
+            if table.row_count:
+                table.add_row()
+            table.add_row("", Text(title, "bold underline"))
+            for row in rows:
+                table.add_row(*row)
+        with Framed(self._title, "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
+            yield Static(table, markup=False)
+
+
+class Help(Reading):
     """Every key with what it does: those of the focused pane first."""
 
     BINDINGS: ClassVar = [
@@ -141,24 +157,12 @@ class Help(ModalScreen[None]):
     ]
 
     def __init__(self, groups: Iterable[Group]) -> None:
-        super().__init__()
-        self._groups = tuple(groups)
+        super().__init__("Keys", [(each.title, self._rows(each)) for each in groups])
 
-    def compose(self) -> ComposeResult:
-        with Framed("Keys", "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
-            yield Static(self._table(), markup=False)
-
-    def _table(self) -> Table:
-        table = Table.grid(padding=(0, 2))
-        table.add_column(justify="right", style="bold", max_width=24)
-        table.add_column(overflow="fold")
-        for group in self._groups:
-            if table.row_count:
-                table.add_row()
-            table.add_row("", Text(group.title, "bold underline"))
-            for shortcut in group.shortcuts:
-                style = "" if shortcut.enabled else "dim"
-                table.add_row(Text(shortcut.keys, style), Text(shortcut.words, style))
-            for hint in group.hints:
-                table.add_row("", Text(hint))
-        return table
+    @staticmethod
+    def _rows(group: Group) -> Iterator[tuple[str | Text, str | Text]]:
+        for shortcut in group.shortcuts:
+            style = "" if shortcut.enabled else "dim"
+            yield Text(shortcut.keys, style), Text(shortcut.words, style)
+        for hint in group.hints:
+            yield "", Text(hint)

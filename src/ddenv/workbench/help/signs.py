@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rich.table import Table
-from rich.text import Text
-from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import VerticalScroll
-from textual.screen import ModalScreen
-from textual.widgets import Static
 
 from ddenv.runfile import branches
 from ddenv.words.signs import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
-from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, OF_WAYS
 
 Signs = tuple[tuple[str, str], ...]
@@ -58,26 +52,12 @@ def _joined(meanings: dict[str, str]) -> Signs:
     return tuple((sign, " or ".join(words)) for sign, words in found.items())
 
 
-class SignsDialog(ModalScreen[None]):
+class SignsDialog(Reading):
     """All signs with their meanings."""
 
     BINDINGS: ClassVar = [
         Binding("escape,k,q,enter", "dismiss", "close", id="signs.close", tooltip="close this dialog"),
     ]
 
-    def compose(self) -> ComposeResult:
-        with Framed("Signs", "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
-            yield Static(_table(), markup=False)
-
-
-def _table() -> Table:
-    table = Table.grid(padding=(0, 2))
-    table.add_column(justify="right", style="bold", min_width=4)
-    table.add_column(overflow="fold")
-    for title, group in signs().items():
-        if table.row_count:
-            table.add_row()
-        table.add_row("", Text(title, "bold underline"))
-        for sign, words in group:
-            table.add_row(sign, words)
-    return table
+    def __init__(self) -> None:
+        super().__init__("Signs", signs().items())

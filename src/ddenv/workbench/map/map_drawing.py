@@ -1,11 +1,12 @@
-"""Draws the map of a world and its run, and reuses what has not changed since the last frame."""
+"""Draws the map of a world and its run."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Generic, TypeVar
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +14,10 @@ from ddenv.evidence.took_part import in_last
 from ddenv.map.cells import Cell
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
-from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
 from ddenv.workbench.map.map_colors import Palette
 from ddenv.workbench.map.map_words import PARTING, sensed_order
-from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
-from ddenv.workbench.map.moved_prints import MovedPrints
+from ddenv.workbench.map.model_looks import Kept, kept, looks
 from ddenv.workbench.map.picture import (
     Line,
     Mark,
@@ -32,37 +31,28 @@ from ddenv.workbench.map.picture import (
     robots,
     seen,
 )
-from ddenv.workbench.map.place import Point, Shown
+from ddenv.workbench.map.place import MovedPrints, Point, Shown
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.pose import pose_of
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
+
 # Dots of the original path, or of the second way, and of the gaps in it.
 DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
 
 
-class Remembered(Generic[T]):
-    """A value with the objects that it was made from.
+# Lying models are the slow part of a frame: 16 of 19 ms with 3,000 models, and only zooming and panning change it.
+@lru_cache(maxsize=4)
+def _outlines(prints: tuple[Footprint, ...]) -> Outlines:
+    return pack(prints)
 
-    These are compared by identity: comparing the names of thousands of models takes too long for each frame.
-    """
 
-    def __init__(self) -> None:
-        self._made_of: tuple[object, ...] | None = None
-        self._value: T
-
-    def get(self, made_of: tuple[object, ...], make: Callable[[], T]) -> T:
-        """The value, made again only if one of the objects changed."""
-        before = self._made_of
-        if (
-            before is None
-            or len(before) != len(made_of)
-            or any(one is not other for one, other in zip(before, made_of, strict=True))
-        ):
-            self._value, self._made_of = make(), made_of
-        return self._value
+@lru_cache(maxsize=4)
+def _seen(prints: tuple[Footprint, ...], view: View) -> Seen:
+    return seen(_outlines(prints), view)
 
 
 class MapDrawing:
@@ -70,19 +60,11 @@ class MapDrawing:
 
     def __init__(self) -> None:
         self._trails: dict[int, list[Point]] = {}
-        # Each is reused until its inputs change.
-        self._evidence: Remembered[np.ndarray] = Remembered()
-        self._original: Remembered[np.ndarray] = Remembered()
-        self._outlines: Remembered[Outlines] = Remembered()
-        self._seen: Remembered[Seen] = Remembered()
-        self._kept: Remembered[Kept] = Remembered()
-        self._looks: Remembered[Looks] = Remembered()
-        self._picture: Remembered[Picture] = Remembered()
         self._moved: MovedPrints | None = None
 
     def fitting(self, shown: Shown, columns: int, rows: int) -> View:
         """A view of all important places; in a large world, of the ways of finished tests."""
-        path = _path(self._evidence, shown.snapshot.evidence)
+        path = _path(shown.snapshot.evidence)
         points = path[np.isfinite(path).all(axis=1)].tolist()
         points += [point for way in shown.ways for point in way.points.tolist()]
         points += [point for point in (shown.start, shown.place.goal, shown.failure) if point]
@@ -97,7 +79,7 @@ class MapDrawing:
     def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         shown = self._with_live(shown)
-        still = self._still(shown, view, palette)
+        still = _still(shown, view, palette)
         canvas, trails = still.canvas.copy(), self._trails if "path" in shown.layers else {}
         if shown.ways:
             riders(canvas, view, still.written, shown.ways, palette, DASH)
@@ -118,70 +100,39 @@ class MapDrawing:
         prints = self._moved.at(poses)
         return shown if prints is shown.place.prints else replace(shown, place=replace(shown.place, prints=prints))
 
-    def _still(self, shown: Shown, view: View, palette: Palette) -> Picture:
-        """All but what moves."""
-        place, layers, snapshot = shown.place, shown.layers, shown.snapshot
-        evidence, original = _path(self._evidence, snapshot.evidence), _path(self._original, snapshot.original)
-        outlines = self._outlines.get((place.prints,), lambda: pack(place.prints))
-        models = self._seen.get((outlines, view), lambda: seen(outlines, view))
-        who = self._who(shown)
-        how = self._looks.get((who, palette, place.prints), lambda: looks(place.prints, who, palette))
 
-        def draw() -> Picture:
-            lines = [Line(evidence, palette.path)] if "path" in layers else []
-            if "original" in layers and not shown.same_paths:
-                lines.insert(0, Line(original, palette.original, DASH))
-            if shown.ways:
-                both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
-                lines = [Line(way.points, color, dash) for way, color, dash in both][::-1]
-            marks = tuple(_marks(shown, palette))
-            return picture(models, how, removed="removed" in layers, lines=lines, marks=marks)
-
-        ways = (shown.parting, *(way.points for way in shown.ways))
-        made_of = (models, how, palette, layers, evidence, original, place, snapshot.state.baseline, *ways)
-        return self._picture.get(made_of, draw)
-
-    def _who(self, shown: Shown) -> Kept:
-        """Which models are in the environment, and how they stand out."""
-        place, state, candidate, layers = shown.place, shown.snapshot.state, shown.candidate, shown.layers
-        looked_at: tuple[object, ...] = (candidate,)
-        if isinstance(candidate, Candidate):
-            # The object changes after each of its tests, the models do not.
-            looked_at = (candidate.split, candidate.kind, candidate.partition)
-        split = state.round.split if state.round else None
-        made_of = (
-            state.elements,
-            state.environment,
-            state.supports,
-            split,
-            state.pinned,
-            *looked_at,
-            state.evidence_test,
-        )
-
-        def gather() -> Kept:
-            who, met = kept(state, candidate), in_last(state) if "took part" in layers else None
-            if not who.elements:
-                who = Kept(place.elements, place.elements)
-            return replace(
-                who,
-                parts=who.parts if "partitions" in layers else {},
-                pinned=who.pinned if "pinned" in layers else frozenset(),
-                selected=shown.selection,
-                sensed=sensed_order(state) if "sensed" in layers else {},
-                shown=who.shown if met is None else frozenset(met.names(state.elements)),
-            )
-
-        return self._kept.get((*made_of, shown.selection, layers, place.elements), gather)
+def _still(shown: Shown, view: View, palette: Palette) -> Picture:
+    """All but what moves."""
+    prints, layers, snapshot = shown.place.prints, shown.layers, shown.snapshot
+    lines = [Line(_path(snapshot.evidence), palette.path)] if "path" in layers else []
+    if "original" in layers and not shown.same_paths:
+        lines.insert(0, Line(_path(snapshot.original), palette.original, DASH))
+    if shown.ways:
+        both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
+        lines = [Line(way.points, color, dash) for way, color, dash in both][::-1]
+    how, marks = looks(prints, _who(shown), palette), tuple(_marks(shown, palette))
+    return picture(_seen(prints, view), how, removed="removed" in layers, lines=lines, marks=marks)
 
 
-def _path(remembered: Remembered[np.ndarray], rows: array[float] | None) -> np.ndarray:
+def _who(shown: Shown) -> Kept:
+    """Which models are in the environment, and how they stand out."""
+    place, state, layers = shown.place, shown.snapshot.state, shown.layers
+    who, met = kept(state, shown.candidate), in_last(state) if "took part" in layers else None
+    if not who.elements:
+        who = Kept(place.elements, place.elements)
+    return replace(
+        who,
+        parts=who.parts if "partitions" in layers else {},
+        pinned=who.pinned if "pinned" in layers else frozenset(),
+        selected=shown.selection,
+        sensed=sensed_order(state) if "sensed" in layers else {},
+        shown=who.shown if met is None else frozenset(met.names(state.elements)),
+    )
+
+
+def _path(rows: array[float] | None) -> np.ndarray:
     """Flat rows of a motion as (N, 2) m."""
-
-    def read() -> np.ndarray:
-        return np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
-
-    return remembered.get((rows,), read)
+    return np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
 
 
 def _marks(shown: Shown, palette: Palette) -> Iterator[Mark]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
     from ddenv.runfile.state import Candidate, Trial
     from ddenv.world.model import Model, World
+    from ddenv.world.pose import Pose
     from ddenv.world.scenario import Scenario
 
 # The layers of the map, which can be hidden.
@@ -86,6 +88,36 @@ class Shown:
         """Whether the last similar run has the same path as f: before the first reduction it is f."""
         original, evidence = self.snapshot.original, self.snapshot.evidence
         return original is None or original == evidence
+
+
+class MovedPrints:
+    """The footprints of a place's models, with the movable ones wherever they are."""
+
+    def __init__(self, place: Place) -> None:
+        self.place = place
+        self._prints = place.prints
+        self._numbers = {each.name: number for number, each in enumerate(place.prints) if each.name in place.movable}
+        self._poses: dict[str, Pose] = {}
+
+    def at(self, poses: Mapping[str, Pose]) -> tuple[Footprint, ...]:
+        """All footprints with the first links of these models at `poses`, and the others where they start.
+
+        The same object if nothing has moved.
+        """
+        from ddenv.map.footprints import footprint
+
+        known = {name: pose for name, pose in poses.items() if name in self._numbers}
+        changed = {
+            self._numbers[name]: self.place.prints[self._numbers[name]] for name in set(self._poses) - set(known)
+        }
+        for name, pose in known.items():
+            if pose != self._poses.get(name):
+                model = self.place.movable[name]
+                changed[self._numbers[name]] = footprint(model, moved=pose @ model.links[0].pose.inverse())
+        self._poses = known
+        if changed:
+            self._prints = tuple(changed.get(number, each) for number, each in enumerate(self._prints))
+        return self._prints
 
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:

@@ -94,7 +94,7 @@ class WorldMap(Widget, can_focus=True):
         # The model that the crosshair moved to, and the position: another model may hide it.
         self._aim: tuple[str, Cell, View] | None = None
         self._pointed: str | None = None
-        self._subtitle_of: tuple[object, ...] = ()
+        self._subtitle_shown: Text | None = None
 
     @cached_property
     def _drawing(self) -> MapDrawing:
@@ -146,7 +146,7 @@ class WorldMap(Widget, can_focus=True):
         self.notice = notice
         self.shown = replace(self.shown, place=place)
         self._numbers = {each.name: number for number, each in enumerate(place.prints)}
-        self._aim, self.picture, self._canvas = None, None, None
+        self._aim, self.picture, self._canvas, self._subtitle_shown = None, None, None, None
         self.fit()
         self.refresh()
 
@@ -392,13 +392,10 @@ class WorldMap(Widget, can_focus=True):
         if model != self._pointed:
             self._pointed = model
             self.post_message(self.Pointed(model))
-        # Texts are slow to make: only after a change in what they mention.
-        where = self.viewport.cursor if self._picking else self.snapshot.state.evidence_test
-        made_of = (model, self.picture and self.picture.how, view, where, self.notice)
-        if made_of != self._subtitle_of:
-            self._subtitle_of = made_of
-            if isinstance(self.parent, Widget):
-                self.parent.border_subtitle = self._subtitle(model, view)
+        subtitle = self._subtitle(model, view)
+        # Another one draws the whole border.
+        if subtitle != self._subtitle_shown and isinstance(self.parent, Widget):
+            self._subtitle_shown = self.parent.border_subtitle = subtitle
 
     def _subtitle(self, model: str | None, view: View) -> Text:
         if self._picking:

@@ -11,8 +11,7 @@ from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round, RunState, Split, Trial
 from ddenv.runfile.supports import Names
 from ddenv.runs.playback import Played
-from ddenv.workbench.map.moved_prints import MovedPrints
-from ddenv.workbench.map.place import Place, Way
+from ddenv.workbench.map.place import MovedPrints, Place, Way
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.pose import pose_at
 

@@ -199,7 +199,7 @@ class Asking:
     def _once_trusted(self, then: Callable[[], None]) -> None:
         """Calls `then` if the user trusts what an engine starts for this run, or says that nothing was done."""
         from ddenv.runs.subject import read_scenario
-        from ddenv.workbench.widgets.trust_question import once_trusted
+        from ddenv.workbench.widgets.question import once_trusted
 
         try:
             scenario = read_scenario(self._poll.file)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.text import count, plain
-from ddenv.workbench.setup.remedies import Missing, read_with_remedies
+from ddenv.workbench.setup.missing_files import Missing, read_with_remedies
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, World
@@ -72,29 +72,23 @@ class Choice:
     @property
     def about(self) -> str:
         """The words below the map."""
-        notes = self.world.notes
-        noted = f" {count(len(notes), 'part')} replaced or ignored ('ddenv world check' lists them)." if notes else ""
-        models = f"{self._removable}{noted}"
-        if self.run:
-            return f"{models} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
-        if self.scenario is not None:
-            return f"{models} {plain(self.scenario.description)}{self._where}"
-        return f"{models} A world without a scenario: set the robot's spawn and goal, on the map or as numbers.{self._where}"
-
-    @property
-    def _where(self) -> str:
-        """The file, unless it is a bundled one: the list has only its name."""
         from ddenv.world.load import SCENARIOS
 
-        return "" if self.path.parent == SCENARIOS else f" {plain(str(self.path))}"
-
-    @property
-    def _removable(self) -> str:
-        if self.models == 0:
-            return "None of its models can be removed: there is nothing to reduce."
-        if self.models == 1:
-            return "1 model: a run can only show whether the failure needs it."
-        return f"{self.models} models."
+        words = f"{self.models} models."
+        if self.models < 2:
+            words = (
+                "None of its models can be removed: there is nothing to reduce.",
+                "1 model: a run can only show whether the failure needs it.",
+            )[self.models]
+        if notes := self.world.notes:
+            words += f" {count(len(notes), 'part')} replaced or ignored ('ddenv world check' lists them)."
+        if self.run:
+            return f"{words} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
+        # The list has the name of a bundled file.
+        where = "" if self.path.parent == SCENARIOS else f" {plain(str(self.path))}"
+        if self.scenario is not None:
+            return f"{words} {plain(self.scenario.description)}{where}"
+        return f"{words} A world without a scenario: set the robot's spawn and goal, on the map or as numbers.{where}"
 
 
 def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:

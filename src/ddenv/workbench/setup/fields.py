@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual import events, on
@@ -23,7 +23,7 @@ from ddenv.text import count, plain
 from ddenv.words.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.form import Field
-from ddenv.workbench.setup.places import remembered_jobs
+from ddenv.workbench.setup.start_run import usual_jobs
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:
@@ -39,48 +39,33 @@ MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANC
 FIELDS = {field.id: field for field in form.ALL}
 
 
-@dataclass(frozen=True, slots=True)
-class Circumstances:
-    """What a cost depends on: the chosen `algorithm` and `pair`, `seconds` of real time a test, if known, and `processors`."""
-
-    algorithm: str = "ddenv"
-    pair: str = ""
-    seconds: float | None = None
-    processors: int = 1
-
-
-def not_used(field: Field, now: Circumstances) -> str:
+def not_used(field: Field, algorithm: str) -> str:
     """Why a field has no effect, or ""."""
     only = field.setting.used_by if field.setting else ()
-    if only and now.algorithm in OURS["algorithm"] and now.algorithm not in only:
-        return f"Not used by {plain(now.algorithm)}."
+    if only and algorithm in OURS["algorithm"] and algorithm not in only:
+        return f"Not used by {plain(algorithm)}."
     return ""
 
 
-def cost(field: Field, texts: Mapping[str, str], now: Circumstances) -> str:
-    """The cost of a field's value, or ""."""
-    number = _number(texts.get(field.id, ""))
-    match field.id:
-        case "iterations" if number is not None:
-            return f"A candidate without f costs at most {count(1 + int(number), 'test')}."
-        case "baseline_runs" if number is not None:
-            return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
-        case "timeout" if number is not None:
-            real = f", here about {now.seconds:.1f} s of real time" if now.seconds else ""
-            return f"A test without success takes {number:g} simulated s{real}."
-        case "jobs":
-            return f"This machine has {count(now.processors, 'processor')}; more jobs save no time."
-        case "accept":
-            return "Asking costs your time, and no tests."
-    return field.setting.cost if field.setting else ""
-
-
-def _number(text: str) -> float | None:
-    try:
+def cost(field: Field, text: str, seconds: float | None = None) -> str:
+    """The cost of a field's value, or ""; a test takes so many `seconds` of real time, if that is known."""
+    number = -1.0
+    with suppress(ValueError):
         number = float(text)
-    except ValueError:
-        return None
-    return number if 0 <= number < 1e6 else None
+    if 0 <= number < 1e6:
+        match field.id:
+            case "iterations":
+                return f"A candidate without f costs at most {count(1 + int(number), 'test')}."
+            case "baseline_runs":
+                return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
+            case "timeout":
+                real = f", here about {seconds:.1f} s of real time" if seconds else ""
+                return f"A test without success takes {number:g} simulated s{real}."
+    if field.id == "jobs":
+        return f"This machine has {count(processor.usable_cores(), 'processor')}; more jobs save no time."
+    if field.id == "accept":
+        return "Asking costs your time, and no tests."
+    return field.setting.cost if field.setting else ""
 
 
 class SchemaSelect(Select[str]):
@@ -164,7 +149,7 @@ class OptionsForm(Vertical):
         self._problems: dict[str, str] = {}
         self._marked: frozenset[str] = frozenset()
         self._message = ""
-        # The texts of fields that were not opened yet: most never are, and the screen opens faster without them.
+        # The texts of the rarely used fields, while they are not opened: with these the screen would open 0.15 s later.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
         self.seconds: float | None = None
         self.border_title = "Settings"
@@ -175,20 +160,20 @@ class OptionsForm(Vertical):
                 for kind, tooltip in METHOD.items():
                     yield Label(kind, markup=False)
                     yield SchemaSelect(kind, tooltip)
-            yield _grid("basic", form.BASIC)
-            yield _grid("places", form.PLACES)
+            yield Grid(*_widgets(form.BASIC), id="basic", classes="grid")
+            yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
         yield Static("", id="wrong", markup=False)
         yield Explained(id="explained")
         with Horizontal(id="last"):
-            yield from _widgets((form.NAME, form.ACCEPT), {})
+            yield from _widgets((form.NAME, form.ACCEPT))
             yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
         yield Static("", id="cost", markup=False)
         yield Static("", id="command", markup=False)
 
     def on_mount(self) -> None:
         self.watch(self.screen, "focused", self._mark)
-        self.query_one("#jobs", Input).value = _default_jobs()
+        self.query_one("#jobs", Input).value = str(usual_jobs())
         self.show_message("")
 
     def _mark(self, focused: Widget | None) -> None:
@@ -210,12 +195,13 @@ class OptionsForm(Vertical):
     @property
     def texts(self) -> dict[str, str]:
         """The texts of the fields, by id."""
-        shown = {id: _text(self.query_one(f"#{id}")) for id in FIELDS if id not in self._unopened}
-        return self._unopened | shown
+        return self._unopened | {id: str(field.value) for id, field in self._fields()}
 
-    @property
-    def accept_mode(self) -> str:
-        return self.texts["accept"]
+    def _fields(self) -> Iterator[tuple[str, Input | Select[str]]]:
+        """The fields that are there, by id."""
+        for field in self.query("Input, Select"):
+            if isinstance(field, Input | Select) and field.id in FIELDS:
+                yield field.id, field
 
     @property
     def own_name(self) -> str:
@@ -227,7 +213,7 @@ class OptionsForm(Vertical):
         """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
         texts = form.texts_of(scenario) | dict(places or {})
         if form.problem(form.JOBS_FIELD, self.texts["jobs"]):
-            texts["jobs"] = _default_jobs()
+            texts["jobs"] = str(usual_jobs())
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
         for kind, name in names.items():
@@ -241,19 +227,12 @@ class OptionsForm(Vertical):
     def set_texts(self, texts: dict[str, str]) -> None:
         """Fills in some of the fields."""
         self._unopened |= {id: text for id, text in texts.items() if id in self._unopened}
-        for id, text in texts.items():
-            if id in self._unopened:
-                continue
-            field = self.query_one(f"#{id}")
-            self._problems.pop(id, None)
-            if isinstance(field, Input | Select) and str(field.value) != text:
-                field.value = text
+        for id, field in self._fields():
+            if id in texts:
+                self._problems.pop(id, None)
+                if str(field.value) != texts[id]:
+                    field.value = texts[id]
         self._show_problems()
-
-    def forget_world(self) -> None:
-        """Empties what belonged to the world that was shown."""
-        self.suggest_name("")
-        self.set_texts({field.id: "" for field in form.PLACES})
 
     def show_fields(self, show: bool) -> None:
         """The whole form; without the settings only the cost, the command, the name and Start."""
@@ -268,10 +247,6 @@ class OptionsForm(Vertical):
                 field.value = name
 
     # The texts.
-
-    def circumstances(self) -> Circumstances:
-        pair, algorithm = self.method
-        return Circumstances(algorithm, pair, self.seconds, processor.usable_cores())
 
     @on(SchemaSelect.Looked)
     def _looked(self, event: SchemaSelect.Looked) -> None:
@@ -298,19 +273,17 @@ class OptionsForm(Vertical):
         self.query_one(Explained).show(f"{kind} {plain(name)}", paragraph(kind, name), unused)
 
     def _explain_field(self, field: form.Field) -> None:
-        now = self.circumstances()
-        words = f"{field.meaning} {cost(field, self.texts, now)}".strip()
-        self.query_one(Explained).show(field.label, words, not_used(field, now))
+        words = f"{field.meaning} {cost(field, self.texts[field.id], self.seconds)}".strip()
+        self.query_one(Explained).show(field.label, words, not_used(field, self.method[1]))
 
     def _dim(self, algorithm: str = "") -> None:
         """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
         algorithm = algorithm or self.method[1]
-        used, now = uses(algorithm), Circumstances(algorithm, self.method[0])
+        used = uses(algorithm)
         for select in self.query(SchemaSelect):
             select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
-        for field in form.ADVANCED:
-            if field.id not in self._unopened:
-                self.query_one(f"#{field.id}").set_class(bool(not_used(field, now)), "-unused")
+        for id, field in self._fields():
+            field.set_class(bool(not_used(FIELDS[id], algorithm)), "-unused")
 
     def show_cost(self, words: str) -> None:
         """Shows the tests and the time that the settings need."""
@@ -330,7 +303,7 @@ class OptionsForm(Vertical):
             self.show_message(f"{MARK}{error}")
             return
         if FIELDS[id] in form.ADVANCED:
-            self._open_more(True)
+            self._show_more(True)
         self._message, self._problems = "", {id: str(error)} | self._problems | {id: str(error)}
         self.call_after_refresh(self._point_at, id)
 
@@ -357,7 +330,7 @@ class OptionsForm(Vertical):
     def on_descendant_blur(self, event: events.DescendantBlur) -> None:
         """A field is checked when it is left; an empty one only at the start of a run."""
         field = FIELDS.get(event.widget.id or "")
-        if field is not None and (text := _text(event.widget)).strip() and (wrong := form.problem(field, text)):
+        if field is not None and (text := self.texts[field.id]).strip() and (wrong := form.problem(field, text)):
             self._problems[field.id] = wrong
             self._show_problems()
 
@@ -378,15 +351,14 @@ class OptionsForm(Vertical):
     @on(Button.Pressed, "#more")
     def toggle_more(self) -> None:
         """Shows or hides the rarely used settings."""
-        self._open_more(not any(grid.display for grid in self.query("#advanced")))
+        self._show_more(not any(grid.display for grid in self.query("#advanced")))
 
-    def _open_more(self, show: bool) -> None:
-        if self._unopened:
-            texts, self._unopened = self._unopened, {}
-            self.query_one("#fields").mount(Grid(*_widgets(form.ADVANCED, texts), id="advanced", classes="grid"))
+    def _show_more(self, show: bool) -> None:
+        if not self.query("#advanced"):
+            fields = _widgets(form.ADVANCED, self._unopened)
+            self.query_one("#fields").mount(Grid(*fields, id="advanced", classes="grid"))
             self.call_after_refresh(self._dim)
-        else:
-            self.query_one("#advanced").display = show
+        self.query_one("#advanced").display = show
         self.query_one("#more", Button).label = Content("▾ fewer settings (f9)" if show else MORE)
 
     @on(Input.Changed)
@@ -410,26 +382,12 @@ class OptionsForm(Vertical):
         self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
 
 
-def _default_jobs() -> str:
-    return str(remembered_jobs() or processor.usable_cores())
-
-
-def _text(widget: Any) -> str:
-    return str(widget.value)
-
-
-def _grid(id: str, fields: tuple[form.Field, ...]) -> Grid:
-    return Grid(*_widgets(fields, {}), id=id, classes="grid")
-
-
-def _widgets(fields: tuple[form.Field, ...], texts: dict[str, str]) -> list[Widget]:
+def _widgets(fields: tuple[Field, ...], texts: Mapping[str, str] = {}) -> Iterator[Widget]:
     """A label and a field for each, with its text."""
-    return [each for field in fields for each in (Label(field.label, markup=False), _entry(field, texts))]
-
-
-def _entry(field: form.Field, texts: dict[str, str]) -> Widget:
-    if not field.choices:
-        return Entry(texts.get(field.id, ""), id=field.id, placeholder=field.empty)
-    choices = [(choice, choice) for choice in field.choices]
-    value = texts.get(field.id, field.choices[0])
-    return Select(choices, value=value, id=field.id, allow_blank=False, compact=True)
+    for field in fields:
+        yield Label(field.label, markup=False)
+        if field.choices:
+            choices, value = [(choice, choice) for choice in field.choices], texts.get(field.id, field.choices[0])
+            yield Select(choices, value=value, id=field.id, allow_blank=False, compact=True)
+        else:
+            yield Entry(texts.get(field.id, ""), id=field.id, placeholder=field.empty)

@@ -184,7 +184,9 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
 
     data = base.model_dump(mode="json")
     given = values(tuple(field for field in ALL if field.key), texts)
-    chosen = {name: asked for name, asked in given.items() if name in SETTINGS}
+    # What is unchanged is not asked for: one field may set what others show.
+    known = {name: one for name, one in SETTINGS.items() if name in given}
+    chosen = {name: given[name] for name, one in known.items() if given[name] != read(data, one)}
     data = with_values(data, chosen | {"pair": pair, "algorithm": algorithm})
     for field in PLACES:
         section, _, key = field.key.rpartition(".")
@@ -192,13 +194,23 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
     return validate(data, "options")
 
 
-def place(what: str, texts: Mapping[str, str]) -> tuple[float, ...] | None:
-    """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m); None while one of them is not a number."""
+def spawn(texts: Mapping[str, str]) -> tuple[float, float, float, float] | None:
+    """x, y, z, m, and yaw, rad, of the start; None while one of them is not a number."""
+    found = _numbers(PLACES[:4], texts)
+    return (found[0], found[1], found[2], found[3]) if found else None
+
+
+def goal(texts: Mapping[str, str]) -> tuple[float, float] | None:
+    """x and y of the goal, m; None while one of them is not a number."""
+    found = _numbers(PLACES[4:], texts)
+    return (found[0], found[1]) if found else None
+
+
+def _numbers(fields: tuple[Field, ...], texts: Mapping[str, str]) -> list[float] | None:
     try:
-        numbers = values(tuple(field for field in PLACES if field.id.startswith(what)), texts)
+        return [float(number) for number in values(fields, texts).values() if number is not None]
     except FieldError:
         return None
-    return tuple(float(number) for number in numbers.values() if number is not None)
 
 
 def field_of(error: UserError) -> str | None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
 from textual import events, on, work
 from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.reactive import Reactive
 from textual.screen import Screen
@@ -25,9 +26,8 @@ from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
-from ddenv.workbench.setup.file_list import FileList, recent_files, remember
+from ddenv.workbench.setup.files import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
-from ddenv.workbench.setup.setup_keys import KEYS, SHOWN, keys_at
 from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, Saved, ask_trust, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.messages import ShowRun
@@ -46,23 +46,45 @@ PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
 HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
-def arrange(screen: Screen[None], pane: str) -> None:
-    """Shows all panes of the setup screen, or only `pane`."""
-    form, preview = screen.query_one(OptionsForm), screen.query_one(Preview)
-    # Not by classes of the screen: these would compute all styles again.
-    width, height = screen.size
-    all = width >= ROOMY[0] and height >= ROOMY[1]
-    fits = width >= SMALLEST[0] and height >= SMALLEST[1]
-    form.display = fits
-    screen.query_one("#body").display = fits and (all or pane != "settings")
-    screen.query_one("#choice").display = all or pane == "choose"
-    form.show_fields(all or pane == "settings")
-    form.set_class(not all and pane == "settings", "-alone")
-    preview.set_class(not all and pane == "map", "-alone")
-    form.set_class(not all, "-frameless")
-    panes = screen.query_one(Panes)
-    panes.display = not all
-    panes.mark(pane)
+def _key(keys: str, action: str, id: str, tooltip: str, words: str = "", display: str | None = None) -> Binding:
+    """A key of this screen; one with `display` is in the footer."""
+    shown = display is not None
+    return Binding(
+        keys, action, words or id, id=f"setup.{id}", tooltip=tooltip, show=shown, key_display=display or None
+    )
+
+
+KEYS: list[Binding] = [
+    _key("ctrl+s,f5", "start", "start", "start the reduction", display="^s"),
+    _key(
+        "f6,ctrl+b",
+        "baseline",
+        "baseline",
+        "start, and pause after the baseline: it shows how often the whole world fails",
+        display="f6",
+    ),
+    _key("f7,ctrl+g", "save", "save", "save as a scenario file", display="f7"),
+    _key("f8,ctrl+y", "copy", "copy", "copy the ddenv run command that does the same", display="f8"),
+    _key("f9", "more", "more", "show or hide the rarely used settings"),
+    _key("ctrl+o", "open", "open", "choose a scenario or world file", display=""),
+    _key("s", "pick('start')", "pick_start", "set the start on the map", "start"),
+    _key("h", "pick('heading')", "pick_heading", "set the heading on the map", "heading"),
+    _key("g", "pick('goal')", "pick_goal", "set the goal on the map", "goal"),
+    _key("m", "missing", "missing", "to the missing files and their remedies"),
+    _key("plus,equals_sign", "zoom(1.25)", "closer", "map: closer"),
+    _key("minus", "zoom(0.8)", "farther", "map: farther away"),
+    _key("0", "fit", "fit", "map: show all of it"),
+    _key("f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
+    _key("f3", "pane('map')", "map", "to the map"),
+    _key("f4", "pane('settings')", "settings", "to the settings"),
+    _key("R", "app.runs", "runs", "the list of all runs"),
+    _key("L", "app.lessons", "lessons", "lessons on delta debugging"),
+    _key("f1,question_mark", "app.help", "help", "show every key", display="?"),
+    _key("escape", "home", "home", "stop picking; back to the list of files", "back"),
+    _key("q", "app.leave", "quit", "leave", display=""),
+]
+# In the footer.
+SHOWN = tuple(each.id or "" for each in KEYS if each.show)
 
 
 class SetupScreen(Screen[None]):
@@ -80,7 +102,7 @@ class SetupScreen(Screen[None]):
         (VAST[0], "-vast"),
     ]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
-    BINDINGS = KEYS
+    BINDINGS: ClassVar[list[BindingType]] = [*KEYS]
     # As on the run screen, the widgets draw what the focus changes.
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
@@ -122,7 +144,7 @@ class SetupScreen(Screen[None]):
                     yield RunList(id="run-list")
             yield self.preview
         yield self.form
-        yield KeyFooter(SHOWN, SHOWN, lambda: keys_at(self.focused))
+        yield KeyFooter(SHOWN, SHOWN, self._keys_here)
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -174,7 +196,7 @@ class SetupScreen(Screen[None]):
         self.post_message(ShowRun(self.query_one(RunList).run_of(event.option_id).path))
 
     def action_open(self) -> None:
-        from ddenv.workbench.setup.open_file import OpenFile
+        from ddenv.workbench.setup.files import OpenFile
 
         self.app.push_screen(OpenFile(Path.cwd()), self._opened)
 
@@ -194,13 +216,6 @@ class SetupScreen(Screen[None]):
         self.preview.read(path, opened=path == self._opened_now)
         self._show_outcome()
 
-    @on(Preview.Failed)
-    def _cannot_be_read(self) -> None:
-        self._awaited = False
-        self.form.show_message("")
-        self.form.forget_world()
-        self._show_outcome()
-
     @on(Preview.Read)
     def _was_read(self, event: Preview.Read) -> None:
         choice = event.choice
@@ -210,15 +225,17 @@ class SetupScreen(Screen[None]):
         # An error about a key pressed too early is out of date.
         self.form.show_message("")
         self.form.suggest_name(event.free_name)
+        if choice is None:
+            self.form.set_texts({field.id: "" for field in form.PLACES})
+            self._show_outcome()
+            return
         if event.again:
             self.preview.show_places()
             self.preview.ask_again()
             self._show_outcome()
             return
-        placed = choice.scenario is not None
-        places = None if placed else self.preview.places_for(self._keep_places)
+        places = None if choice.scenario else self.preview.places_for(self._keep_places)
         self.form.show_settings(choice.settings, places)
-        self.preview.show_places()
         if self.preview.asks and choice.path == self._opened_now:
             self.action_pick("start")
 
@@ -235,7 +252,7 @@ class SetupScreen(Screen[None]):
             self.notify("there is no world to pick a place in yet", severity="warning", timeout=3)
             return
         self.action_pane("map")
-        self.preview.picker.pick(what)
+        self.preview.pick(what)
 
     def action_missing(self) -> None:
         """To the rows of missing files, if there are any."""
@@ -401,7 +418,26 @@ class SetupScreen(Screen[None]):
         self._arrange()
 
     def _arrange(self) -> None:
-        arrange(self, self._pane)
+        """Shows all panes, or only one."""
+        # Not by classes of the screen: these would compute all styles again.
+        (width, height), pane = self.size, self._pane
+        all = width >= ROOMY[0] and height >= ROOMY[1]
+        fits = width >= SMALLEST[0] and height >= SMALLEST[1]
+        self.form.display = fits
+        self.query_one("#body").display = fits and (all or pane != "settings")
+        self.query_one("#choice").display = all or pane == "choose"
+        self.form.show_fields(all or pane == "settings")
+        self.form.set_class(not all and pane == "settings", "-alone")
+        self.preview.set_class(not all and pane == "map", "-alone")
+        self.form.set_class(not all, "-frameless")
+        panes = self.query_one(Panes)
+        panes.display = not all
+        panes.mark(pane)
+
+    def _keys_here(self) -> tuple[str, ...]:
+        """The ids of the keys in the footer: those of what has the focus come first."""
+        bindings = () if self.focused is None else Binding.make_bindings(self.focused.BINDINGS)
+        return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *SHOWN)
 
     @on(Panes.Chosen)
     def _pane_chosen(self, event: Panes.Chosen) -> None:
@@ -421,7 +457,7 @@ class SetupScreen(Screen[None]):
         self.form.toggle_more()
 
     def action_home(self) -> None:
-        if self.preview.picker.picked_next:
-            self.preview.picker.pick("")
+        if self.preview.picked_next:
+            self.preview.pick("")
         else:
             self.action_pane("choose")

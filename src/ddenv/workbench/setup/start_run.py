@@ -11,12 +11,12 @@ from textual.app import App
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
-from ddenv.settings import OPTIONS, PRINTED, number_text, read
+from ddenv.runs.remembered import read_state, write_state
+from ddenv.settings import JOBS, OPTIONS, PRINTED, number_text, read
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
-from ddenv.workbench.setup.file_list import remember
+from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.form import read_key
-from ddenv.workbench.setup.places import remember_jobs
 from ddenv.workbench.shared.processes import Engine
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ PLACES = {
     "spawn": ("robot.spawn.x", "robot.spawn.y", "robot.spawn.z", "robot.spawn.yaw"),
     "goal": ("goal.x", "goal.y"),
 }
+JOBS_FILE = "jobs.json"
 NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
@@ -61,7 +62,9 @@ def command(
             words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
     if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]
-    return words + _name(name)
+    if not name:
+        return words
+    return [*words, "--output", _path(Path(name))] if len(Path(name).parts) > 1 else [*words, "--name", name]
 
 
 def source_of(path: Path, bundled: Path) -> str:
@@ -73,12 +76,6 @@ def source_of(path: Path, bundled: Path) -> str:
 
 def _path(path: Path) -> str:
     return str(path.absolute())
-
-
-def _name(name: str) -> list[str]:
-    if not name:
-        return []
-    return ["--output", str(Path(name).absolute())] if len(Path(name).parts) > 1 else ["--name", name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +100,7 @@ class Saved:
 def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
     """Calls `then` with whether what the run starts is trusted. A run file is never the user's own: somebody may have sent it."""
     from ddenv.runs.trust import trust_own
-    from ddenv.workbench.widgets.trust_question import once_trusted
+    from ddenv.workbench.widgets.question import once_trusted
 
     if not new.choice.run:
         trust_own(new.scenario, new.choice.path)
@@ -112,6 +109,7 @@ def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
 
 def create(new: NewRun, only_baseline: bool) -> Engine:
     """Writes the run file and starts its engine. Raises UserError."""
+    from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like, create_run
 
     engine = Engine(new.path)
@@ -121,10 +119,19 @@ def create(new: NewRun, only_baseline: bool) -> Engine:
         create_run(new.scenario, new.path)
         remember(new.choice.path)
     engine.start(new.jobs, new.accept_mode)
-    remember_jobs(new.jobs)
+    # The usual number is not remembered: another machine has other cores.
+    write_state(JOBS_FILE, None if new.jobs == processor.usable_cores() else new.jobs)
     if only_baseline:
-        _pause_after_baseline(new.path)
+        # A step of one round ends after the baseline. The engine has started: it ignores older commands.
+        with RunFile(new.path) as run:
+            run.send("step", unit="round")
     return engine
+
+
+def usual_jobs() -> int:
+    """The number of jobs of the last run that was started here, or of this machine's cores."""
+    found = read_state(JOBS_FILE)
+    return found if type(found) is int and JOBS.allows(found) else processor.usable_cores()
 
 
 def command_words(
@@ -150,8 +157,7 @@ def run_file(scenario_name: str, name: str) -> Path:
     try:
         path = run_path(scenario_name, None, Path(name)) if is_path else run_path(scenario_name, name, None)
     except UserError as error:
-        what = str(error).partition(": ")[2]
-        raise form.FieldError("name", f"run name: {what}") from None
+        raise form.FieldError("name", f"run name: {str(error).partition(': ')[2]}") from None
     try:
         exists = path.exists()
     except OSError as error:
@@ -159,11 +165,3 @@ def run_file(scenario_name: str, name: str) -> Path:
     if exists:
         raise form.FieldError("name", f"run name: {path} exists already; choose another name")
     return path
-
-
-def _pause_after_baseline(path: Path) -> None:
-    """Sends a step of one round, which ends after the baseline. The engine must have started: it ignores older commands."""
-    from ddenv.runfile.store import RunFile
-
-    with RunFile(path) as run:
-        run.send("step", unit="round")

@@ -61,8 +61,7 @@ class Poll:
         self._looked = -math.inf
         self._alive = False
         self._posed = -math.inf
-        self._evidence: tuple[int | None, array[float] | None] = (None, None)
-        self._original: tuple[int | None, array[float] | None] = (None, None)
+        self._motions: dict[int, array[float] | None] = {}
 
     @property
     def snapshot(self) -> Snapshot:
@@ -113,7 +112,8 @@ class Poll:
         spent = self._spent(state, engine)
         try:
             live, due = self._poses(state) if engine == "alive" else ((), True)
-            snapshot = Snapshot(state, live, engine, self._motion(state), spent, error, self._first_motion(state))
+            evidence, original = self._ways(state)
+            snapshot = Snapshot(state, live, engine, evidence, spent, error, original)
         except Busy:
             raise
         except UserError as trouble:
@@ -172,17 +172,13 @@ class Poll:
         except (TypeError, ValueError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
-    def _motion(self, state: RunState) -> array[float] | None:
-        test = state.evidence_test
-        if test != self._evidence[0]:
-            self._evidence = (test, None if test is None else self.file.motion(test))
-        return self._evidence[1]
-
-    def _first_motion(self, state: RunState) -> array[float] | None:
-        test = state.f_test.id if state.f_test is not None else None
-        if test != self._original[0]:
-            self._original = (test, None if test is None else self.file.motion(test))
-        return self._original[1]
+    def _ways(self, state: RunState) -> tuple[array[float] | None, array[float] | None]:
+        """The robot's paths on the last similar run and in f, each read once."""
+        tests = state.evidence_test, None if state.f_test is None else state.f_test.id
+        known = self._motions
+        self._motions = {test: known[test] if test in known else self.file.motion(test) for test in tests if test}
+        evidence, original = (self._motions.get(test or 0) for test in tests)
+        return evidence, original
 
     def _spent(self, state: RunState, engine: EngineIs) -> int:
         return int(spent(state, now() if engine == "alive" else state.updated_at))

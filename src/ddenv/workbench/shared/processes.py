@@ -14,10 +14,6 @@ from ddenv.text import plain
 
 # Exit codes of an engine that has finished or was stopped.
 GOOD_ENDS = (0, 1)
-# Maximum time that the screen waits for a program to end, s.
-A_MOMENT = 0.3
-# How much of the end of a log is read, bytes.
-TAIL = 4000
 
 
 class Engine:
@@ -117,13 +113,8 @@ class Scene:
         if process is None:
             return
         process.terminate()
-        try:
-            process.wait(timeout=A_MOMENT)
-        except subprocess.TimeoutExpired:
-            # The screen waits no longer.
-            Thread(target=_end, args=(process,), name="scene").start()
-        else:
-            _close(process)
+        # The screen does not wait for it.
+        Thread(target=_end, args=(process,), name="scene").start()
 
 
 def _end(process: subprocess.Popen[str]) -> None:
@@ -132,10 +123,6 @@ def _end(process: subprocess.Popen[str]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-    _close(process)
-
-
-def _close(process: subprocess.Popen[str]) -> None:
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             pipe.close()
@@ -144,9 +131,7 @@ def _close(process: subprocess.Popen[str]) -> None:
 def last_line(log: Path) -> str:
     """The last line of a log that is not empty."""
     try:
-        with log.open("rb") as file:
-            file.seek(max(0, log.stat().st_size - TAIL))
-            lines = file.read().decode(errors="replace").splitlines()
+        lines = log.read_text(errors="replace").splitlines()
     except OSError:
         return ""
     return next((plain(line) for line in reversed(lines) if line.strip()), "")

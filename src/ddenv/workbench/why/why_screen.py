@@ -204,7 +204,7 @@ class WhyScreen(Screen[None]):
         self.set_class(not found, "-empty")
         if not found:
             words = trouble or nothing_yet(self._state, self._look_at().works, attach_name(self._file.path))
-            self.query_one("#why-empty", Static).update(Text(plain_lines(words)))
+            self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
             return
         beyond = f" · {more} more are not listed" if more else ""
         self.query_one("#why-models").border_title = Text(f"Without each model{beyond}")
@@ -299,8 +299,3 @@ class WhyScreen(Screen[None]):
 
     def _refuse(self, why: str) -> None:
         self.notify(plain(why), severity="warning", timeout=4, markup=False)
-
-
-def plain_lines(text: str) -> str:
-    """As `plain`, but lines stay lines."""
-    return "\n".join(map(plain, text.split("\n")))

@@ -1,17 +1,23 @@
-"""A dialog that asks a question, answered by yes or no."""
+"""A dialog that asks a question, answered by yes or no: also whether a program may start that a scenario or a run brings along."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal
 from textual.screen import ModalScreen
 from textual.widgets import Button, Static
 
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
 
 
 class Question(ModalScreen[bool]):
@@ -45,3 +51,20 @@ class Question(ModalScreen[bool]):
 
     def on_button_pressed(self, event: Button.Pressed) -> None:
         self.dismiss(event.button.id == "yes")
+
+
+def once_trusted(app: App[Any], scenario: Scenario, where: Path, then: Callable[[bool], None]) -> None:
+    """Calls `then` with whether the user trusts what `scenario` (of the file `where`) starts; asks only where that is not known."""
+    from ddenv.runs.trust import trust, untrusted
+
+    program = untrusted(scenario)
+    if program is None:
+        then(True)
+        return
+
+    def answered(yes: bool | None) -> None:
+        if yes:
+            trust(program)
+        then(bool(yes))
+
+    app.push_screen(Question(plain(f"{where} starts {program.words}. Do you trust it?"), final=True), answered)

@@ -1,0 +1,240 @@
+"""Files that a world names but that cannot be found: their rows on the screen, and the remedy of each.
+
+A remedy is a stand-in, `none`, or a folder, and is remembered by URI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+from urllib.parse import unquote
+
+from rich.text import Text
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.message import Message
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from ddenv.errors import UserError
+from ddenv.runs.remembered import read_state, write_state
+from ddenv.text import count, plain
+from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.widgets.path_entry import PathEntry
+
+if TYPE_CHECKING:
+    from ddenv.world.model import World
+    from ddenv.world.scenario import Reading
+
+OPEN, DONE = "?", "✓"
+HOW = """auto       a guessed shape
+none       without it
+/a/folder  the folder that holds its model's folder; tab completes
+box:x,y,z  or cylinder:radius,length, or sphere:radius (m)
+It is used in every world that names this file."""
+REMEDIES = "remedies.json"
+KEPT = 1000  # URIs
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """A URI that cannot be found.
+
+    Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
+    the map for it, and first if it is not in the folder that was chosen for it.
+    """
+
+    uri: str
+    remedy: str
+    words: str
+
+
+def remembered() -> dict[str, str]:
+    """The remedies that the user chose so far, by URI."""
+    found = read_state(REMEDIES)
+    if not isinstance(found, dict):
+        return {}
+    return {uri: text for uri, text in found.items() if isinstance(text, str) and _is_usable(text)}
+
+
+def remember_remedies(chosen: Mapping[str, str]) -> None:
+    """Remembers the remedies of some URIs; "" forgets one."""
+    known = {uri: text for uri, text in remembered().items() if uri not in chosen}
+    known |= {uri: text for uri, text in chosen.items() if text}
+    write_state(REMEDIES, dict(list(known.items())[-KEPT:]))
+
+
+def remedy(text: str) -> str:
+    """What the user typed, as a remedy: a stand-in, or else the path of a folder. Raises UserError."""
+    from ddenv.world.access import is_folder, without_tilde
+    from ddenv.world.sdf.standin import AUTO, NONE, parse_stand_in
+
+    text = text.strip()
+    names_folder = text not in ("", AUTO, NONE) and is_folder(Path(text))
+    if "/" in text or text.startswith(("~", ".")) or names_folder:
+        folder = without_tilde(text).absolute()
+        if not is_folder(folder):
+            raise UserError(f"{folder} is a file; name a folder" if folder.exists() else f"there is no folder {folder}")
+        return str(folder)
+    stand_in = parse_stand_in(text, "remedy") if text else AUTO
+    if isinstance(stand_in, str) and stand_in not in (AUTO, NONE):
+        raise UserError(f"{text} is for single meshes, with --stand-in; auto takes the box around the visuals, too")
+    return text
+
+
+def _is_usable(text: str) -> bool:
+    try:
+        return bool(remedy(text))
+    except UserError:
+        return False
+
+
+def read_with_remedies(
+    path: Path, reading: Reading, options: Mapping[str, Any]
+) -> tuple[World, dict[str, Any], tuple[Missing, ...]]:
+    """The world, with remembered remedies for what is missing, and a guess for all else; the `options` with these remedies.
+
+    `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
+    """
+    from ddenv.runs.subject import reading_of
+    from ddenv.world.access import MissingFiles
+    from ddenv.world.sdf.read import read_world
+    from ddenv.world.sdf.standin import AUTO
+
+    known, found, vain = remembered(), dict[str, str](), dict[str, str]()
+    while True:
+        chosen = with_remedies(options, found)
+        try:
+            world = read_world(path, reading_of(reading, **chosen))
+            break
+        except MissingFiles as error:
+            # A folder does not help if the file is not in it.
+            fresh = {uri: "" if uri in found else known.get(uri, "") for uri in error.uris}
+            vain |= {uri: found[uri] for uri in error.uris if found.get(uri)}
+            changed = {uri: text for uri, text in fresh.items() if found.get(uri, "") != text}
+            found |= fresh
+        if not changed:
+            guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), AUTO)}
+            world = read_world(path, reading_of(reading, **guessing))
+            break
+    return (
+        world,
+        chosen,
+        tuple(Missing(uri, text, _words(uri, text, vain.get(uri, ""), world)) for uri, text in found.items()),
+    )
+
+
+def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[str, Any]:
+    """The `options` of the command line that say the same as the remedies, too."""
+    folders = tuple(dict.fromkeys(Path(text) for text in found.values() if text.startswith("/")))
+    stand_ins = tuple(f"{uri}={text}" for uri, text in found.items() if text and not text.startswith("/"))
+    more = {"model_path": folders, "stand_in": stand_ins}
+    return {**options, **{name: (*options.get(name, ()), *each) for name, each in more.items() if each}}
+
+
+def _words(uri: str, text: str, vain: str, world: World) -> str:
+    if text.startswith("/"):
+        return f"in {text}"
+    if text:
+        return _on_the_map(uri, world)
+    return f"{f'not in {vain}; ' if vain else ''}guess {_on_the_map(uri, world)}"
+
+
+def _on_the_map(uri: str, world: World) -> str:
+    begin = f"'{uri}' by "
+    by = next((note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)), "left out")
+    return by.removeprefix("a guess, ").removeprefix("the stand-in ")
+
+
+def _key(key: str, action: str, words: str, tooltip: str) -> Binding:
+    return Binding(key, action, words, id=f"missing.{'choose' if key == 'enter' else words}", tooltip=tooltip)
+
+
+class MissingList(OptionList):
+    """A row for each missing file; hidden while there is none."""
+
+    BINDINGS: ClassVar = [
+        _key("enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
+        _key("a", "guess", "guess", "take the guessed shape wherever nothing is chosen, or else for this one"),
+        _key("w", "without", "without", "leave this one out"),
+    ]
+
+    class Chosen(Message):
+        """The user chose remedies, by URI; "" takes one back."""
+
+        def __init__(self, remedies: dict[str, str]) -> None:
+            super().__init__()
+            self.remedies = remedies
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, compact=True, markup=False)
+        self._rows: tuple[Missing, ...] = ()
+        self.display = False
+
+    def show(self, rows: tuple[Missing, ...]) -> None:
+        """Shows other rows; the cursor stays where it was, or goes to the first row without a remedy."""
+        same = [row.uri for row in rows] == [row.uri for row in self._rows]
+        place, self._rows = self.highlighted if same else None, rows
+        self.set_options(Option(self._line(row), id=row.uri) for row in rows)
+        undecided = [index for index, row in enumerate(rows) if not row.remedy]
+        self.highlighted = (next(iter(undecided), 0) if place is None else place) if rows else None
+        self.display = bool(rows)
+        still = f", {len(undecided)} without a remedy" if undecided else ""
+        self.border_title = f"{count(len(rows), 'file')} missing (m){still}"
+
+    def _line(self, row: Missing) -> Text:
+        color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
+        text = Text(no_wrap=True, overflow="ellipsis").append(DONE if row.remedy else OPEN, f"bold {color}")
+        # The last word of a URI tells models and meshes apart.
+        name = plain(unquote(row.uri).rstrip("/").rsplit("/", 1)[-1]) or plain(row.uri)
+        return text.append(f" {name}  ").append(plain(row.words), "dim")
+
+    @on(OptionList.OptionSelected)
+    def _selected(self, event: OptionList.OptionSelected) -> None:
+        event.stop()
+        row = self._rows[event.option_index]
+
+        def take(text: str | None) -> None:
+            if text is not None:
+                self.post_message(self.Chosen({row.uri: text}))
+
+        self.app.push_screen(AskRemedy(row), take)
+
+    def action_guess(self) -> None:
+        here = [] if self.highlighted is None else [self._rows[self.highlighted].uri]
+        self.post_message(self.Chosen(dict.fromkeys([row.uri for row in self._rows if not row.remedy] or here, "auto")))
+
+    def action_without(self) -> None:
+        if self.highlighted is not None:
+            self.post_message(self.Chosen({self._rows[self.highlighted].uri: "none"}))
+
+
+class AskRemedy(ModalScreen[str | None]):
+    """Asks for the remedy of one missing file."""
+
+    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="remedy.cancel", tooltip="change nothing")]
+
+    def __init__(self, row: Missing) -> None:
+        super().__init__()
+        self._row = row
+
+    def compose(self) -> ComposeResult:
+        with Framed("A remedy for a missing file", "enter takes it   escape cancels"):
+            yield Static(Text(plain(self._row.uri)), markup=False)
+            yield Static(Text(f"now: {plain(self._row.words)}", "dim"), markup=False)
+            yield PathEntry(self._row.remedy or "auto", id="remedy")
+            yield Static("", id="wrong", classes="wrong", markup=False)
+            yield Static(Text(HOW, "dim"), markup=False)
+
+    @on(Input.Submitted)
+    def _typed(self, event: Input.Submitted) -> None:
+        try:
+            if not event.value.strip() and not self._row.remedy:
+                raise UserError("type one of these, or press escape to change nothing")
+            self.dismiss(remedy(event.value))
+        except UserError as error:
+            self.query_one("#wrong", Static).update(Text(str(error).removeprefix("remedy: ")))
