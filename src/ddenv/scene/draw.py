@@ -157,10 +157,8 @@ class Scenery:
 
     def way(self, samples: np.ndarray, ghost: bool) -> bytes:
         """The message that draws the robot's path in a whole run, for one browser."""
-        points = path_on_ground(samples, self._lowest)
-        if ghost:
-            return self._stage.drawn(GHOST_TRAIL, _tube(points, colors.GHOST_TRAIL))
-        return self._stage.drawn(TRAIL, _tube(points, colors.TRAIL))
+        path, color = (GHOST_TRAIL, colors.GHOST_TRAIL) if ghost else (TRAIL, colors.TRAIL)
+        return self._stage.drawn(path, _tube(path_on_ground(samples, self._lowest), color))
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`key`)."""
