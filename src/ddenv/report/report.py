@@ -51,7 +51,7 @@ def content(record: Record) -> Report:
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),
-        lead=(*in_short(record), *_damage(record), _standing(record), *_failure(state), *_noted(state)),
+        lead=(*in_short(record), *_damage(record), _standing(record), *_failure(state)),
         figures=_figures(record),
         sections=tuple(each for each in sections if each is not None),
         foot=_foot(record),
@@ -99,22 +99,17 @@ def _standing(record: Record) -> Paragraph:
 
 
 def _failure(state: RunState) -> list[Paragraph]:
-    """The scenario in its author's words, and how the robot failed in it."""
-    description = plain(state.scenario.get("description", ""))
-    described = [say(description)] if description else []
-    position = state.f_position
-    if position is None:
+    """The scenario in its author's words, how the robot failed in it, and what is wrong with the world."""
+    description, position = plain(state.scenario.get("description", "")), state.f_position
+    said = [say(description)] if description else []
+    if position is not None:
+        words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
+        said.append(say(f"{words}{_short_of(state, position)}{_after(state)}."))
+    elif state.tests_done:
         seen = count(state.tests_done, "run")
-        words = f"The whole world is run first to fix the failure: {seen} ended so far."
-        return [*described, say(words)] if state.tests_done else described
-    words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
-    words += f"{_short_of(state, position)}{_after(state)}."
-    return [*described, say(words)]
-
-
-def _noted(state: RunState) -> list[Paragraph]:
-    """What is wrong with the world."""
-    return [say(f"{words[:1].upper()}{words[1:]}.", notice=True) for words in (plain(each) for _, each in state.notes)]
+        said.append(say(f"The whole world is run first to fix the failure: {seen} ended so far."))
+    notes = (plain(each) for _, each in state.notes)
+    return [*said, *(say(f"{words[:1].upper()}{words[1:]}.", notice=True) for words in notes)]
 
 
 def _short_of(state: RunState, position: Place) -> str:
