@@ -108,7 +108,7 @@ def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collect
     own = [one for one in models if (sorts[one.model.name] != "gone" if named is None else one.model.name in named)]
     own = own[-MOST_AVOIDED:]
     wanted = [index for index, each in enumerate(own) if sorts[each.model.name] != "still"]
-    names = labels(own, wanted, MOST_LABELS, frame, list(places.values()))
+    names = labels(own, wanted, MOST_LABELS, frame, list(places.values()), 11.0)
     marks = [at(frame.pixel(point), MARKS[sign]) for sign, point in places.items()]
     drawing = plot(frame, 12, name, inside, [*names, *marks])
     return "\n".join([opening(height), *drawing, *_legend(legend, bottom), "</svg>"])
