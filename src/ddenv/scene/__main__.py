@@ -21,7 +21,7 @@ from ddenv.scene.player import Player
 from ddenv.scene.server import Server, last_address, remember
 from ddenv.scene.stage import Stage
 
-PERIOD = 0.05  # time between two updates of the scene, s
+PERIOD = 0.1  # time between two updates of the scene, s
 
 
 class _Parser(argparse.ArgumentParser):
