@@ -63,7 +63,7 @@ async def picture(run: RunFile) -> None:
     stage = Stage(server.send)
     server.welcome = stage.messages
     player = Player(run, stage, server.say)
-    server.play, server.pairs, server.drawings = player.play, player.pairs, player.drawings
+    server.player = player
     player.tick(0.0)
     set_up(stage, view(*CAMERAS[name]))
     url = server.listen(0)

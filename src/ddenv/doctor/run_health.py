@@ -41,7 +41,7 @@ def repair(path: Path, copy: Path) -> list[Finding]:
         if trouble := _parts(file):
             raise UserError(f"{path}: nothing can be repaired: {trouble}")
         found = rescue(file, copy)
-    words = f"{count(found.events, 'event')}, {count(len(found.state.finished_tests), 'test')}"
+    words = _how_much(found)
     if not found.trouble:
         return [Finding("copy", "copy", f"{copy}: whole, {words}")]
     again = f"ddenv resume {copy} makes the rest again"
@@ -115,7 +115,7 @@ def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
     found = faults(file)
     yield _finding("SQLite", "; ".join(found) or "sound", *(("wrong", _repair(path)) if found else ()))
     read = whole(file)
-    words = f"{count(read.events, 'event')}, {count(len(read.state.finished_tests), 'test')}"
+    words = _how_much(read)
     if read.trouble:
         yield _finding("events", f"{words} are whole; then: {read.trouble}", "wrong", _repair(path))
     else:
@@ -126,7 +126,11 @@ def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
     if read.bare:
         says = f"{read.bare} of {count(len(read.state.finished_tests), 'test')} have none, and cannot be shown"
         yield _finding("trajectories", says, "note")
-    yield from _made_with(read)
+    now = read.state.physics.now
+    other = now and read.state.engine_version not in ("", __version__)
+    advice = f"this is ddenv {__version__}: 'ddenv resume' first compares the bits" if other else ""
+    yield _finding("made with", now or "nothing yet", "note" if other else "ok", advice)
+    yield from (_finding("mixed", each, "note") for each in read.state.physics.mixed if now)
     yield _engine(read, path, alive)
 
 
@@ -139,16 +143,8 @@ def _parts(file: RunFile) -> str:
     return ""
 
 
-def _made_with(read: Whole) -> Iterator[Finding]:
-    now = read.state.physics.now
-    if not now:
-        yield _finding("made with", "nothing yet")
-        return
-    other = read.state.engine_version not in ("", __version__)
-    advice = f"this is ddenv {__version__}: 'ddenv resume' first compares the bits" if other else ""
-    yield _finding("made with", now, "note" if other else "ok", advice)
-    for each in read.state.physics.mixed:
-        yield _finding("mixed", each, "note")
+def _how_much(read: Whole) -> str:
+    return f"{count(read.events, 'event')}, {count(len(read.state.finished_tests), 'test')}"
 
 
 def _engine(read: Whole, path: Path, alive: bool) -> Finding:

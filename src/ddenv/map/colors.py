@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, overload
-
-if TYPE_CHECKING:
-    import numpy as np
+from typing import Any
 
 RGB = tuple[int, int, int]
 # Eight hues, as distinct as possible for colour-blind readers; parts beyond H repeat the hues, but not the letters.
@@ -42,14 +39,6 @@ def readable(back: int) -> int:
     return BLACK if luminance(back) > 110 else WHITE
 
 
-@overload
-def luminance(color: int) -> float: ...
-
-
-@overload
-def luminance(color: np.ndarray) -> np.ndarray: ...
-
-
-def luminance(color: int | np.ndarray) -> float | np.ndarray:
+def luminance(color: Any) -> Any:
     """The brightness of a packed colour, or of an array of them, 0..255."""
     return 0.3 * (color >> 16) + 0.59 * (color >> 8 & 255) + 0.11 * (color & 255)

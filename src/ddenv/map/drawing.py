@@ -28,7 +28,6 @@ SIZES = (12.0, 10.5, 9.0)
 WIDTH, HEIGHT = 0.58, 1.15
 GAP = 3.0
 LONGEST_LABEL = 26  # columns
-LEAST = 11.0  # the size of letters that are drawn, also where a smaller size fits better, pixels
 MARK = 14.0  # half the size of a mark, with some space, pixels
 # Maximum fraction of a name that may cover other models.
 MOST_COVERED = 0.3
@@ -177,14 +176,17 @@ def written(text: str) -> str:
 
 
 def labels(
-    models: Sequence[Drawn], wanted: Iterable[int], most: int, frame: Frame, points: Sequence[Point]
+    models: Sequence[Drawn], wanted: Iterable[int], most: int, frame: Frame, points: Sequence[Point], least: float = 0.0
 ) -> Iterator[str]:
-    """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m."""
+    """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m.
+
+    Letters have at least the size `least`, pixels, even if a smaller one fits better.
+    """
     largest = sorted(wanted, key=lambda index: -models[index].outline.area)[:most]
     names = [shortened(each.model.name, LONGEST_LABEL) for each in models]
     marks = [np.array([x - MARK, y - MARK, x + MARK, y + MARK]) for x, y in map(frame.pixel, points)]
     placed = place_labels(names, [_spot(each, frame) for each in models], largest, frame.box, marks)
-    return (_plate(label) for label in placed.values())
+    return (_plate(label, max(least, label.size)) for label in placed.values())
 
 
 def _spot(each: Drawn, frame: Frame) -> Spot:
@@ -194,9 +196,8 @@ def _spot(each: Drawn, frame: Frame) -> Spot:
     return spot(frame.pixels(np.array([each.outline.center])) + around, frame.box, False)
 
 
-def _plate(label: Label) -> str:
+def _plate(label: Label, size: float) -> str:
     """A name on its own background, so that outlines and neighbours do not make it hard to read."""
-    size = max(LEAST, label.size)
     long, high = 1.04 * label.length * size / label.size + 4, HEIGHT * size
     turn = f" rotate({label.angle:.1f})" if abs(label.angle) > 0.05 else ""
     return (

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts
+from ddenv.page.blocks import Block, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts
 from ddenv.page.policy import hashed, policy
 from ddenv.text import plain, printable
 
@@ -26,18 +25,14 @@ def html(report: Report) -> str:
         f'<header><p class="of"><bdi>{_text(report.name)}</bdi></p>',
         f"<h1>{_text(report.verdict)}</h1>",
         *(_paragraph(each) for each in report.lead),
-        *_figures(report.figures),
+        '<dl class="figures">',
+        *(f"<div><dt>{_text(what)}</dt><dd>{_text(number)}</dd></div>" for number, what in report.figures),
+        "</dl>",
         "</header>",
     ]
     for section in report.sections:
         lines += [f"<section><h2>{_text(section.title)}</h2>", *map(_block, section.blocks), "</section>"]
     return "\n".join([*lines, f"<footer>{_text(report.foot)}</footer>", "</main></body></html>", ""])
-
-
-def _figures(figures: tuple[tuple[str, str], ...]) -> Iterator[str]:
-    yield '<dl class="figures">'
-    yield from (f"<div><dt>{_text(what)}</dt><dd>{_text(number)}</dd></div>" for number, what in figures)
-    yield "</dl>"
 
 
 def _block(block: Block) -> str:
@@ -60,19 +55,14 @@ def _paragraph(block: Paragraph) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th{_side(table, column)}>{_text(title)}</th>" for column, title in enumerate(table.head))
-    rows = "\n".join(_row(table, number, row) for number, row in enumerate(table.rows))
-    return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody></table></div>'
-
-
-def _row(table: Table, number: int, row: tuple[Cell, ...]) -> str:
-    strong = ' class="strong"' if number in table.strong else ""
-    cells = (f"<td{_side(table, column)}>{''.join(map(_part, parts(cell)))}</td>" for column, cell in enumerate(row))
-    return f"<tr{strong}>{''.join(cells)}</tr>"
-
-
-def _side(table: Table, column: int) -> str:
-    return ' class="number"' if column in table.right else ""
+    sides = [' class="number"' if column in table.right else "" for column in range(len(table.head))]
+    head = "".join(f"<th{side}>{_text(title)}</th>" for side, title in zip(sides, table.head, strict=True))
+    rows = []
+    for number, row in enumerate(table.rows):
+        strong = ' class="strong"' if number in table.strong else ""
+        cells = (f"<td{side}>{''.join(map(_part, parts(cell)))}</td>" for side, cell in zip(sides, row, strict=True))
+        rows.append(f"<tr{strong}>{''.join(cells)}</tr>\n")
+    return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
 
 
 def _code(code: Code) -> str:

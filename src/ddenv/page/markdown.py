@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
@@ -24,11 +23,11 @@ def markdown(report: Report, stem: str) -> str:
         frozenset(range(len(report.figures))),
     )
     lines = [f"# {_name(report.name)}: {_text(report.verdict)}", ""]
-    opening: tuple[Block, ...] = (*report.lead, figures)
-    for block in opening:
-        lines += [*_block(block, stem), ""]
-    for section in report.sections:
-        lines += _section(section, stem)
+    opening = Section("", (*report.lead, figures))
+    for section in (opening, *report.sections):
+        lines += [f"## {_text(section.title)}", ""] if section.title else []
+        for block in section.blocks:
+            lines += [*_block(block, stem), ""]
     return "\n".join([*lines, "---", "", _text(report.foot), ""])
 
 
@@ -52,12 +51,6 @@ def _alone(svg: str, style: str) -> str:
     start = svg.index(">") + 1
     ground = '<rect width="100%" height="100%" style="fill: var(--page)"/>'
     return f"{svg[:start]}\n<style>\n{style}</style>\n{ground}{svg[start:]}\n"
-
-
-def _section(section: Section, stem: str) -> Iterator[str]:
-    yield from (f"## {_text(section.title)}", "")
-    for block in section.blocks:
-        yield from (*_block(block, stem), "")
 
 
 def _block(block: Block, stem: str) -> list[str]:

@@ -6,14 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from ddenv.map.drawing import tick, tick_step, tick_text, ticks
-from ddenv.runfile.progress import Point
 from ddenv.runfile.state import RunState
 from ddenv.text import count
 
 WIDTH, HEIGHT = 880.0, 300.0
 LEFT, TOP, RIGHT, BOTTOM = 52.0, 26.0, 24.0, 46.0
-# More steps cannot be seen.
-MOST_POINTS = 2000
 
 Steps = list[tuple[float, float]]
 # Where (tests, models) is on the chart, pixels.
@@ -24,11 +21,9 @@ def chart(state: RunState) -> str:
     """The chart as SVG, its colours as classes of `style.css`."""
     last = max(1, state.tests_done, *(point.tests for point in state.history))
     most = max(1, *(point.models for point in state.history))
-    points = _thinned(state.history)
-    points = [*points, replace(points[-1], tests=last)]
+    points = [*state.history, replace(state.history[-1], tests=last)]
     models = steps([(point.tests, point.models) for point in points])
     needed = steps([(point.tests, point.needed) for point in points])
-
     at = scale(last, most)
     line = path(models, at)
     (first, floor), (end, _) = at(0, 0), at(last, 0)
@@ -65,20 +60,14 @@ def path(corners: Sequence[tuple[float, float]], at: At) -> str:
     return "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*corner) for corner in corners))
 
 
-def _thinned(history: Sequence[Point]) -> list[Point]:
-    """As few of the points as give the same picture."""
-    step = max(1, -(-len(history) // MOST_POINTS))
-    return [*history[:-1:step], *history[-1:]]
-
-
 def steps(points: Sequence[tuple[int, int]]) -> Steps:
-    """Corners: each number holds until the next one."""
-    corners: Steps = []
-    for tests, number in points:
-        if corners:
-            corners.append((tests, corners[-1][1]))
-        corners.append((tests, number))
-    return corners
+    """Corners of a line through points of tests and models: each number holds until another one."""
+    corners: Steps = list(points[:1])
+    for tests, models in points:
+        if models != corners[-1][1]:
+            corners += [(tests, corners[-1][1]), (tests, models)]
+    end = (points[-1][0], corners[-1][1])
+    return corners if corners[-1] == end else [*corners, end]
 
 
 def axes(at: At, last: int, most: int) -> Iterator[str]:

@@ -79,16 +79,11 @@ def sureness(record: Record) -> Section | None:
     state = record.state
     if not state.tests_done:
         return None
-    return Section("How sure it is", (*_baseline(state), *_tests(state), *_mixed(state)))
-
-
-def _mixed(state: RunState) -> list[Block]:
-    return [
-        say(
-            Strong("Mixed tests."), f" They were made with {plain(each)}, which do not give the same bits.", notice=True
-        )
-        for each in state.physics.mixed
-    ]
+    mixed = (
+        say(Strong("Mixed tests."), f" They were made with {plain(one)}, which do not give the same bits.", notice=True)
+        for one in state.physics.mixed
+    )
+    return Section("How sure it is", (*_baseline(state), *_tests(state), *mixed))
 
 
 def _baseline(state: RunState) -> list[Block]:
@@ -101,23 +96,19 @@ def _baseline(state: RunState) -> list[Block]:
     )
     if base.broken:
         words += f" {count(base.broken, 'more run')} broke, and {'says' if base.broken == 1 else 'say'} nothing."
-    return [
-        say(words),
-        Picture("interval", interval(base), "The failure rate with its interval."),
-        *([say(as_sentence(missed(state)))] if base.rate < 1 else []),
-        *_seen(base),
-    ]
-
-
-def _seen(base: BaselineFinished) -> list[Block]:
-    """The failures of the whole world, if there are several."""
-    if not base.others:
-        return []
-    rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
-    f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
-    chose = f" The first {count(base.chose, 'run')} only chose it, and are not in its rate." if base.chose else ""
-    words = "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces another one."
-    return [say(words + chose), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
+    blocks: list[Block] = [say(words), Picture("interval", interval(base), "The failure rate with its interval.")]
+    if base.rate < 1:
+        blocks.append(say(as_sentence(missed(state))))
+    if base.others:
+        rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
+        f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
+        words = (
+            "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces "
+            "another one."
+        )
+        words += f" The first {count(base.chose, 'run')} only chose it, and are not in its rate." if base.chose else ""
+        blocks += [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
+    return blocks
 
 
 def _tests(state: RunState) -> list[Block]:
@@ -237,7 +228,15 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
     if state.certified:
         means = promise(state, found)
         words += f" {as_sentence(means)}"
-    return [table, say(words), *_earlier(state, found)]
+    # Other certificates of the same environment: each stands for itself.
+    others = [
+        one for one in state.certificates if one.node == found.node and one.claims and one is not state.certificate
+    ]
+    earlier = (
+        say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
+        for one in others
+    )
+    return [table, say(words), *earlier]
 
 
 def _fresh_row(each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
@@ -257,17 +256,6 @@ def _name(each: FreshRuns) -> Cell:
         return "what is left"
     world = "the whole world" if each.node == 0 else f"environment {each.node}"
     return f"{world}, where what is left missed f" if each.is_chosen else world
-
-
-def _earlier(state: RunState, found: Certificate) -> list[Block]:
-    """Other certificates of the same environment: each stands for itself."""
-    others = [
-        one for one in state.certificates if one.node == found.node and one.claims and one is not state.certificate
-    ]
-    return [
-        say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
-        for one in others
-    ]
 
 
 def rate_of_left(state: RunState) -> tuple[str, str]:

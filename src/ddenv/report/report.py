@@ -52,7 +52,7 @@ def content(record: Record) -> Report:
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),
-        lead=(*in_short(record), *_damage(record), *_standing(record), *_failure(state), *_noted(state)),
+        lead=(*in_short(record), *_damage(record), _standing(record), *_failure(state)),
         figures=_figures(record),
         sections=tuple(each for each in sections if each is not None),
         foot=_foot(record),
@@ -78,53 +78,39 @@ def _damage(record: Record) -> list[Paragraph]:
     ]
 
 
-def _standing(record: Record) -> list[Paragraph]:
+def _standing(record: Record) -> Paragraph:
     """Whether it is over, and why it ended."""
     state = record.state
-    why = plain(state.reason).rstrip(".")
+    why = plain(ended(state) if state.status == "finished" else state.reason).rstrip(".")
     if state.status == "finished" and state.certified:
-        return [_minimal(state)]
-    if state.status == "finished":
-        why = plain(ended(state)).rstrip(".") or "no reason is known"
-        return [say(Strong("Not shown to be minimal:"), f" {why}.", notice=True)]
-    if state.status == "stopped":
-        return [
-            say(Strong("Stopped"), f"{f': {why}' if why else ''}. This report shows what was known then.", notice=True)
-        ]
-    if state.status == "failed":
-        return [say(Strong("The engine could not go on"), f"{f': {why}' if why else ''}.", notice=True)]
-    if state.status == "created":
-        return [say(Strong("Not started yet:"), " no test has been made.", notice=True)]
+        if not state.environment:
+            return say(Strong("Minimal."), " Look at the robot, its goal, and the models that always stay.")
+        return say(Strong("Minimal:"), f" {why}.")
+    reason = f": {why}" if why else ""
     at = f" at {moment(state.updated_at)} UTC" if moment(state.updated_at) else ""
-    if record.alive:
-        return [say(Strong("This run has not ended."), f" This report shows what was known{at}.", notice=True)]
-    gone = f" The engine is gone; its last message came{at}." if at else " The engine is gone."
-    return [say(Strong("This run has not ended."), gone, notice=True)]
-
-
-def _minimal(state: RunState) -> Paragraph:
-    if not state.environment:
-        return say(Strong("Minimal."), " Look at the robot, its goal, and the models that always stay.")
-    return say(Strong("Minimal:"), f" {plain(ended(state)).rstrip('.')}.")
+    title, words = {
+        "finished": ("Not shown to be minimal:", f" {why or 'no reason is known'}."),
+        "stopped": ("Stopped", f"{reason}. This report shows what was known then."),
+        "failed": ("The engine could not go on", f"{reason}."),
+        "created": ("Not started yet:", " no test has been made."),
+    }.get(state.status, ("This run has not ended.", f" This report shows what was known{at}."))
+    if not (state.ended or state.status == "created" or record.alive):
+        words = f" The engine is gone; its last message came{at}." if at else " The engine is gone."
+    return say(Strong(title), words, notice=True)
 
 
 def _failure(state: RunState) -> list[Paragraph]:
-    """The scenario in its author's words, and how the robot failed in it."""
-    description = plain(state.scenario.get("description", ""))
-    described = [say(description)] if description else []
-    position = state.f_position
-    if position is None:
+    """The scenario in its author's words, how the robot failed in it, and what is wrong with the world."""
+    description, position = plain(state.scenario.get("description", "")), state.f_position
+    said = [say(description)] if description else []
+    if position is not None:
+        words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
+        said.append(say(f"{words}{_short_of(state, position)}{_after(state)}."))
+    elif state.tests_done:
         seen = count(state.tests_done, "run")
-        words = f"The whole world is run first to fix the failure: {seen} ended so far."
-        return [*described, say(words)] if state.tests_done else described
-    words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
-    words += f"{_short_of(state, position)}{_after(state)}."
-    return [*described, say(words)]
-
-
-def _noted(state: RunState) -> list[Paragraph]:
-    """What is wrong with the world."""
-    return [say(as_sentence(words), notice=True) for words in (plain(each) for _, each in state.notes)]
+        said.append(say(f"The whole world is run first to fix the failure: {seen} ended so far."))
+    notes = (plain(each) for _, each in state.notes)
+    return [*said, *(say(as_sentence(words), notice=True) for words in notes)]
 
 
 def _short_of(state: RunState, position: Place) -> str:

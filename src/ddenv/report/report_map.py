@@ -22,8 +22,8 @@ from ddenv.runfile.store import COLUMNS
 Ways = Mapping[str, "array[float] | None"]
 PATHS = ("way", "last", "with", "without")
 
-# Pixels: of a letter, between entries, and from line to line.
-LETTER, GAP, LINE, LEGEND_LEFT = 6.9, 12.0, 24.0, 52.0
+# Of the legend: entries in a line, and pixels from line to line.
+ACROSS, LINE = 4, 24.0
 
 
 # Around (0, 0): where the robot starts, where it should go, and where it ended in f.
@@ -96,9 +96,10 @@ def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collect
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS
     drawn = {way: path for way, samples in ways.items() if (path := _way(samples, frame))}
-    legend = _lines({*sorts.values(), *drawn, *places})
+    shown = {*sorts.values(), *drawn, *places}
+    legend = [name for name in WORDS if name in shown]
     bottom = float(frame.box[3]) + AXIS
-    height = bottom + LINE * len(legend) + 6
+    height = bottom + LINE * -(-len(legend) // ACROSS) + 6
     inside = [
         *(_model(each, sorts[each.model.name], frame, coarse) for each in models),
         *(f'<path class="{way}" d="{path}"/>' for way, path in drawn.items()),
@@ -108,7 +109,7 @@ def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collect
     own = [one for one in models if (sorts[one.model.name] != "gone" if named is None else one.model.name in named)]
     own = own[-MOST_AVOIDED:]
     wanted = [index for index, each in enumerate(own) if sorts[each.model.name] != "still"]
-    names = labels(own, wanted, MOST_LABELS, frame, list(places.values()))
+    names = labels(own, wanted, MOST_LABELS, frame, list(places.values()), 11.0)
     marks = [at(frame.pixel(point), MARKS[sign]) for sign, point in places.items()]
     drawing = plot(frame, 12, name, inside, [*names, *marks])
     return "\n".join([opening(height), *drawing, *_legend(legend, bottom), "</svg>"])
@@ -175,42 +176,14 @@ def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
 
 
-def _lines(shown: Collection[str]) -> list[list[str]]:
-    """The signs that are `shown`, in lines that are not wider than the map."""
-    lines: list[list[str]] = [[]]
-    x = LEGEND_LEFT
-    for name in (name for name in WORDS if name in shown):
-        if lines[-1] and x + _wide(name) > WIDTH:
-            lines.append([])
-            x = LEGEND_LEFT
-        lines[-1].append(name)
-        x += _wide(name)
-    return lines
-
-
-def _legend(lines: list[list[str]], top: float) -> Iterator[str]:
-    """The signs with their words, from `top` on."""
-    for number, line in enumerate(lines):
-        x, y = LEGEND_LEFT, top + LINE * number + 10
-        for name in line:
-            yield at((x, y), f'{_sign(name)}\n<text class="tick" x="{_room(name):g}" y="4.5">{WORDS[name]}</text>')
-            x += _wide(name)
-
-
-def _wide(name: str) -> float:
-    return _room(name) + LETTER * len(WORDS[name]) + GAP
-
-
-def _room(name: str) -> float:
-    """The width of a sign with the space before its word."""
-    return 25.0 if name in MARKS else 33.0
-
-
-def _sign(name: str) -> str:
-    if name in MARKS:
-        return at((10, 0), MARKS[name])
-    return (
-        f'<path class="{name}" d="M0 0H26"/>'
-        if name in PATHS
-        else f'<rect class="{name}" x="1" y="-7" width="24" height="14"/>'
-    )
+def _legend(shown: Sequence[str], top: float) -> Iterator[str]:
+    """The signs that are `shown` with their words, in columns from `top` on."""
+    for number, name in enumerate(shown):
+        sign = f'<rect class="{name}" x="1" y="-7" width="24" height="14"/>'
+        if name in MARKS:
+            sign = at((13, 0), MARKS[name])
+        elif name in PATHS:
+            sign = f'<path class="{name}" d="M0 0H26"/>'
+        row, column = divmod(number, ACROSS)
+        place = LEFT + (WIDTH - LEFT) / ACROSS * column, top + LINE * row + 10
+        yield at(place, f'{sign}\n<text class="tick" x="33" y="4.5">{WORDS[name]}</text>')

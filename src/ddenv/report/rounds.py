@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
 
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, moment, say
@@ -25,108 +24,76 @@ MOST = 120
 MOST_STEPS = 40
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """A round, its finished tests, whether it is still on, and whether its reduction was taken back."""
-
-    round: Round
-    tests: int
-    on: bool
-    undone: bool
-
-    @property
-    def tried(self) -> int:
-        """The number of its candidates that were judged or have tests."""
-        return sum(
-            one.verdict in ("similar", "missed", "dissimilar") or bool(one.tests) for one in self.round.candidates
-        )
-
-    @property
-    def won(self) -> Candidate | None:
-        return None if self.round.winner is None else self.round.candidates[self.round.winner]
-
-
 def way(record: Record) -> Section | None:
     """The section on the rounds; None before the baseline is done."""
     state = record.state
     if state.baseline is None:
         return None
-    blocks: list[Block] = [Picture("chart", chart(state), _alternative(state))]
-    if record.rounds:
-        undone = frozenset(node.round for node in state.nodes if node.rejected and node.how == "reduced")
-        tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
-        judged = [_Row(each, tests[each.number], _is_on(state, each), each.number in undone) for each in record.rounds]
-        blocks += _table(judged)
-    else:
-        blocks.append(say("No round has begun yet."))
-    return Section("How it got there", tuple(blocks))
-
-
-def _alternative(state: RunState) -> str:
     bound = f" At least {state.lower_bound} of them seem to be needed." if state.lower_bound else ""
-    return (
-        f"Models left after each test, down to {len(state.environment)} after {count(state.tests_done, 'test')}.{bound}"
-    )
+    down = f"down to {len(state.environment)} after {count(state.tests_done, 'test')}"
+    drawn = Picture("chart", chart(state), f"Models left after each test, {down}.{bound}")
+    rounds = _rounds(record) if record.rounds else [say("No round has begun yet.")]
+    return Section("How it got there", (drawn, *rounds))
 
 
-def _is_on(state: RunState, round: Round) -> bool:
-    return not state.ended and not round.done and state.round is not None and round.number == state.round.number
-
-
-def _table(judged: list[_Row]) -> list[Block]:
-    shown = _shown(judged)
-    rows = tuple(
-        _summed([judged[each] for each in others]) if number is None else _row(judged[number])
-        for number, others in groupby(range(len(judged)), lambda number: number if number in shown else None)
-    )
+def _rounds(record: Record) -> list[Block]:
+    state, rounds = record.state, record.rounds
+    tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
+    undone = frozenset(node.round for node in state.nodes if node.rejected and node.how == "reduced")
+    # If there are too many, those that reduced have a row of their own, the first and the last of these.
+    shown: set[int] = {each.number for each in rounds}
+    if len(rounds) > MOST_ROUNDS:
+        wins = [each.number for each in rounds if each.winner is not None]
+        half = MOST_ROUNDS // 2
+        shown = {rounds[0].number, rounds[-1].number}
+        shown |= set(wins if len(wins) <= MOST_ROUNDS else wins[:half] + wins[-half:])
+    rows: list[tuple[Cell, ...]] = []
+    for number, group in groupby(rounds, lambda each: each.number if each.number in shown else None):
+        some = list(group)
+        own = sum(tests[each.number] for each in some)
+        rows.append(_summed(some, own) if number is None else _row(state, some[0], own, number in undone))
     head = ("round", "parts n", "tried", "first similar", "models left", "tests")
-    table = Table(head, rows, frozenset({0, 1, 2, 4, 5}))
     explained = "A round tries one set of models after the other; the first one that shows f becomes the environment."
-    if any(each.tried and not each.tests for each in judged):
+    if any(_tried(each) and not tests[each.number] for each in rounds):
         explained += " Sets judged before are not tested again."
-    return [say(explained), table]
+    return [say(explained), Table(head, tuple(rows), frozenset({0, 1, 2, 4, 5}))]
 
 
-def _shown(judged: list[_Row]) -> frozenset[int]:
-    """Which rounds have a row of their own: if there are too many, those that reduced, the first and the last of these."""
-    numbers = range(len(judged))
-    if len(judged) <= MOST_ROUNDS:
-        return frozenset(numbers)
-    wins = [number for number in numbers if judged[number].won is not None]
-    half = MOST_ROUNDS // 2
-    kept = wins if len(wins) <= MOST_ROUNDS else wins[:half] + wins[-half:]
-    return frozenset([*kept, 0, len(judged) - 1])
+def _tried(round: Round) -> int:
+    """The number of its candidates that were judged or have tests."""
+    return sum(one.verdict in ("similar", "missed", "dissimilar") or bool(one.tests) for one in round.candidates)
 
 
-def _row(row: _Row) -> tuple[Cell, ...]:
-    round, won = row.round, row.won
-    left = len(round.environment) if won is None else won.size
-    tried = f"{row.tried} of {len(round.candidates)}"
-    size = str(left) if won is None else Strong(str(left))
-    return str(round.number), str(round.n_partitions), tried, _first_similar(row), size, str(row.tests)
+def _won(round: Round) -> Candidate | None:
+    return None if round.winner is None else round.candidates[round.winner]
 
 
-def _first_similar(row: _Row) -> str:
-    verdicts = Counter(one.verdict for one in row.round.candidates)
+def _left(round: Round) -> int:
+    won = _won(round)
+    return len(round.environment) if won is None else won.size
+
+
+def _row(state: RunState, round: Round, tests: int, undone: bool) -> tuple[Cell, ...]:
+    won, verdicts = _won(round), Counter(one.verdict for one in round.candidates)
+    if won is not None:
+        first = f"{won.label}{', taken back' if undone else ''}"
+    elif not state.ended and not round.done and state.round is not None and round.number == state.round.number:
+        first = "under way"
+    else:
+        first = "not finished" if verdicts[""] else "none"
     refused = [f"{verdicts[word]} {word}" for word in REFUSED if verdicts[word]]
-    words = f" ({', '.join(refused)})" if refused else ""
-    if row.won is not None:
-        return f"{row.won.label}{', taken back' if row.undone else ''}{words}"
-    if row.on:
-        return f"under way{words}"
-    return f"not finished{words}" if verdicts[""] else f"none{words}"
+    first += f" ({', '.join(refused)})" if refused else ""
+    left = str(_left(round))
+    tried = f"{_tried(round)} of {len(round.candidates)}"
+    return str(round.number), str(round.n_partitions), tried, first, left if won is None else Strong(left), str(tests)
 
 
-def _summed(judged: list[_Row]) -> tuple[Cell, ...]:
+def _summed(rounds: Sequence[Round], tests: int) -> tuple[Cell, ...]:
     """Several rounds in one row."""
-    wins = sum(each.won is not None for each in judged)
-    first, last = judged[0].round, judged[-1].round
-    numbers = f"{first.number} to {last.number}" if len(judged) > 1 else str(first.number)
-    tried = str(sum(each.tried for each in judged))
-    words = f"{wins} of {len(judged)} reduced" if wins else "none"
-    won = judged[-1].won
-    left = len(last.environment) if won is None else won.size
-    return numbers, "", tried, words, str(left), str(sum(each.tests for each in judged))
+    wins = sum(each.winner is not None for each in rounds)
+    numbers = " to ".join(str(number) for number in dict.fromkeys((rounds[0].number, rounds[-1].number)))
+    words = f"{wins} of {len(rounds)} reduced" if wins else "none"
+    return numbers, "", str(sum(map(_tried, rounds))), words, str(_left(rounds[-1])), str(tests)
 
 
 def guiding(record: Record) -> Section | None:

@@ -55,40 +55,32 @@ def _alternative(state: RunState) -> str:
 
 def _models(record: Record) -> list[Block]:
     """A row for each model that is left, in the file's order."""
-    state, by_name = record.state, {each.model.name: each for each in record.models}
-    touched = _touched(state)
-    names = state.environment
-    carried = {name: drops_without(state, frozenset({name})) for name in names[:MOST_MODELS]}
-    drop = any(carried.values())
-    rows = tuple(
-        (*_row(name, by_name.get(name), touched, state), *((named(fallen, MOST_DROPPED),) if drop else ()))
-        for name, fallen in carried.items()
-    )
-    if not rows:
+    state, names = record.state, record.state.environment[:MOST_MODELS]
+    if not names:
         return []
-    head = ["model", "kind", "centre x, y, z, m", "size x × y × z, m"]
-    head += (["first touched, s"] if touched else []) + (["removing it drops"] if drop else [])
-    table = Table(tuple(head), rows, frozenset({2, 3, 4} if touched else {2, 3}))
-    more = len(names) - len(rows)
+    by_name = {each.model.name: each for each in record.models}
+    drawn = [by_name.get(name) for name in names]
+    columns: dict[str, list[Cell]] = {
+        "model": [(Name(name), " (pinned)") if name in state.pinned else Name(name) for name in names],
+        "kind": ["" if each is None else "static" if each.model.static else "dynamic" for each in drawn],
+        "centre x, y, z, m": ["" if each is None else place(each.center) for each in drawn],
+        "size x × y × z, m": ["" if each is None else _size(each) for each in drawn],
+    }
+    # In the last similar run, s; old files do not say it.
+    test = state.evidence_test
+    if test is not None and 0 < test <= len(state.tests) and (first := dict(state.tests[test - 1].first_touched)):
+        columns["first touched, s"] = [f"{first[name]:.1f}" if name in first else "never" for name in names]
+    right = frozenset(range(2, len(columns)))
+    carried = [drops_without(state, frozenset({name})) for name in names]
+    if any(carried):
+        columns["removing it drops"] = [named(fallen, MOST_DROPPED) for fallen in carried]
+    table = Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), right)
+    more = len(state.environment) - len(names)
     return [table, say(f"And {count(more, 'more model')}.")] if more else [table]
 
 
-def _row(name: str, each: Drawn | None, touched: dict[str, float], state: RunState) -> tuple[Cell, ...]:
-    shown: Cell = (Name(name), " (pinned)") if name in state.pinned else Name(name)
-    if each is None:
-        return (shown, "", "", "") + (("",) if touched else ())
-    kind = "static" if each.model.static else "dynamic"
-    size = " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
-    at = (f"{touched[name]:.1f}" if name in touched else "never",) if touched else ()
-    return (shown, kind, place(each.center), size, *at)
-
-
-def _touched(state: RunState) -> dict[str, float]:
-    """When the robot first touched each model in the last similar run, s; empty in old files."""
-    test = state.evidence_test
-    if test is None or not 0 < test <= len(state.tests):
-        return {}
-    return dict(state.tests[test - 1].first_touched)
+def _size(each: Drawn) -> str:
+    return " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
 
 
 def _stay(record: Record) -> list[Block]:

@@ -21,7 +21,7 @@ from ddenv.scene.player import Player
 from ddenv.scene.server import Server, last_address, remember
 from ddenv.scene.stage import Stage
 
-PERIOD = 0.05  # time between two updates of the scene, s
+PERIOD = 0.1  # time between two updates of the scene, s
 
 
 class _Parser(argparse.ArgumentParser):
@@ -59,7 +59,7 @@ async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:
     stage = Stage(server.send)
     server.welcome = stage.messages
     player = Player(run, stage, server.say)
-    server.play, server.pairs, server.drawings = player.play, player.pairs, player.drawings
+    server.player = player
     url = server.listen(port, before)
     remember(run.path, server.port, token)
     player.tick(time.monotonic())

@@ -34,33 +34,6 @@ LINE = 0.025  # radius of drawn trajectories, m
 ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
 
-class Crowd:
-    """The still elements of a large world: the surfaces of each one, and the ends of its edges."""
-
-    def __init__(self) -> None:
-        self._painted: dict[str, list[Painted]] = {}
-        self._edges: dict[str, np.ndarray] = {}
-
-    def add(self, name: str, painted: list[Painted], edges: np.ndarray | None) -> None:
-        """Adds a model; `edges` (N, 3) come for all elements, also for those that are drawn by themselves."""
-        self._painted[name] = painted
-        if edges is not None:
-            self._edges[name] = edges
-
-    def objects(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
-        """What shows the environment of `shot`; None where nothing is left to show."""
-        parts = [item for name, items in self._painted.items() if name in shot.models for item in items]
-        solid, clear = [item for item in parts if item.alpha == 1], [item for item in parts if item.alpha < 1]
-        for name, items in (("still", solid), ("still clear", clear)):
-            yield (*MODELS, name), joined(items).thing() if items else None
-        yield (*LEFT_OUT, "all"), self._outlines(shot.left_out, colors.LEFT_OUT)
-        yield (*REMOVED, "all"), self._outlines(shot.removed, colors.REMOVED)
-
-    def _outlines(self, names: Iterable[str], color: Color) -> Object | None:
-        ends = [self._edges[name] for name in sorted(names) if name in self._edges]
-        return lines(np.concatenate(ends), color) if ends else None
-
-
 def safe_name(number: int, name: str) -> str:
     """A name for the browser's tree: unique by its number, without special characters of paths or pages."""
     kept = "".join(char if char.isalnum() or char in "-_. " else "_" for char in name)[:40]
@@ -91,7 +64,7 @@ class Letter(NamedTuple):
 class Scenery:
     """The objects of one run. Every element is drawn once; a change of environment only shows and hides elements.
 
-    In a large world those that never move are drawn together (`Crowd`), anew for each environment.
+    In a large world those that never move are drawn together, anew for each environment.
     """
 
     def __init__(self, stage: Stage, world: World, wheels: Wheels, elements: Iterable[str]) -> None:
@@ -103,7 +76,10 @@ class Scenery:
         self._pieces = 0
         elements = frozenset(elements)
         self._movable = {model.name for model in world.models if not model.static and model.name in elements}
-        self._crowd = Crowd() if len(elements) > MOST_SINGLE else None
+        self._is_large = len(elements) > MOST_SINGLE
+        # The surfaces of elements that are drawn together, and the edges of all elements.
+        self._painted: dict[str, list[Painted]] = {}
+        self._edges: dict[str, np.ndarray] = {}
         surfaces = [
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
@@ -124,14 +100,26 @@ class Scenery:
         """Shows the environment of `shot`."""
         for name, key in self._keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
-            if self._crowd is None:
+            if not self._is_large:
                 self._stage.show((*LEFT_OUT, key), name in shot.left_out)
                 self._stage.show((*REMOVED, key), name in shot.removed)
-        for path, thing in self._crowd.objects(shot) if self._crowd is not None else ():
-            if thing is None:
-                self._stage.delete(path)
-            else:
-                self._stage.draw(path, thing, shadow=path[: len(MODELS)] == MODELS)
+        for path, thing in self._together(shot):
+            self._stage.draw(path, thing, shadow=path[: len(MODELS)] == MODELS)
+
+    def _together(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
+        """What shows the environment of `shot` in a large world; None where nothing is left to show."""
+        if not self._is_large:
+            return
+        items = [item for name, items in self._painted.items() if name in shot.models for item in items]
+        for name, solid in (("still", True), ("still clear", False)):
+            some = [item for item in items if (item.alpha == 1) == solid]
+            yield (*MODELS, name), joined(some).thing() if some else None
+        for group, names, color in (
+            (LEFT_OUT, shot.left_out, colors.LEFT_OUT),
+            (REMOVED, shot.removed, colors.REMOVED),
+        ):
+            ends = [self._edges[name] for name in sorted(names) if name in self._edges]
+            yield (*group, "all"), lines(np.concatenate(ends), color) if ends else None
 
     def place_robot(self, pose: Pose, turned: tuple[float, float] = (0.0, 0.0)) -> None:
         """Puts the robot's first link at `pose`, its left and right wheels `turned`, rad."""
@@ -157,15 +145,12 @@ class Scenery:
 
     def way(self, samples: np.ndarray, ghost: bool) -> bytes:
         """The message that draws the robot's path in a whole run, for one browser."""
-        points = path_on_ground(samples, self._lowest)
-        if ghost:
-            return self._stage.drawn(GHOST_TRAIL, _tube(points, colors.GHOST_TRAIL))
-        return self._stage.drawn(TRAIL, _tube(points, colors.TRAIL))
+        path, color = (GHOST_TRAIL, colors.GHOST_TRAIL) if ghost else (TRAIL, colors.TRAIL)
+        return self._stage.drawn(path, _tube(path_on_ground(samples, self._lowest), color))
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`key`)."""
-        objects = () if self._crowd is None else self._crowd.objects(shot)
-        return [self._stage.drawn(path, thing) for path, thing in objects]
+        return [self._stage.drawn(path, thing) for path, thing in self._together(shot)]
 
     def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[Letter]:
         """Draws edges around the models of each partition: its letter, its colour, its models. Returns the first letters.
@@ -192,9 +177,8 @@ class Scenery:
 
     def evidence(self, samples: np.ndarray | None) -> None:
         """Draws the robot's path in the run that shows f."""
-        self._stage.delete(EVIDENCE)
-        if samples is not None:
-            self._draw_path(EVIDENCE, path_on_ground(samples, self._lowest), colors.EVIDENCE)
+        tube = None if samples is None else _tube(path_on_ground(samples, self._lowest), colors.EVIDENCE)
+        self._stage.draw(EVIDENCE, tube, shadow=False)
 
     def trail(self, samples: np.ndarray) -> None:
         """Draws the robot's path so far; fewer `samples` than before start a new one."""
@@ -204,30 +188,26 @@ class Scenery:
             self._stage.delete(TRAIL)
             self._pieces = 0
         for piece in range(max(0, self._pieces - 1), pieces):
-            self._draw_path((*TRAIL, str(piece)), points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
+            tube = _tube(points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
+            self._stage.draw((*TRAIL, str(piece)), tube, shadow=False)
         self._pieces = pieces
-
-    def _draw_path(self, at: Path, points: np.ndarray, color: Color) -> None:
-        if (thing := _tube(points, color)) is not None:
-            self._stage.draw(at, thing, shadow=False)
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
         shape = mesh.merge([item.surface for item in painted])
-        edges = outline(model, shape) if element and len(shape.vertices) else None
-        alone = self._crowd is None or not element or not model.static
-        if self._crowd is not None and element:
-            self._crowd.add(model.name, [] if alone else painted, edges)
-        if not alone:
+        if element and len(shape.vertices):
+            self._edges[model.name] = outline(model, shape)
+        if self._is_large and element and model.static:
+            self._painted[model.name] = painted
             return shape
         key = safe_name(number, model.name)
         for part, item in enumerate(painted):
             self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
         if element:
             self._keys[model.name] = key
-        if edges is not None and self._crowd is None:
-            self._stage.draw((*LEFT_OUT, key), lines(edges, colors.LEFT_OUT), shadow=False)
-            self._stage.draw((*REMOVED, key), lines(edges, colors.REMOVED), shadow=False)
+        if model.name in self._edges and not self._is_large:
+            for group, color in ((LEFT_OUT, colors.LEFT_OUT), (REMOVED, colors.REMOVED)):
+                self._stage.draw((*group, key), lines(self._edges[model.name], color), shadow=False)
         return shape
 
     def _draw_ground(self) -> None:

@@ -84,9 +84,9 @@ def frustum(bottom: float, top: float, length: float) -> Surface:
     return revolved([(0.0, length / 2), high], [high, low], [low, (0.0, -length / 2)])
 
 
-def sphere(radius: float, sides: int = SIDES) -> Surface:
+def sphere(radius: float) -> Surface:
     """A sphere centred on its frame's origin."""
-    return revolved(_arc(radius, 0.0, math.pi, sides // 2), sides=sides)
+    return revolved(_arc(radius, 0.0, math.pi, SIDES // 2))
 
 
 def capsule(radius: float, length: float) -> Surface:

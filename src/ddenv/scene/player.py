@@ -33,8 +33,6 @@ from ddenv.world.scenario import Goal, Spawn
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5
-READ_EVERY = 0.1  # time between reads of the run file, s
-LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
 
 
 def rows_of(samples: array[float]) -> np.ndarray:
@@ -60,8 +58,7 @@ class Player:
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
         self._epsilon, self._timeout = scenario.failure.epsilon, scenario.failure.timeout
         self._shot: Shot | None = None
-        self._read_at = self._looked_at = self._ran_at = -math.inf
-        self._engine = False
+        self._ran_at = -math.inf
         self._live: list[Live] = []
         self._parts: tuple[tuple[str, ...], ...] = ()
         self._letters: list[Any] = []
@@ -86,7 +83,7 @@ class Player:
 
     def show(self, wanted: Wanted) -> None:
         """Shows another moment of the run, or another row of its table, from the next tick on."""
-        self._wanted, self._read_at = wanted, -math.inf
+        self._wanted = wanted
         self._position.go(wanted.at)
 
     def play(self, test: int) -> dict[str, Any]:
@@ -165,17 +162,8 @@ class Player:
 
     def tick(self, now: float) -> None:
         """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
-        if now - self._read_at >= READ_EVERY:
-            self._read_at = now
-            self._read(now)
-        self._move()
-
-    def _read(self, now: float) -> None:
-        if now - self._looked_at >= LOOK_FOR_ENGINE:
-            self._looked_at = now
-            self._engine = engine_is_alive(self._run.path)
         # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
-        self._live = self._run.live() if self._engine and self._wanted.at is None else []
+        self._live = self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
         self._position.catch_up()
         row = row_of(self._state, self._wanted)
         idle = now - self._ran_at
@@ -187,6 +175,7 @@ class Player:
         self._show_parts()
         if following != self._shot:
             self._cut(following)
+        self._move()
 
     def _cut(self, following: Shot) -> None:
         before, self._shot = self._shot, following

@@ -33,6 +33,7 @@ from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
 from ddenv.runs.programs import FIRST_PORT
 from ddenv.runs.remembered import read_state, write_state
+from ddenv.scene.player import Player
 
 # Where the scenes of runs were served last, so many of them.
 FILE, MOST = "scenes.json", 50
@@ -64,20 +65,18 @@ class Server:
         self.viewers: set[_Feed] = set()
         self.welcome: Callable[[], list[bytes]] = list
         self.caption = ""
-        # What a browser may ask for: finished tests by number, pairs of them, and the messages that draw a part of one.
-        self.play: Callable[[int], dict[str, Any]] = _nothing
-        self.pairs: Callable[[], dict[str, Any]] = dict
-        self.drawings: Callable[[str, int], list[bytes]] = lambda *_: []
+        # Answers what a browser asks for.
+        self.player: Player | None = None
         self.token = token or secrets.token_urlsafe(TOKEN_BYTES)
         self.port = 0
         routes: list[Any] = [
             (f"/{self.token}/feed", _Feed, {"server": self}),
-            (f"/{self.token}/", _Page, {"page": _PAGE.read_text()}),
+            (f"/{self.token}/", _Page, {"server": self}),
             (rf"/{self.token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
             (rf"/{self.token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
             (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
+            (rf"/alive/{name_of(self.token)}/([0-9a-f]{{32}})", _Alive, {"server": self}),
         ]
-        routes.append((rf"/alive/{name_of(self.token)}/([0-9a-f]{{32}})", _Alive, {"server": self}))
         application = tornado.web.Application(
             routes,
             default_handler_class=_Stranger,
@@ -130,52 +129,45 @@ class Server:
         await self._http.close_all_connections()
 
 
-class _Page(tornado.web.RequestHandler):
-    def initialize(self, page: str) -> None:
-        self._page = page
-
-    def get(self) -> None:
-        self.set_header("Cache-Control", "no-store")
-        self.set_header("Referrer-Policy", "no-referrer")
-        scripts = f"{_POLICY['script-src']} {of_scripts(self._page)}"
-        self.set_header("Content-Security-Policy", policy(_POLICY | {"script-src": scripts}))
-        self.finish(self._page)
-
-
-class _Alive(tornado.web.RequestHandler):
-    """Proves to a page whose scene was gone that this is its scene."""
-
+class _Handler(tornado.web.RequestHandler):
     def initialize(self, server: Server) -> None:
         self._server = server
 
-    def get(self, challenge: str) -> None:
+    def set_default_headers(self) -> None:
         self.set_header("Cache-Control", "no-store")
+
+
+class _Page(_Handler):
+    def get(self) -> None:
+        page = _PAGE.read_text()
+        self.set_header("Referrer-Policy", "no-referrer")
+        scripts = f"{_POLICY['script-src']} {of_scripts(page)}"
+        self.set_header("Content-Security-Policy", policy(_POLICY | {"script-src": scripts}))
+        self.finish(page)
+
+
+class _Alive(_Handler):
+    """Proves to a page whose scene was gone that this is its scene."""
+
+    def get(self, challenge: str) -> None:
         self.finish(proof(self._server.token, challenge, self._server.port))
 
 
-def _nothing(_: int) -> dict[str, Any]:
-    raise UserError("nothing to play")
-
-
-class _Asked(tornado.web.RequestHandler):
+class _Asked(_Handler):
     """Answers what a page asks for; reading is all that it can do."""
 
-    def initialize(self, server: Server) -> None:
-        self._server = server
-
     def get(self, what: str, number: str | None) -> None:
-        self.set_header("Cache-Control", "no-store")
-        test = int(number or 0)
+        test, player = int(number or 0), self._server.player
+        assert player is not None
         try:
             if what == "pairs":
-                self.finish(self._server.pairs())
+                self.finish(player.pairs())
             elif what == "play":
-                self.finish(self._server.play(test))
+                self.finish(player.play(test))
             else:
                 self.set_header("Content-Type", "application/octet-stream")
                 # Each message after its length in 4 bytes.
-                drawings = self._server.drawings(what, test)
-                self.finish(b"".join(len(one).to_bytes(4, "big") + one for one in drawings))
+                self.finish(b"".join(len(one).to_bytes(4, "big") + one for one in player.drawings(what, test)))
         except UserError as error:
             self.set_status(404)
             self.set_header("Content-Type", "text/plain; charset=utf-8")

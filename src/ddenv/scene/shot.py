@@ -30,14 +30,14 @@ class Shot:
 
 def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf) -> Shot:
     """What to show, `idle` s after a test was last running. Stays with the `previous` test while it runs."""
-    running = [row.test for row in live if _is_running(state, row.test)]
+    numbers = [row.test for row in live if 0 < row.test <= len(state.tests)]
+    running = [number for number in numbers if state.tests[number - 1].outcome == "running"]
+    before = previous if previous is not None and previous.kind == "live" else None
     if running:
-        stays = previous is not None and previous.kind == "live" and previous.test in running
-        number = previous.test if stays and previous is not None and previous.test else running[0]
-        return shot_of_test(state, "live", state.tests[number - 1])
-    working = state.status in ("baseline", "running")
-    if working and previous is not None and previous.kind == "live" and idle < HOLD:
-        return previous
+        number = before.test if before is not None and before.test in running else None
+        return shot_of_test(state, "live", state.tests[(number or running[0]) - 1])
+    if state.status in ("baseline", "running") and before is not None and idle < HOLD:
+        return before
     test = _to_replay(state)
     if test is None:
         return _shot(state, "start", None, frozenset(state.environment), "the robot at its start")
@@ -55,10 +55,6 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
         return _shot(state, "start", None, frozenset(row.models), f"{row.label} · not tested yet")
     kind = "live" if any(each.test == found[0].id for each in live) and running else "replay"
     return shot_of_test(state, kind, found[0], row)
-
-
-def _is_running(state: RunState, test: int) -> bool:
-    return 0 < test <= len(state.tests) and state.tests[test - 1].outcome == "running"
 
 
 def _to_replay(state: RunState) -> Test | None:

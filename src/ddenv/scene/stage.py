@@ -26,8 +26,11 @@ class Stage:
         self._send = send
         self._kept: dict[tuple[Path, str], bytes] = {}
 
-    def draw(self, path: Path, thing: Object, *, shadow: bool = True) -> None:
-        """Puts `thing` at `path`, replacing the object there."""
+    def draw(self, path: Path, thing: Object | None, *, shadow: bool = True) -> None:
+        """Puts `thing` at `path`, replacing the object there; None only deletes it."""
+        if thing is None:
+            self.delete(path)
+            return
         self._keep(path, "object", {"type": "set_object", "object": thing.lower()})
         # In the viewer a new object always casts a shadow, and properties of the old one are lost.
         self._kept.pop(((*path, DRAWN), "property castShadow"), None)

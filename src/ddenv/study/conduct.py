@@ -103,14 +103,13 @@ def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> 
     return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
 
 
-# Time between two estimates of the time left, which are slow, s.
+# Time between two estimates of the time left, which are slow, and two records of the time so far, s: a killed study loses the time
+# since the last one.
 LOOK_PERIOD = 2.0
 # To the start of the line, and clears it.
 CLEAR = "\r\x1b[K"
 # Time between two lines of progress in logs and pipes, s.
 QUIET = 60.0
-# Time between two records of the study's time so far, s: a killed study loses the time since the last one.
-WRITE_PERIOD = 10.0
 # A shorter time left is not shown, s.
 LEAST = 5.0
 
@@ -127,11 +126,10 @@ class Progress:
         self._worlds, self._jobs = worlds, jobs
         self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
         self._earlier, self._begun = sittings(folder), Sitting(time.time(), 0.0, jobs, 0, versions(), machine())
-        self._began, self._written = time.monotonic(), 0.0
+        self._began = self._next_look = time.monotonic()
+        self._next_line = self._began + QUIET
         self._cells: tuple[Work, ...] = ()
         self._reported = 0
-        self._next_look = 0.0
-        self._next_line = self._began + QUIET
         self._left: float | None = None
 
     def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
@@ -144,6 +142,7 @@ class Progress:
         now = time.monotonic()
         if now >= self._next_look:
             self._left = seconds_left(running, waiting, ended, self._worlds, self._jobs) if running else None
+            self._write()
             self._next_look = now + LOOK_PERIOD
         if self._live:
             line = self._now(running, shutil.get_terminal_size().columns - 1)
@@ -151,9 +150,6 @@ class Progress:
         elif now >= self._next_line and running:
             self._next_line = now + QUIET
             self._say(self._now(running))
-        if now > self._written + WRITE_PERIOD:
-            self._written = now
-            self._write()
 
     @property
     def _done(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import platform
 import signal
@@ -11,7 +10,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -73,7 +72,7 @@ class Sitting:
     machine: str
 
 
-_SITTINGS = TypeAdapter(tuple[Sitting, ...])
+_SITTINGS = TypeAdapter(dict[str, tuple[Sitting, ...]])
 
 
 def sittings(folder: Path) -> tuple[Sitting, ...]:
@@ -82,15 +81,14 @@ def sittings(folder: Path) -> tuple[Sitting, ...]:
     if not path.exists():
         return ()
     try:
-        return _SITTINGS.validate_python(json.loads(read_bytes(path))["sittings"])
-    except (ValueError, TypeError, KeyError, RecursionError):
+        return _SITTINGS.validate_json(read_bytes(path))["sittings"]
+    except (ValueError, KeyError):
         raise UserError(f"{path}: is damaged; delete it (the runs are not affected)") from None
 
 
 def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:
     """Writes them as a whole or not at all."""
-    text = json.dumps({"sittings": [asdict(each) for each in all_of_them]}, indent=1)
-    write_file(folder / ABOUT, text.encode())
+    write_file(folder / ABOUT, _SITTINGS.dump_json({"sittings": all_of_them}, indent=1))
 
 
 def versions() -> str:
