@@ -1,4 +1,4 @@
-"""Commands that open the workbench, here or in a browser: `ddenv open` and `serve`; and `config`, its keys and theme."""
+"""Commands that open the workbench, here or in a browser: `ddenv open` and `serve`."""
 
 from __future__ import annotations
 
@@ -68,11 +68,7 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 @click.argument("run", required=False, shell_complete=runs)
 @click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
 @click.option(
-    "--font-size",
-    type=whole(6, 72),
-    default=16,
-    show_default=True,
-    help="Of the text, in pixels; 28 for a projector.",
+    "--font-size", type=whole(6, 72), default=16, show_default=True, help="Of the text, in pixels; 28 for a projector."
 )
 @click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
 def serve_command(run: str | None, port: int, font_size: int) -> int:
@@ -80,14 +76,4 @@ def serve_command(run: str | None, port: int, font_size: int) -> int:
     from ddenv.workbench.terminal.served import serve
 
     serve(port, run, font_size)
-    return 0
-
-
-@click.command("config")
-@click.option("--example", is_flag=True, help="Print an example file with every action.")
-def config_command(example: bool) -> int:
-    """Shows the path of the file with your keys and theme, and lists all actions with their keys."""
-    from ddenv.workbench.config import example_lines, lines
-
-    print("\n".join(example_lines() if example else lines()))
     return 0

@@ -55,7 +55,7 @@ def study_command(
     jobs: int,
     folder: Path,
     trust: bool,
-    **options: Any,
+    **given: Any,
 ) -> int:
     """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
 
@@ -66,7 +66,7 @@ def study_command(
     from ddenv.study.conduct import conduct
     from ddenv.study.plan import make_plan, scenario_names
 
-    plan = make_plan(scenarios, pairs, algorithms, seeds, **options)
+    plan = make_plan(scenarios, pairs, algorithms, seeds, **given)
     for scenario, name in zip(plan.scenarios, scenario_names(scenarios), strict=True):
         check_named(scenario, name, asking(trust))
     return conduct(plan, folder, jobs, sys.stdout)
