@@ -16,3 +16,8 @@ def keys(screen: str, *rows: tuple[str, ...]) -> list[BindingType]:
         Binding(each, action, word, id=f"{screen}.{name}", tooltip=words, key_display=display[0] if display else None)
         for name, each, action, word, words, *display in rows
     ]
+
+
+def ids(screen: str, names: str) -> tuple[str, ...]:
+    """The ids of some of them, for the footer; one with a dot in it is of a pane."""
+    return tuple(name if "." in name else f"{screen}.{name}" for name in names.split())

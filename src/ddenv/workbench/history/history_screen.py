@@ -23,6 +23,7 @@ from ddenv.runfile import branches
 from ddenv.runfile.progress import Decision, Node
 from ddenv.runfile.state import RunState
 from ddenv.text import first_of, plain, shortened
+from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
@@ -41,6 +42,7 @@ ROOM = 90
 # The width of the tree in columns, without the lines of its branches.
 TREE = 15
 MARK = "marked"
+GO = "go on from this environment: the run pauses there (branch)"
 # Where the words of a decision begin, after its time.
 INDENT = 10
 HOW = {
@@ -71,20 +73,14 @@ class History(Screen[int | None]):
     CSS_PATH: ClassVar = ["history.tcss"]
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
     BINDINGS: ClassVar = [
-        Binding(
-            "enter",
-            "go",
-            "go on from here",
-            id="history.go",
-            tooltip="go on from this environment: the run pauses there (branch)",
-            priority=True,
+        Binding("enter", "go", "go on from here", id="history.go", tooltip=GO, priority=True),
+        *keys(
+            "history",
+            ("mark", "m", "mark", "mark", "mark this environment, to compare another with it"),
+            ("compare", "c", "compare", "compare", "compare the marked environment with this one"),
+            HELP,
+            ("close", "escape,h,q", "close", "close", "back to the run", "esc"),
         ),
-        Binding("m", "mark", "mark", id="history.mark", tooltip="mark this environment, to compare another with it"),
-        Binding(
-            "c", "compare", "compare", id="history.compare", tooltip="compare the marked environment with this one"
-        ),
-        Binding("question_mark,f1", "app.help", "help", id="history.help", tooltip="show every key", key_display="?"),
-        Binding("escape,h,q", "close", "close", id="history.close", tooltip="back to the run", key_display="esc"),
     ]
 
     def __init__(self, look: Callable[[], Situation], place: Place) -> None:
@@ -103,7 +99,7 @@ class History(Screen[int | None]):
             with Framed("What you decided", id="past-decisions", classes="panel"):
                 yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         yield Static("", id="about", markup=False)
-        shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
+        shown = ids("history", "go mark compare help close")
         yield KeyFooter(shown, shown)
 
     def on_mount(self) -> None:

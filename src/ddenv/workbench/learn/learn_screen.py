@@ -11,14 +11,14 @@ from textual.app import ComposeResult
 from textual.screen import Screen, ScreenResultType
 from textual.widgets import Static
 
-from ddenv.errors import UserError
 from ddenv.learn.race import Turn
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round
+from ddenv.workbench.help.bindings import ids
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.map.place import Place, place_of_run
+from ddenv.workbench.map.place import Place
+from ddenv.workbench.map.read_world import read_world
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.poll import Snapshot
 
 SMALLEST = (64, 20)
@@ -41,28 +41,20 @@ class LearnScreen(Screen[ScreenResultType]):
     def compose(self) -> ComposeResult:
         yield Static("", id=f"{self.NAME}-header", markup=False)
         yield from self.body()
-        yield KeyFooter(self._ids(self.SHOWN), self._ids(self.FIRST))
+        yield KeyFooter(ids(self.NAME, self.SHOWN), ids(self.NAME, self.FIRST))
         yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def body(self) -> ComposeResult:
         yield from ()
 
-    def _ids(self, names: str) -> list[str]:
-        return [name if "." in name else f"{self.NAME}.{name}" for name in names.split()]
-
     def read_world(self, run: Path, maps: Sequence[WorldMap]) -> None:
-        """Shows the world of a run on these maps, once it is read in a thread: what that needs takes long to load."""
+        """Shows the world of a run on these maps, once it is read."""
 
-        def read() -> None:
-            try:
-                place, notice = place_of_run(run), ""
-            except UserError as error:
-                place, notice = Place(), str(error)
+        def show(place: Place, notice: str) -> None:
             for each in maps:
-                call_if_open(self, each.set_place, place, notice)
+                each.set_place(place, notice)
 
-        # The first paint comes before.
-        self.call_after_refresh(self.run_worker, read, thread=True, group="world", exclusive=True)
+        read_world(self, run, show)
 
     def say(self, why: str) -> None:
         self.notify(why, timeout=4, markup=False)

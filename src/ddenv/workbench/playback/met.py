@@ -86,13 +86,9 @@ class Met(Widget):
         room = max(1, height - len(above))
         # The latest line stands in the middle once there are more than fit.
         first = max(0, min(self._now - room // 2 - 1, len(self._lines) - room))
-        for number in range(first, min(first + room, len(self._lines))):
-            text.append_text(self._line(number, width)).append("\n")
+        for number, line in enumerate(self._lines[first : first + room], first):
+            here = HERE if number == self._now - 1 else " "
+            head = f"{here}{line.time:6.1f} s {line.sign}{' ' if line.sign else ''}"
+            what = shortened(line.words, max(4, width - len(head)))
+            text.append(f"{head}{what}\n", "" if number < self._now else "dim")
         return text
-
-    def _line(self, number: int, width: int) -> Text:
-        line = self._lines[number]
-        here = HERE if number == self._now - 1 else " "
-        head = f"{here}{line.time:6.1f} s {line.sign}{' ' if line.sign else ''}"
-        words = shortened(line.words, max(4, width - len(head)))
-        return Text(f"{head}{words}", "" if number < self._now else "dim", no_wrap=True)
