@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ddenv.learn.attempt import Attempt
-from ddenv.learn.foretelling import Foretelling, at_hand, foretelling
+from ddenv.learn.foretelling import at_hand, foretelling
 from ddenv.learn.lesson import Answer, Block, Question, blocks
 from ddenv.learn.lesson import Step as LessonStep
 from ddenv.learn.race import Play, bet, in_one_sentence, result
@@ -224,7 +224,7 @@ class Course:
         if here.question is not None:
             self._asked = Asked(str(step), _filled(here.question, self._said))
         elif (found := self._opened.foretold[step]) is not None:
-            self._asked = _asked(str(step), found)
+            self._asked = Asked(str(step), found.question, found.until, found.reason)
         elif here.race:
             self.due, self._asked = True, Asked(str(step), bet(self._opened.racers(here)))
         elif (attempt := self.attempt) is not None:
@@ -261,7 +261,7 @@ class Course:
 
     def keep(self, attempt: Attempt) -> None:
         """After a move of the student's own search. The first search that ends counts."""
-        self.score = self.score.with_moves(str(self.step), attempt.moves)
+        self.score = replace(self.score, moves={**self.score.moves, str(self.step): attempt.moves})
         if attempt.ended:
             found = attempt.found and len(attempt.tried) <= attempt.budget
             self.score = self.score.with_answer(str(self.step), Answer("", found, ""))
@@ -301,15 +301,11 @@ class Course:
                 # What was explained a moment ago is not asked again.
                 shown = found.told if found.kind in self._explained else found
                 self._explained |= {found.kind}
-                self._asked = _asked(f"free.{id}", shown)
+                self._asked = Asked(f"free.{id}", shown.question, shown.until, shown.reason)
                 if self._opened is not None:
                     self._own = self._own or before
                 return True
         return False
-
-
-def _asked(key: str, found: Foretelling) -> Asked:
-    return Asked(key, found.question, found.until, found.reason)
 
 
 def _filled(question: Question, said: Callable[[str], str]) -> Question:

@@ -201,12 +201,6 @@ class RunTable(DataTable[Text]):
     def on_resize(self) -> None:
         self.show(self._runs, self._order)
 
-    def action_scroll_top(self) -> None:
-        self.move_cursor(row=0)
-
-    def action_scroll_bottom(self) -> None:
-        self.move_cursor(row=len(self._runs) - 1)
-
     def _arrange(self) -> None:
         """The columns that fit; the name takes the rest."""
         self.clear(columns=True)
