@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -15,9 +16,12 @@ from ddenv.cli.terminal import terminal_columns, wrapped
 from ddenv.cli.workbench import PORT
 from ddenv.doctor import Finding, is_well
 from ddenv.errors import UserError
-from ddenv.runs.folder import SUFFIX, find_run, runs_folder
+from ddenv.runs.folder import find_run, runs_folder
 from ddenv.schemas import Kind, explanation, names
 from ddenv.text import printable
+
+if TYPE_CHECKING:
+    from ddenv.workbench.runs.recent_runs import Recent
 
 TITLES: dict[Kind, str] = {
     "partitioning": "partitionings: how the environment is split",
@@ -36,36 +40,20 @@ def runs_command() -> int:
 
 
 def run_lines(folder: Path) -> list[str]:
-    """One line a run, newest first: name, status, models left, tests. A damaged file says so in its line."""
-    paths = sorted((path for path in folder.glob(f"*{SUFFIX}") if path.is_file()), key=_changed, reverse=True)
-    width = max((len(path.stem) for path in paths), default=0)
-    return [printable(f"{path.stem:<{width}}  {_line(path)}") for path in paths]
+    """One line a run, last changed first: name, status, models left, tests. A damaged file says so in its line."""
+    from ddenv.workbench.runs.recent_runs import RunsFolder
+
+    found = RunsFolder(folder).look()
+    width = max((len(run.path.stem) for run in found), default=0)
+    return [printable(f"{run.path.stem:<{width}}  {_line(run)}") for run in found]
 
 
-def _changed(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except FileNotFoundError:
-        return 0.0
-
-
-def _line(path: Path) -> str:
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.lock import engine_is_alive
-    from ddenv.runfile.store import RunFile
-
-    try:
-        with RunFile(path) as file:
-            state = fold(file.events())
-    except UserError as error:
-        return str(error)
-    status = state.status
-    if not state.ended and status != "created" and not engine_is_alive(path):
-        status = "engine not running"
-    elif status == "finished" and state.minimal:
-        status = "minimal"
-    size = f"{len(state.environment)} of {len(state.elements)} models"
-    return f"{status:<18}  {size:<20}  {state.tests_done} tests"
+def _line(run: Recent) -> str:
+    if run.trouble:
+        return run.trouble
+    status = "minimal" if run.minimal else "engine not running" if run.status == "lost" else run.status
+    size = f"{len(run.kept)} of {run.total} models"
+    return f"{status:<18}  {size:<20}  {run.tests} tests"
 
 
 @click.command("schemas")

@@ -33,7 +33,13 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     if kind == "run" and path.is_file():
         if any(reading.values()):
             raise UserError("options for reading worlds: a run keeps its own")
-        return _follow(path, watch) if lines else run_workbench(path, watch=watch)
+        if not lines:
+            return run_workbench(path, watch=watch)
+        from ddenv.workbench.lines.line_mode import LineMode, typed_lines
+
+        # Interrupted as after quit, the engine goes on.
+        LineMode(path, watch, sys.stdout).follow(typed_lines(sys.stdin))
+        return 0
     if is_folder(Path(run)):
         raise UserError(f"{run}: is a folder; expected a run, a scenario or a world")
     if kind == "run":
@@ -43,17 +49,6 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     if watch or lines:
         raise UserError(f"{'--watch' if watch else '--lines'}: only for runs")
     return run_workbench(None, reading=given_reading(reading), file=path.absolute())
-
-
-def _follow(run: Path, watch: bool) -> int:
-    from ddenv.workbench.lines.line_mode import follow_in_lines
-
-    try:
-        follow_in_lines(run, watch, sys.stdin, sys.stdout)
-    except KeyboardInterrupt:
-        # As quit: the engine goes on.
-        return 130
-    return 0
 
 
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:

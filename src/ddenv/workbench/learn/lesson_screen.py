@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.containers import Container, Vertical
+from textual.containers import Container
 from textual.widgets import Static
 
 from ddenv.errors import UserError
@@ -24,6 +24,7 @@ from ddenv.runfile.tested import told
 from ddenv.text import plain
 from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.learn_screen import LearnScreen
 from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
@@ -98,14 +99,14 @@ class LessonScreen(LearnScreen[bool]):
 
     def body(self) -> ComposeResult:
         with Container(id="lesson-body"):
-            with _panel("lesson-world", "World"):
+            with Framed("World", id="lesson-world", classes="panel"):
                 yield self._map
                 yield self._legend
-            with _panel("lesson-now", "Algorithm"):
+            with Framed("Algorithm", id="lesson-now", classes="panel"):
                 yield Happening(id="lesson-happening")
-            with _panel("lesson-variables-panel", "Variables now"):
+            with Framed("Variables now", id="lesson-variables-panel", classes="panel"):
                 yield Variables(id="lesson-variables")
-            with _panel("lesson-panel", "Lesson" if self._opened else "This run"):
+            with Framed("Lesson" if self._opened else "This run", id="lesson-panel", classes="panel"):
                 yield LessonPane()
 
     def on_mount(self) -> None:
@@ -162,10 +163,9 @@ class LessonScreen(LearnScreen[bool]):
 
     def _with_way(self, snapshot: Snapshot, test: Test) -> Snapshot:
         """With the path of the test that is told, as far as it is recorded, and the robot where it ended."""
-        ended = (
-            () if test.end_pose is None or len(test.end_pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, test.end_pose),)
-        )
-        return replace(snapshot, evidence=self._moments.path(test.id), live=ended)
+        pose = test.end_pose
+        live = () if pose is None or len(pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, pose),)
+        return replace(snapshot, evidence=self._moments.path(test.id), live=live)
 
     def _heading(self) -> Text:
         course, score = self.course, self.course.score
@@ -270,9 +270,3 @@ class LessonScreen(LearnScreen[bool]):
         """After a move: what was said before it would only hide the text."""
         self.app.clear_notifications()
         self._show()
-
-
-def _panel(id: str, title: str) -> Vertical:
-    panel = Vertical(id=id, classes="panel")
-    panel.border_title = title
-    return panel

@@ -9,7 +9,6 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.widgets import OptionList, Static
 
 from ddenv.errors import UserError
@@ -44,9 +43,7 @@ class LessonsScreen(LearnScreen[None]):
     def body(self) -> ComposeResult:
         with Framed("Lessons", id="lessons-panel", classes="panel"):
             yield OptionList(id="lessons-list")
-        with Vertical(classes="panel", id="lesson-about-panel") as panel:
-            panel.styles.height = 8
-            panel.border_title = "Its aim"
+        with Framed("Its aim", classes="panel", id="lesson-about-panel"):
             yield Static("", id="lesson-about", markup=False)
 
     def on_mount(self) -> None:

@@ -59,17 +59,9 @@ class RacerPane(Vertical):
         # As text: a name may look like markup.
         self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
         self.map.show(snapshot_of(self._base, left, turn), None if turn is None else turn.candidate)
-        self._said.update(Text("\n").join(_lines(play, turn, tests, room)))
-
-
-def _lines(play: Play, turn: Turn | None, tests: int, room: int) -> list[Text]:
-    left = play.after(tests)
-    there = frozenset(left if turn is None else turn.candidate.models)
-    return [
-        Text(truncated(_what(play, turn), room)),
-        _bar(play.begins, frozenset(left), there, room),
-        _signs(play.turns[:tests], room),
-    ]
+        there = frozenset(left if turn is None else turn.candidate.models)
+        bar, signs = _bar(play.begins, frozenset(left), there, room), _signs(play.turns[:tests], room)
+        self._said.update(Text(f"{truncated(_what(play, turn), room)}\n{bar}\n{signs}"))
 
 
 def _what(play: Play, turn: Turn | None) -> str:
@@ -79,20 +71,19 @@ def _what(play: Play, turn: Turn | None) -> str:
     return f"{turn.candidate.label}{again}: {count(turn.candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
 
 
-def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> Text:
+def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> str:
     """A cell for each model in the world's order; of more models than there is room, by their shares."""
     if len(models) <= room:
-        return Text("".join(GONE if name not in left else IN if name in there else OUT for name in models))
+        return "".join(GONE if name not in left else IN if name in there else OUT for name in models)
     kept = max(bool(left), round(room * len(left) / len(models)))
     tested = min(kept, max(bool(there & left), round(room * len(there & left) / len(models))))
-    return Text(IN * tested + OUT * (kept - tested) + GONE * (room - kept))
+    return IN * tested + OUT * (kept - tested) + GONE * (room - kept)
 
 
-def _signs(turns: tuple[Turn, ...], room: int) -> Text:
+def _signs(turns: tuple[Turn, ...], room: int) -> str:
     """How the tests ended, the last ones if there are many."""
-    cut = len(turns) > room
-    shown = turns[-(room - 1) :] if cut else turns
-    return Text(("…" if cut else "") + "".join(SIGNS.get(turn.outcome, "?") for turn in shown), no_wrap=True)
+    signs = "".join(SIGNS.get(turn.outcome, "?") for turn in turns)
+    return signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
 
 
 class RaceScreen(LearnScreen[None]):
@@ -214,15 +205,11 @@ def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
 def _table(race: Race) -> Text:
     """A line for each search: its tests so far, those that showed f, and those that did not, by kind."""
     width = min(LONGEST_NAME, max(len(play.name) for play in race.plays))
-    heads = "".join(f"{head:>{_wide(head)}}" for head in COLUMNS.values())
-    text = Text(f"{'':<{width}}{'tests':>7}{heads}", "dim", no_wrap=True)
+    heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
+    text = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
     for play in race.plays:
         spent = tally(play, race.at).spent
-        cells = "".join(f"{spent[kind] or '':>{_wide(head)}}" for kind, head in COLUMNS.items())
+        cells = "".join(f"{spent[kind] or '':>{len(head)}}" for kind, head in heads.items())
         name = shortened(plain(play.name), width)
         text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
     return text
-
-
-def _wide(head: str) -> int:
-    return len(head) + 2

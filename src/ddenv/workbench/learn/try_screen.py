@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.containers import Container, Vertical, VerticalScroll
+from textual.containers import Container, VerticalScroll
 from textual.widgets import Static
 
 from ddenv.errors import UserError
@@ -17,6 +17,7 @@ from ddenv.learn.race import BOUND, Line, Play, comparison, in_one_sentence
 from ddenv.learn.variables import SIGNS
 from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.help.bindings import HELP, keys
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Snapshot
@@ -60,8 +61,7 @@ class TryScreen(LearnScreen[None]):
 
     def body(self) -> ComposeResult:
         with Container(id="try-body"):
-            with Vertical(id="try-world", classes="panel") as world:
-                world.border_title = "World"
+            with Framed("World", id="try-world", classes="panel"):
                 yield self._map
             with VerticalScroll(id="try-tests", classes="panel", can_focus=False):
                 yield Static("", id="try-table", markup=False)
