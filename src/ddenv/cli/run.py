@@ -40,14 +40,7 @@ LONGEST_URI = 80
 @options.trust_option
 @options.json_option
 def run_command(
-    scenario: str,
-    name: str | None,
-    output: Path | None,
-    exact: bool,
-    jobs: int,
-    trust: bool,
-    as_json: bool,
-    **given: Any,
+    scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
 ) -> int:
     """Reduces SCENARIO (ditch, rubble, friction, a YAML file or an SDF world) without a screen."""
     from ddenv.cli.follow import follow_to_summary
@@ -55,7 +48,7 @@ def run_command(
     from ddenv.runs.export import export_world
     from ddenv.runs.programs import start_engine
 
-    if exact:
+    if given.pop("exact"):
         given["accept_rate"] = "exact"
     path, world = create_named(scenario, given, asking(trust), name, output, announce)
     announce_notes(world, as_json)
