@@ -49,7 +49,6 @@ PERIOD = 0.1
 # The maximum number of tests in the list of those to play beside one, and the widths of its columns.
 LISTED = 200
 NUMBER, WORDS, SEED, OUTCOME = 7, 36, 12, 16
-TITLE = " Playback"
 
 
 class Playing:
@@ -218,8 +217,11 @@ class Playback(Screen[None]):
         self.query_one("#playback-world").border_title = Text(f"World · {moves}" if first.rows else "World")
         lines = [f"test {one.test.id}: {plain(one.words)}, seed {one.test.seed}" for one in self._tests]
         if len(lines) == 2:
-            lines = [f"{ROBOTS[0]} {lines[0]}", f"{' ' * len(TITLE)} · {ROBOTS[1]} {lines[1]}"]
-        header = Text(TITLE, "bold", no_wrap=True, overflow="ellipsis").append(" · " + "\n".join(lines), "not bold")
+            lines = [f"{sign} {line}" for sign, line in zip(ROBOTS, lines, strict=True)]
+        titles = (" Playback", "         ")
+        header = Text("\n", no_wrap=True, overflow="ellipsis").join(
+            Text.assemble((title, "bold"), f" · {line}") for title, line in zip(titles, lines, strict=False)
+        )
         self.query_one("#playback-header", Static).update(header)
         self._show()
 
