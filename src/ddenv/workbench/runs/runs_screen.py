@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+from asyncio import to_thread
 from pathlib import Path
 from typing import ClassVar
 
@@ -238,35 +239,30 @@ class RunsScreen(Screen[None]):
         elif run.is_worked_on:
             self._complain("its engine is at work: open the run and stop it first")
         else:
-            self._delete(run.path)
+            self.app.run_worker(self._delete(run.path))
 
-    @work(thread=True, group="delete")
-    def _delete(self, path: Path) -> None:
+    async def _delete(self, path: Path) -> None:
         try:
-            delete_run(path)
+            await to_thread(delete_run, path)
         except UserError as error:
-            self.app.call_from_thread(self._complain, str(error))
+            self._complain(str(error))
             return
-        self.app.call_from_thread(self._deleted, path)
-
-    def _deleted(self, path: Path) -> None:
         self.notify(f"{plain(path.stem)} is deleted; u brings it back, for a week", timeout=4, markup=False)
         self._runs = [run for run in self._runs if run.path != path]
         if is_open(self):
             self._list()
 
-    @work(thread=True, group="delete")
     def action_undo(self) -> None:
+        self.app.run_worker(self._undo())
+
+    async def _undo(self) -> None:
         from ddenv.runs.folder import runs_folder
 
         try:
-            path = bring_back(runs_folder())
+            path = await to_thread(bring_back, runs_folder())
         except UserError as error:
-            self.app.call_from_thread(self._complain, str(error))
+            self._complain(str(error))
             return
-        self.app.call_from_thread(self._is_back, path)
-
-    def _is_back(self, path: Path) -> None:
         self.notify(f"{plain(path.stem)} is back", timeout=3, markup=False)
         if is_open(self):
             self._look()
