@@ -392,7 +392,7 @@ def test_a_newer_run_file_is_refused(reduced, tmp_path):
 def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
     from types import SimpleNamespace
 
-    from ddenv.cli.run_command import announce_notes
+    from ddenv.cli.run import announce_notes
 
     announce_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
     assert capsys.readouterr().out.startswith(words)

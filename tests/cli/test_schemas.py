@@ -9,7 +9,8 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from ddenv import schemas
-from ddenv.cli.schemas_command import lines, report
+from ddenv.cli.lists import schemas_lines as lines
+from ddenv.cli.lists import schemas_report as report
 from ddenv.text import width
 from tests.waiting import PATIENCE
 

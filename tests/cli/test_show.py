@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from ddenv.cli.world_show import terminal_map
+from ddenv.cli.world_map import terminal_map
 from ddenv.text import width
 from ddenv.world.load import SDF
 from ddenv.world.sdf.read import read_world

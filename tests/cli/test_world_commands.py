@@ -5,7 +5,8 @@ import re
 
 import pytest
 
-from ddenv.cli.world_check import lines, report
+from ddenv.cli.world import world_lines as lines
+from ddenv.cli.world import world_report as report
 from ddenv.text import width
 from ddenv.world.sdf.read import parse_world
 from tests.command import ddenv, in_process

@@ -1,6 +1,7 @@
 """A student's own search: its verdict is that of the oracle, its moves are kept, and a comparison says what it was worth."""
 
 import math
+from dataclasses import asdict
 from itertools import combinations
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from ddenv.errors import UserError
 from ddenv.learn.attempt import Attempt
 from ddenv.learn.race import bound, comparison, in_one_sentence
-from ddenv.learn.score import Score, data_of, score_of, summary
+from ddenv.learn.score import Score, score_of, summary
 from tests.learn.lessons import course, opened
 
 ORACLE, PLAYS = opened(0).oracle, tuple(opened(0).plays.values())
@@ -58,7 +59,7 @@ def test_a_verdict_is_what_the_robot_does_in_every_part(moves):
 @given(PLACES)
 def test_a_search_goes_on_where_it_was_left(moves):
     attempt = tried(moves)
-    score = score_of(data_of(Score().with_moves("3", attempt.moves)))
+    score = score_of(asdict(Score(moves={"3": attempt.moves})))
     again = Attempt(ORACLE, 20, score.moves["3"])
     assert (again.held, again.tried, again.ended) == (attempt.held, attempt.tried, True)
 

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import zipfile
+from dataclasses import asdict
 
 import pytest
 from docs.lessons import delivery, quay, toys
@@ -12,7 +13,7 @@ from ddenv.evidence.rates import wilson_interval
 from ddenv.learn.attempt import read_oracle
 from ddenv.learn.handout import handout
 from ddenv.learn.lesson import Answer
-from ddenv.learn.score import Score, data_of, score_of, summary
+from ddenv.learn.score import Score, score_of, summary
 from ddenv.learn.shelf import LESSONS
 from ddenv.page.html import html
 from ddenv.runfile.position import position_in
@@ -109,7 +110,7 @@ def test_answers_are_kept_and_count_once():
         walk.go_on()
     question = walk.page.question
     walk.answer((question.right + 1) % len(question.answers))
-    again = course(0, score_of(data_of(walk.score)))
+    again = course(0, score_of(asdict(walk.score)))
     assert again.step == walk.step
     again.answer(question.right)
     assert again.score.right == 0 and len(again.score.answered) == 1

@@ -25,7 +25,7 @@ from ddenv.runs.tests_left import remaining
 from ddenv.words.explain import explain
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import read_config
-from ddenv.workbench.export.export_dialog import Wanted, suggested, write
+from ddenv.workbench.export.export_dialog import suggested, write
 from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.run_screen import RunScreen
@@ -366,4 +366,4 @@ def test_models_that_the_world_does_not_have_are_told(runs, tmp_path):
     run.reduce(1, run.elements[6:], run.similar(1))
     run.close()
     with pytest.raises(UserError, match="damaged run file"):
-        list(write(run.path, Wanted(tmp_path / "world.sdf", None, None)))
+        list(write(run.path, {"world": tmp_path / "world.sdf"}))

@@ -15,7 +15,7 @@ from ddenv.text import about, duration, percent, plain, truncated
 from ddenv.words.signs import brief, metres
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.map.picture import strip
-from ddenv.workbench.runs.recent_runs import recent_runs
+from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.processes import last_line
 from ddenv.world.sdf.read import parse_world
@@ -129,11 +129,11 @@ def test_recent_runs_say_how_they_stand(runs):
     fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
     fake_moments.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
     (runs / "c.ddenv").write_text("no run")
-    told = {run.path.stem: run for run in recent_runs(runs)}
+    told = {run.path.stem: run for run in RunsFolder(runs).look()}
     assert told["a"].words == "2/11 finished"
     assert told["b"].words == "6/11 engine is gone"
     assert told["c"].trouble
-    assert recent_runs(runs / "nowhere") == []
+    assert RunsFolder(runs / "nowhere").look() == []
 
 
 def test_the_last_line_of_a_log(tmp_path):

@@ -18,16 +18,16 @@ import click
 from click.shell_completion import CompletionItem
 
 from ddenv import __version__
-from ddenv.cli.doctor_command import doctor_command
-from ddenv.cli.learn_command import learn_command
+from ddenv.cli.explain import isolate_command, why_command
+from ddenv.cli.learn import learn_command
+from ddenv.cli.lists import config_command, doctor_command, runs_command, schemas_command
 from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
-from ddenv.cli.result_command import export_command, report_command, runs_command, why_command
-from ddenv.cli.run_command import certify_command, isolate_command, resume_command, run_command
-from ddenv.cli.schemas_command import schemas_command
-from ddenv.cli.study_command import study_command
-from ddenv.cli.test_command import CANNOT_SAY, reproduce_command, test_command
-from ddenv.cli.workbench_command import config_command, open_command, serve_command
-from ddenv.cli.world_command import world_group
+from ddenv.cli.run import certify_command, resume_command, run_command
+from ddenv.cli.share import CANNOT_SAY, export_command, report_command, reproduce_command
+from ddenv.cli.study import study_command
+from ddenv.cli.test import test_command
+from ddenv.cli.workbench import open_command, serve_command
+from ddenv.cli.world import world_group
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.text import printable
@@ -85,16 +85,6 @@ def app(context: click.Context, /, **reading: Any) -> None:
         raise UserError(f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ...")
 
 
-def _cannot_print(error: OSError) -> int:
-    """Handles output that nobody reads any more (as with `| head`), or a full disk."""
-    # Otherwise Python tries to write the rest again at exit.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    if isinstance(error, BrokenPipeError):
-        return 1
-    print(f"ddenv: cannot print: {error.strerror}", file=sys.stderr)
-    return 2
-
-
 for command in (
     run_command,
     resume_command,
@@ -116,15 +106,6 @@ for command in (
     world_group,
 ):
     app.add_command(command)
-
-
-def _said(error: click.ClickException) -> str:
-    """What is wrong, with options that are really like a mistyped one: their dashes alone make short ones alike."""
-    if isinstance(error, click.NoSuchOption) and error.possibilities:
-        word = error.option_name.lstrip("-")
-        like = [each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])]
-        error = click.NoSuchOption(error.option_name, possibilities=like)
-    return error.format_message().rstrip(".")
 
 
 def main() -> None:
@@ -155,10 +136,19 @@ def _told(error: Exception, all_of_it: bool) -> int:
         print(error.format_message(), file=sys.stderr)
     elif isinstance(error, click.ClickException):
         context = error.ctx if isinstance(error, click.UsageError) else None
+        if isinstance(error, click.NoSuchOption) and error.possibilities:
+            # Only those that are really like a mistyped one: their dashes alone make short ones alike.
+            word = error.option_name.lstrip("-")
+            like = [each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])]
+            error = click.NoSuchOption(error.option_name, possibilities=like)
         command = "ddenv" if context is None else context.command_path
-        print(printable(f"ddenv: {_said(error)}; see '{command} --help'"), file=sys.stderr)
+        print(printable(f"ddenv: {error.format_message().rstrip('.')}; see '{command} --help'"), file=sys.stderr)
     elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
-        return _cannot_print(error)
+        # Nobody reads the output any more (as with `| head`), or a disk is full. Else Python tries to write the rest at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            return 1
+        print(f"ddenv: cannot print: {error.strerror}", file=sys.stderr)
     elif all_of_it:
         traceback.print_exception(error)
     else:

@@ -109,8 +109,12 @@ def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) ->
     return together(*map(_option, chosen))
 
 
+def _sentence(one: Setting) -> str:
+    return f"{one.summary[:1].upper()}{one.summary[1:]}"
+
+
 def _option(one: Setting) -> Option:
-    words = f"{one.summary[:1].upper()}{one.summary[1:]}"
+    words = _sentence(one)
     if one.none:
         words += "; 0: no limit"
     if one.kind is bool:
@@ -127,12 +131,9 @@ def jobs_option(what: str = "Tests") -> Option:
     return click.option("--jobs", type=Number(JOBS), default=processor.usable_cores(), show_default=True, help=words)
 
 
-def cluster_option() -> Option:
-    """Where the tests of a run that is there are made from now on."""
-    one = SETTINGS["cluster"]
-    words = f"{one.summary[:1].upper()}{one.summary[1:]}; as before if not given."
-    return click.option(one.option, help=words)
-
+# Where the tests of a run that is there are made from now on.
+_CLUSTER = SETTINGS["cluster"]
+cluster_option = click.option(_CLUSTER.option, help=f"{_sentence(_CLUSTER)}; as before if not given.")
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 

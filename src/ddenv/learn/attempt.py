@@ -153,7 +153,7 @@ class Attempt:
         self.tried.append(Tried(names, tuple(name for name in self.held if name not in there), outcome))
         if outcome == "similar":
             self._chain.append(names)
-        self._did(" ".join(("test", *names)))
+        self.moves += (" ".join(("test", *names)),)
         return outcome
 
     def back(self) -> None:
@@ -161,16 +161,13 @@ class Attempt:
         if self.ended or len(self._chain) == 1:
             raise UserError("this search is over" if self.ended else "all models are there already")
         self._chain.pop()
-        self._did("back")
+        self.moves += ("back",)
 
     def end(self) -> None:
         """The student says that no single model can go."""
         if not self.ended:
             self.ended = True
-            self._did("end")
-
-    def _did(self, move: str) -> None:
-        self.moves = (*self.moves, move)
+            self.moves += ("end",)
 
     def _make(self, move: str) -> None:
         what, _, names = move.partition(" ")
@@ -195,11 +192,8 @@ class Attempt:
         smaller = smallest if len(smallest) < len(self.held) else ()
         known = of_all_parts(self.held, self.oracle.could_go(self.held), smaller)
         said = f"{known[:1].upper()}{known[1:]}."
-        shown = sum(self._was_left_out(name) for name in self.held)
+        tested = [frozenset(each.kept) for each in self.tried]
+        shown = sum(frozenset(self.held) - {name} in tested for name in self.held)
         if not self.found or shown == len(self.held):
             return said
         return f"{said} Your own tests {f'show it for {shown} of them' if shown else 'do not show it'}."
-
-    def _was_left_out(self, name: str) -> bool:
-        rest = frozenset(self.held) - {name}
-        return any(rest == frozenset(each.kept) for each in self.tried)

@@ -80,7 +80,9 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     if not isinstance(moment.recorded.event, TestStarted) or not 0 < number <= len(position.end.tests):
         return None
     test, candidate = position.end.tests[number - 1], pointed(moment)
-    until = next((id for id in position.ids if id > moment.recorded.id and _ends(position, id, number)), None)
+    later = (position.moment(id) for id in position.ids if id > moment.recorded.id)
+    ended = (each.recorded for each in later if each is not None and isinstance(each.recorded.event, TestFinished))
+    until = next((each.id for each in ended if each.data["test"] == number), None)
     if test.outcome not in SAID or candidate is None or until is None:
         return None
     answers = tuple(Answer(words, outcome == test.outcome, _seen(test)) for outcome, words in SAID.items())
@@ -89,16 +91,9 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     return Foretelling(Question(what, answers, _hint(candidate)), until, reason, test.outcome)
 
 
-def _ends(position: Position, id: int, test: int) -> bool:
-    moment = position.moment(id)
-    event = None if moment is None else moment.recorded.event
-    return isinstance(event, TestFinished) and event.test == test
-
-
 def _what(candidate: Candidate) -> str:
-    if candidate.kind == "partition":
-        return f"{candidate.label} alone: {_named(candidate.models)}"
-    return f"E {candidate.label}: {_named(candidate.models)}"
+    what = f"{candidate.label} alone" if candidate.kind == "partition" else f"E {candidate.label}"
+    return f"{what}: {_named(candidate.models)}"
 
 
 def _named(models: tuple[str, ...]) -> str:
@@ -125,20 +120,22 @@ def _seen(test: Test) -> str:
 # Who wins a round.
 
 
-def _chapter(position: Position, moment: Moment) -> tuple[Chapter, Round] | None:
+def _round(position: Position, number: int) -> Chapter | None:
+    return next((each for each in position.chapters if (each.kind, each.number) == ("round", number)), None)
+
+
+def _begun(position: Position, moment: Moment) -> tuple[Chapter, Round] | None:
     """The round that begins at a moment, as it was at its end."""
     started = moment.after.round
-    if started is None:
+    found = None if started is None else _round(position, started.number)
+    ended = None if found is None else position.state(found.last).round
+    if found is None or ended is None or ended.number != found.number:
         return None
-    found = next((each for each in position.chapters if each.kind == "round" and each.number == started.number), None)
-    state = None if found is None else position.state(found.last)
-    if found is None or state is None or state.round is None or state.round.number != started.number:
-        return None
-    return found, state.round
+    return found, ended
 
 
 def _winner(position: Position, moment: Moment) -> Foretelling | None:
-    found = _chapter(position, moment)
+    found = _begun(position, moment)
     if found is None or not isinstance(moment.recorded.event, RoundStarted):
         return None
     chapter, round = found
@@ -184,13 +181,11 @@ def _name(one: Candidate) -> str:
 
 
 def _parts(position: Position, moment: Moment) -> Foretelling | None:
-    found = _chapter(position, moment)
+    found = _begun(position, moment)
     if found is None or settings(moment.after).algorithm != "ddenv":
         return None
     _, round = found
-    following = next(
-        (each for each in position.chapters if each.kind == "round" and each.number == round.number + 1), None
-    )
+    following = _round(position, round.number + 1)
     after = None if following is None else position.state(following.first).round
     if following is None or after is None or not _is_regular(round, after):
         return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ddenv.learn.attempt import Attempt
-from ddenv.learn.foretelling import Foretelling, at_hand, foretelling
+from ddenv.learn.foretelling import at_hand, foretelling
 from ddenv.learn.lesson import Answer, Block, Question, blocks
 from ddenv.learn.lesson import Step as LessonStep
 from ddenv.learn.race import Play, bet, in_one_sentence, result
@@ -74,6 +74,7 @@ class Course:
 
     def __init__(self, position: Position, opened: Opened | None = None, score: Score | None = None) -> None:
         self.position, self._opened = position, opened
+        self._steps = () if opened is None else opened.lesson.steps
         self.score = score or Score()
         self.step = 0
         self._asked: Asked | None = None
@@ -97,7 +98,7 @@ class Course:
     @property
     def last(self) -> int:
         """The number of the last step: after all of the lesson's own comes the summary."""
-        return 0 if self._opened is None else len(self._opened.lesson.steps)
+        return len(self._steps)
 
     @property
     def page(self) -> Page:
@@ -116,10 +117,8 @@ class Course:
 
     def _searches(self) -> Iterator[str]:
         """What came of the student's own searches, in sentences."""
-        if self._opened is None:
-            return
-        for number, step in enumerate(self._opened.lesson.steps):
-            attempt = self._opened.attempt(step, self.score.moves.get(str(number), ()))
+        for number in range(self.last):
+            attempt = self._attempt(number)
             if attempt is not None and attempt.ended:
                 yield f"Your own search: {in_one_sentence(attempt.oracle, self.plays, attempt)}"
 
@@ -219,12 +218,12 @@ class Course:
         self.score = self.score.at(step, self.last)
         if self._opened is None or step == self.last:
             return
-        here = self._opened.lesson.steps[step]
+        here = self._steps[step]
         self.position.go(self._opened.places[step])
         if here.question is not None:
             self._asked = Asked(str(step), _filled(here.question, self._said))
         elif (found := self._opened.foretold[step]) is not None:
-            self._asked = _asked(str(step), found)
+            self._asked = Asked(str(step), found.question, found.until, found.reason)
         elif here.race:
             self.due, self._asked = True, Asked(str(step), bet(self._opened.racers(here)))
         elif (attempt := self.attempt) is not None:
@@ -235,7 +234,7 @@ class Course:
     @property
     def here(self) -> LessonStep | None:
         """The step of the lesson; None at the end, or in a free walk."""
-        return None if self._opened is None or self.step == self.last else self._opened.lesson.steps[self.step]
+        return self._steps[self.step] if self.step < self.last else None
 
     @property
     def activity(self) -> Activity | None:
@@ -246,22 +245,24 @@ class Course:
     @property
     def attempt(self) -> Attempt | None:
         """The student's own search in this step, where it was left."""
-        if self._opened is None or self.here is None:
-            return None
-        return self._opened.attempt(self.here, self.score.moves.get(str(self.step), ()))
+        return None if self.here is None else self._attempt(self.step)
+
+    def _attempt(self, number: int) -> Attempt | None:
+        moves = self.score.moves.get(str(number), ())
+        return None if self._opened is None else self._opened.attempt(self._steps[number], moves)
 
     @property
     def plays(self) -> tuple[Play, ...]:
         """The searches that the student's own is compared with: none that races later, before the student's bet on that race."""
         if self._opened is None:
             return ()
-        steps = list(enumerate(self._opened.lesson.steps))[self.step :]
+        steps = list(enumerate(self._steps))[self.step :]
         secret = {name for number, step in steps if str(number) not in self.score.answered for name in step.race}
         return tuple(play for name, play in self._opened.plays.items() if name not in secret)
 
     def keep(self, attempt: Attempt) -> None:
         """After a move of the student's own search. The first search that ends counts."""
-        self.score = self.score.with_moves(str(self.step), attempt.moves)
+        self.score = replace(self.score, moves={**self.score.moves, str(self.step): attempt.moves})
         if attempt.ended:
             found = attempt.found and len(attempt.tried) <= attempt.budget
             self.score = self.score.with_answer(str(self.step), Answer("", found, ""))
@@ -301,15 +302,11 @@ class Course:
                 # What was explained a moment ago is not asked again.
                 shown = found.told if found.kind in self._explained else found
                 self._explained |= {found.kind}
-                self._asked = _asked(f"free.{id}", shown)
+                self._asked = Asked(f"free.{id}", shown.question, shown.until, shown.reason)
                 if self._opened is not None:
                     self._own = self._own or before
                 return True
         return False
-
-
-def _asked(key: str, found: Foretelling) -> Asked:
-    return Asked(key, found.question, found.until, found.reason)
 
 
 def _filled(question: Question, said: Callable[[str], str]) -> Question:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -159,33 +160,29 @@ class Tally:
 
 def tally(play: Play, tests: int | None = None) -> Tally:
     """What the tests of a search were good for; the first so many `tests`, or all."""
-    sizes = [(turn, len(before) - len(turn.left)) for before, turn in _steps(play)[:tests]]
-    spent = {kind: sum(is_one(turn) for turn, _ in sizes) for kind, is_one in KINDS.items()}
-    return Tally(spent, tuple(gone for turn, gone in sizes if turn.outcome == "similar" and gone > 0))
+    turns = play.turns[:tests]
+    lefts = (play.begins, *(turn.left for turn in turns))
+    gone = [len(before) - len(after) for before, after in pairwise(lefts)]
+    steps = (size for size, turn in zip(gone, turns, strict=True) if turn.outcome == "similar" and size > 0)
+    return Tally(dict.fromkeys(KINDS, 0) | Counter(map(kind_of, turns)), tuple(steps))
 
 
-def _steps(play: Play) -> list[tuple[tuple[str, ...], Turn]]:
-    lefts = (play.begins, *(turn.left for turn in play.turns))
-    return [(before, turn) for (before, _), turn in zip(pairwise(lefts), play.turns, strict=True)]
+def kind_of(turn: Turn) -> str:
+    """What a test was good for: one of `KINDS`."""
+    if turn.outcome == "similar":
+        return "f showed"
+    if turn.outcome in BROKEN:
+        return "broke"
+    if turn.again:
+        return "again"
+    if not isinstance(turn.candidate, Candidate):
+        return "by hand"
+    return "part without f" if turn.candidate.kind == "partition" else "rest without f"
 
 
-def _missed(turn: Turn, kind: str) -> bool:
-    of_kind = isinstance(turn.candidate, Candidate) and turn.candidate.kind == kind
-    return of_kind and not turn.again and turn.outcome != "similar" and turn.outcome not in BROKEN
-
-
-# Each test is of one kind.
-KINDS: dict[str, Callable[[Turn], bool]] = {
-    "f showed": lambda turn: turn.outcome == "similar",
-    "part without f": lambda turn: _missed(turn, "partition"),
-    "rest without f": lambda turn: _missed(turn, "complement"),
-    "again": lambda turn: turn.again and turn.outcome != "similar" and turn.outcome not in BROKEN,
-    "broke": lambda turn: turn.outcome in BROKEN,
-    "by hand": lambda turn: (
-        not turn.again and not isinstance(turn.candidate, Candidate) and turn.outcome not in ("similar", *BROKEN)
-    ),
-}
-_WITHOUT_F = {
+# What a test was good for, with what a search did in those without f.
+KINDS = {
+    "f showed": "",
     "part without f": "tested a part alone and did not see f",
     "rest without f": "left out a part and lost f",
     "again": "repeated a test and did not see f",
@@ -230,15 +227,11 @@ def result(plays: Sequence[Play]) -> tuple[str, ...]:
     if len(ended) < 2:
         return (*said, "So there is no winner.")
     first, last = ended[0], ended[-1]
-    best = [play.name for play in ended if play.tests == first.tests]
     if first.tests == last.tests:
         return (*said, f"All needed {count(first.tests, 'test')}.", *_ends(ended))
-    return (
-        *said,
-        f"{_and(best)} needed the fewest tests: {first.tests}. {last.name} needed the most: {last.tests}.",
-        why(first, last),
-        *_ends(ended),
-    )
+    best = _and([play.name for play in ended if play.tests == first.tests])
+    said.append(f"{best} needed the fewest tests: {first.tests}. {last.name} needed the most: {last.tests}.")
+    return (*said, why(first, last), *_ends(ended))
 
 
 def why(first: Play, last: Play) -> str:
@@ -247,7 +240,7 @@ def why(first: Play, last: Play) -> str:
     most = max(KINDS, key=lambda kind: slow.spent[kind] - quick.spent[kind])
     if most != "f showed":
         fewer = f"only {count(quick.spent[most], 'time')}" if quick.spent[most] else "never"
-        return f"{last.name} {_WITHOUT_F[most]} {count(slow.spent[most], 'time')}, {first.name} {fewer}."
+        return f"{last.name} {KINDS[most]} {count(slow.spent[most], 'time')}, {first.name} {fewer}."
     return f"{first.name} got there in {_in_steps(quick)}, {last.name} in {_in_steps(slow)}."
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from ddenv.runfile.events import (
     CandidateJudged,
     CertificateFinished,
     EngineStarted,
+    Event,
     Implied,
     RateLost,
     TestFinished,
@@ -45,10 +45,10 @@ _WORDS = re.compile(rf"({'|'.join(ALONE)})|({'|'.join(COUNTED)}) (\d{{1,6}})")
 
 
 # Says which event of a run the words of a lesson name, such as `Places.event`. Raises UserError for other words.
-Event = Callable[[str], int]
+Find = Callable[[str], int]
 
 
-def read_lesson(file: Path, places: Callable[[Path], Event]) -> Lesson:
+def read_lesson(file: Path, places: Callable[[Path], Find]) -> Lesson:
     """The lesson in `file`; `places` opens its run. Raises UserError: file, line, key, what is wrong."""
     content = read_bytes(file)
     if len(content) > LONGEST:
@@ -172,7 +172,7 @@ def _beside(node: _Node) -> Path:
     return path
 
 
-def _step(node: _Node, event: Event, has_oracle: bool) -> Step:
+def _step(node: _Node, find: Find, has_oracle: bool) -> Step:
     keys = node.keys(_STEP, "text")
     at = keys.get("at")
     if len(does := [key for key in _DOES if key in keys]) > 1:
@@ -193,7 +193,7 @@ def _step(node: _Node, event: Event, has_oracle: bool) -> Step:
             raise at.wrong(f"to foretell the {foretell} it must be a {wanted}")
     return Step(
         keys["text"].words(),
-        None if at is None else int(at.tried(lambda: event(at.raw()))),
+        None if at is None else int(at.tried(lambda: find(at.raw()))),
         _question(node, keys) if "ask" in keys else None,
         foretell,
         keys["try"].keys(("budget",), "budget")["budget"].whole() if "try" in keys else None,
@@ -239,14 +239,42 @@ class Places:
 
     def __init__(self, position: Position, events: Sequence[Recorded]) -> None:
         """`events` are all of those that the position was made of."""
-        found = _of_events(events)
+        self._found: dict[tuple[str, int], int] = {}
+        self._ended = 0
+        for recorded in events:
+            self._note(recorded.event, recorded.id)
         for chapter in position.chapters:
             if chapter.kind != "baseline":
-                found[chapter.kind, chapter.number] = chapter.first
+                self._found[chapter.kind, chapter.number] = chapter.first
         for number, id in enumerate(position.stops("reduction"), 1):
-            found["reduction", number] = id
-        found["end", 0] = position.end.revision
-        self._found = found
+            self._found["reduction", number] = id
+        self._found["end", 0] = position.end.revision
+
+    def _note(self, event: Event, id: int) -> None:
+        """The places that an event makes by itself."""
+        found = self._found
+        match event:
+            case EngineStarted():
+                found.setdefault(("start", 0), id)
+            case BaselineFinished():
+                found["baseline", 0] = id
+            case TestStarted(test):
+                found["test", test] = id
+            case TestFinished(test) | Implied(test):
+                self._ended = test
+                found["result", test] = id
+                # One that follows from another test never started.
+                found.setdefault(("test", test), id)
+            case CandidateJudged():
+                # A later candidate may be judged at once, by what is known.
+                found.setdefault(("verdict", self._ended), id)
+            case CertificateFinished():
+                found["claims", self._most("claims") + 1] = id
+            case RateLost():
+                found["back", self._most("back") + 1] = id
+
+    def _most(self, word: str) -> int:
+        return max((number for kind, number in self._found if kind == word), default=0)
 
     def event(self, words: str) -> int:
         """The event that `words` name. Raises UserError."""
@@ -255,36 +283,6 @@ class Places:
             raise UserError(f"'{words[:40]}' is no place in a run; {EXPECTED}")
         key = (found[1], 0) if found[1] else (found[2], int(found[3]))
         if key not in self._found:
-            most = max((number for kind, number in self._found if kind == key[0]), default=0)
+            most = self._most(key[0])
             raise UserError(f"the run has no {words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}")
         return self._found[key]
-
-
-def _of_events(events: Sequence[Recorded]) -> dict[tuple[str, int], int]:
-    """The places that an event makes by itself."""
-    found: dict[tuple[str, int], int] = {}
-    numbers: Counter[str] = Counter()
-    ended = 0
-    for recorded in events:
-        id = recorded.id
-        match recorded.event:
-            case EngineStarted():
-                found.setdefault(("start", 0), id)
-            case BaselineFinished():
-                found["baseline", 0] = id
-            case TestStarted(test):
-                found["test", test] = id
-            case TestFinished(test):
-                ended = test
-                found["result", test] = id
-            case Implied(test):
-                ended = test
-                found["test", test] = found["result", test] = id
-            case CandidateJudged():
-                # A later candidate may be judged at once, by what is known.
-                found.setdefault(("verdict", ended), id)
-            case CertificateFinished() | RateLost() as event:
-                word = "back" if isinstance(event, RateLost) else "claims"
-                numbers[word] += 1
-                found[word, numbers[word]] = id
-    return found

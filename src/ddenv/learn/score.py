@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer
@@ -37,29 +38,13 @@ class Score:
         if key in self.answered:
             return self
         streak = self.streak + 1 if answer.right else 0
-        beliefs = dict(self.misconceptions)
-        if answer.misconception:
-            beliefs[answer.misconception] = beliefs.get(answer.misconception, 0) + 1
-        return replace(
-            self,
-            answered={**self.answered, key: answer.right},
-            streak=streak,
-            best=max(self.best, streak),
-            misconceptions=beliefs,
-        )
-
-    def with_moves(self, key: str, moves: tuple[str, ...]) -> Score:
-        """After moves of the student's own search."""
-        return replace(self, moves={**self.moves, key: moves})
+        beliefs = dict(Counter(self.misconceptions) + Counter([answer.misconception] if answer.misconception else ()))
+        answered = {**self.answered, key: answer.right}
+        return replace(self, answered=answered, streak=streak, best=max(self.best, streak), misconceptions=beliefs)
 
     def at(self, step: int, last: int) -> Score:
         """At a step of a lesson whose last step is `last`."""
         return replace(self, step=step, done=self.done or step >= last)
-
-
-def data_of(score: Score) -> dict[str, Any]:
-    """As JSON."""
-    return asdict(score)
 
 
 def score_of(data: Any) -> Score:

@@ -49,10 +49,9 @@ def test_what_a_node_is_has_a_sign_and_words(run):
 
 def test_two_environments_are_compared_by_name(run):
     state = fold(fake_moments.guided(run).file.events())
-    found = compare(state.nodes[2], state.nodes[3])
-    assert found.only_first == ("crate_05",)
-    assert found.only_second == ("crate_02", "crate_03")
-    assert found.common == ("crate_00", "crate_01", "crate_04")
+    common, *alone = compare(state.nodes[2], state.nodes[3])
+    assert common == ("crate_00", "crate_01", "crate_04")
+    assert alone == [("crate_05",), ("crate_02", "crate_03")]
 
 
 def cells(session):

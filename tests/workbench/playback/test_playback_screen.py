@@ -11,9 +11,8 @@ from textual.widgets import OptionList
 
 from ddenv.map.raster import ARROWS, HOLLOW
 from ddenv.workbench.playback import playback_screen
-from ddenv.workbench.playback.beside_dialog import others
 from ddenv.workbench.playback.met import Met
-from ddenv.workbench.playback.playback_screen import SPEEDS, Playback, Playing
+from ddenv.workbench.playback.playback_screen import SPEEDS, Playback, Playing, others
 from ddenv.workbench.playback.timeline import NOW, Timeline
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.why.why_screen import WhyScreen

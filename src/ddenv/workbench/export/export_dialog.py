@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,7 +15,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
-from ddenv.text import count, plain
+from ddenv.text import count, first_of, plain, shortened
+from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
@@ -31,13 +31,8 @@ KINDS = (
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """The files to write; None for one that is not wanted. A scenario needs a world."""
-
-    world: Path | None
-    scenario: Path | None
-    report: Path | None
+# The files to write, by the ids of `KINDS`.
+Wanted = Mapping[str, Path]
 
 
 class Tick(Checkbox):
@@ -55,9 +50,12 @@ class ExportScreen(ModalScreen[None]):
     AUTO_FOCUS = "#export-write"
     BINDINGS: ClassVar = [
         Binding("ctrl+s", "write", "write", id="export.write", tooltip="write the chosen files", priority=True),
-        Binding("escape", "dismiss", "close", id="export.close", tooltip="close this dialog"),
-        Binding("up", "app.focus_previous", show=False, id="export.previous", tooltip="the field before"),
-        Binding("down", "app.focus_next", show=False, id="export.next", tooltip="the next field"),
+        *keys(
+            "export",
+            ("close", "escape", "dismiss", "close", "close this dialog"),
+            ("previous", "up", "app.focus_previous", "", "the field before"),
+            ("next", "down", "app.focus_next", "", "the next field"),
+        ),
     ]
 
     def __init__(self, run: Path) -> None:
@@ -90,11 +88,7 @@ class ExportScreen(ModalScreen[None]):
 
     @work(thread=True, group="look")
     def _look(self) -> None:
-        words = what_is_left(self._file)
-        call_if_open(self, self._show_left, words)
-
-    def _show_left(self, words: str) -> None:
-        self.query_one("#export-left", Static).update(words)
+        call_if_open(self, self.query_one("#export-left", Static).update, what_is_left(self._file))
 
     @on(Checkbox.Changed)
     def _chosen(self, event: Checkbox.Changed) -> None:
@@ -106,23 +100,17 @@ class ExportScreen(ModalScreen[None]):
             self.query_one("#export-scenario", Checkbox).value = False
 
     @on(Input.Changed)
-    def _typed(self) -> None:
-        self._forget()
-
     def _forget(self) -> None:
         """Asks again before other files are replaced."""
         self._agreed = frozenset()
         self.query_one("#export-write", Button).label = "Write"
 
-    @on(Input.Submitted)
-    @on(Button.Pressed, "#export-write")
-    def _submitted(self) -> None:
-        self.action_write()
-
     @on(Button.Pressed, "#export-close")
     def _close_pressed(self) -> None:
         self.dismiss()
 
+    @on(Input.Submitted)
+    @on(Button.Pressed, "#export-write")
     def action_write(self) -> None:
         if self._busy:
             return
@@ -138,14 +126,15 @@ class ExportScreen(ModalScreen[None]):
     def _wanted(self) -> Wanted:
         """Raises UserError for names that cannot be used."""
         folder = _home(Path(self._value("folder") or "."))
-        files = [self._path(folder, id, title, endings) for id, title, endings in KINDS]
-        if not any(files):
+        wanted = {id: self._path(folder, id, title, endings) for id, title, endings in KINDS if self._ticked(id)}
+        if not wanted:
             raise UserError("nothing is chosen: tick what to write (space)")
-        return Wanted(*files)
+        return wanted
 
-    def _path(self, folder: Path, id: str, title: str, endings: tuple[str, ...]) -> Path | None:
-        if not self.query_one(f"#export-{id}", Checkbox).value:
-            return None
+    def _ticked(self, id: str) -> bool:
+        return self.query_one(f"#export-{id}", Checkbox).value
+
+    def _path(self, folder: Path, id: str, title: str, endings: tuple[str, ...]) -> Path:
         name = self._value(f"{id}-name")
         if not name or not f"{folder}{name}".isprintable():
             raise UserError(f"{title}: give a name that ends in {endings[0]}")
@@ -175,10 +164,9 @@ class ExportScreen(ModalScreen[None]):
 
     def _ask(self, there: list[Path]) -> None:
         self._busy, self._agreed = False, frozenset(there)
-        names = ", ".join(plain(path.name) for path in there[:MOST_NAMED])
-        more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
+        names = first_of([plain(path.name) for path in there], MOST_NAMED)
         verb = "exists" if len(there) == 1 else "exist"
-        self._report("", f"{names}{more} {verb} already. Write again to replace, or give other names.")
+        self._report("", f"{names} {verb} already. Write again to replace, or give other names.")
         self.query_one("#export-write", Button).label = "Replace"
 
     def _done(self, written: list[str], wrong: str) -> None:
@@ -243,26 +231,25 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
     """All files that may be written."""
     from ddenv.report.report import files_of as files_of_report
 
-    if wanted.world is not None:
-        yield wanted.world
-    if wanted.scenario is not None:
-        yield from (wanted.scenario, *(wanted.scenario.with_suffix(f".robot{kind}") for kind in (".sdf", ".urdf")))
-    if wanted.report is not None:
-        yield from files_of_report(wanted.report)
+    for id, path in wanted.items():
+        if id == "report":
+            yield from files_of_report(path)
+            continue
+        yield path
+        if id == "scenario":
+            yield from (path.with_suffix(f".robot{kind}") for kind in (".sdf", ".urdf"))
 
 
 def write(run: Path, wanted: Wanted) -> Iterator[str]:
     """Writes the files; yields a line for each. Raises UserError for the first that cannot be written."""
     from ddenv.report.report import write_report
     from ddenv.runs.export import export_world
-    from ddenv.text import shortened
 
-    if wanted.world is not None:
-        exported = export_world(run, wanted.world, wanted.scenario)
+    if "world" in wanted:
+        exported = export_world(run, wanted["world"], wanted.get("scenario"))
         yield from (f"wrote {plain(path)}" for path in exported.files)
         if exported.needs:
-            needs = [shortened(uri, LONGEST_NEED) for uri in exported.needs[:MOST_NEEDS]]
-            more = f" and {len(exported.needs) - MOST_NEEDS} more" if len(exported.needs) > MOST_NEEDS else ""
-            yield f"the world still needs {', '.join(needs)}{more}"
-    if wanted.report is not None:
-        yield from (f"wrote {plain(path)}" for path in write_report(run, wanted.report, force=True))
+            needs = [shortened(uri, LONGEST_NEED) for uri in exported.needs]
+            yield f"the world still needs {first_of(needs, MOST_NEEDS)}"
+    if "report" in wanted:
+        yield from (f"wrote {plain(path)}" for path in write_report(run, wanted["report"], force=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from textwrap import wrap
 from typing import ClassVar, Literal
 
@@ -24,6 +24,7 @@ from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen
 from ddenv.words.decisions import CAME_BY
 from ddenv.words.slices import slice_in_short
+from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
@@ -41,6 +42,7 @@ ROOM = 90
 # The width of the tree in columns, without the lines of its branches.
 TREE = 15
 MARK = "marked"
+GO = "go on from this environment: the run pauses there (branch)"
 # Where the words of a decision begin, after its time.
 INDENT = 10
 
@@ -61,20 +63,14 @@ class History(Screen[int | None]):
     CSS_PATH: ClassVar = ["history.tcss"]
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
     BINDINGS: ClassVar = [
-        Binding(
-            "enter",
-            "go",
-            "go on from here",
-            id="history.go",
-            tooltip="go on from this environment: the run pauses there (branch)",
-            priority=True,
+        Binding("enter", "go", "go on from here", id="history.go", tooltip=GO, priority=True),
+        *keys(
+            "history",
+            ("mark", "m", "mark", "mark", "mark this environment, to compare another with it"),
+            ("compare", "c", "compare", "compare", "compare the marked environment with this one"),
+            HELP,
+            ("close", "escape,h,q", "close", "close", "back to the run", "esc"),
         ),
-        Binding("m", "mark", "mark", id="history.mark", tooltip="mark this environment, to compare another with it"),
-        Binding(
-            "c", "compare", "compare", id="history.compare", tooltip="compare the marked environment with this one"
-        ),
-        Binding("question_mark,f1", "app.help", "help", id="history.help", tooltip="show every key", key_display="?"),
-        Binding("escape,h,q", "close", "close", id="history.close", tooltip="back to the run", key_display="esc"),
     ]
 
     def __init__(self, look: Callable[[], Situation], place: Place) -> None:
@@ -93,7 +89,7 @@ class History(Screen[int | None]):
             with Framed("What you decided", id="past-decisions", classes="panel"):
                 yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         yield Static("", id="about", markup=False)
-        shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
+        shown = ids("history", "go mark compare help close")
         yield KeyFooter(shown, shown)
 
     def on_mount(self) -> None:
@@ -104,18 +100,14 @@ class History(Screen[int | None]):
 
     def _look(self) -> None:
         state = self._look_at().state
-        self._show_decisions(state.decisions)
+        if state.decisions != (lines := self.query_one(Lines)).items:
+            lines.show(state.decisions)
         if (state.nodes, state.node) != (self._tree, self._here):
             at = self.under_cursor
             stays = None if at is None or at.number == self._here else at.number
             self._tree, self._here = state.nodes, state.node
             self._rows = branches.rows(state.nodes, state.node)
             self._fill(self._here if stays is None else stays)
-
-    def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
-        lines = self.query_one(Lines)
-        if decisions != lines.items:
-            lines.show(decisions)
 
     def _fill(self, cursor: int) -> None:
         table = self.query_one(Tree)
@@ -162,9 +154,6 @@ class History(Screen[int | None]):
 
     def on_data_table_row_highlighted(self) -> None:
         self._show_about()
-
-    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
-        event.stop()
 
     def _show_about(self) -> None:
         node = self.under_cursor
@@ -232,22 +221,13 @@ def _side(name: str) -> Literal["left", "right"]:
     return "right" if name in ("#", "tests", "f shown") else "left"
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """Models' names in the order of the world file."""
-
-    common: tuple[str, ...]
-    only_first: tuple[str, ...]
-    only_second: tuple[str, ...]
-
-
-def compare(first: Node, second: Node) -> Comparison:
-    """Both environments, model by model."""
+def compare(first: Node, second: Node) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """The models of both environments, those of the first alone, and those of the second, in the order of the world file."""
     left, right = frozenset(first.environment), frozenset(second.environment)
-    return Comparison(
-        common=tuple(name for name in first.environment if name in right),
-        only_first=tuple(name for name in first.environment if name not in right),
-        only_second=tuple(name for name in second.environment if name not in left),
+    return (
+        tuple(name for name in first.environment if name in right),
+        tuple(name for name in first.environment if name not in right),
+        tuple(name for name in second.environment if name not in left),
     )
 
 
@@ -257,36 +237,33 @@ class Compare(ModalScreen[None]):
     CSS_PATH = "history.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-small"), (110, "-large")]
     AUTO_FOCUS = "Lines"
-    BINDINGS: ClassVar = [
-        Binding("escape,c,q,enter", "dismiss", "close", id="compare.close", tooltip="back to the history"),
-    ]
+    BINDINGS: ClassVar = keys("compare", ("close", "escape,c,q,enter", "dismiss", "close", "back to the history"))
 
     def __init__(self, first: Node, second: Node, state: RunState, place: Place) -> None:
         super().__init__()
-        self._sides = (first, second)
+        self._common, *alone = compare(first, second)
+        self._sides = tuple(zip("AB", (first, second), alone, strict=True))
         self._state, self._place = state, place
 
     def compose(self) -> ComposeResult:
-        found = compare(*self._sides)
         with Framed("Two environments side by side", "tab to the lists   escape closes"):
             with Horizontal(classes="sides"):
-                for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
+                for name, node, alone in self._sides:
                     with Vertical(classes="side"):
                         yield Static(self._facts(name, node), classes="facts", markup=False)
                         yield WorldMap(id=f"map-{name}")
                         yield Static(_heading(f"only in {name}", alone), classes="facts", markup=False)
                         yield Lines(_name, nothing="none", id=f"only-{name}")
-            yield Static(_heading("in both", found.common), classes="facts", markup=False)
+            yield Static(_heading("in both", self._common), classes="facts", markup=False)
             yield Lines(_name, nothing="none", id="common")
 
     def on_mount(self) -> None:
-        found = compare(*self._sides)
-        for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
+        for name, node, alone in self._sides:
             self.query_one(f"#only-{name}", Lines).show(alone)
             world = self.query_one(f"#map-{name}", WorldMap)
             world.set_place(self._place)
             world.show(Snapshot(self._state.changed(environment=node.environment, round=None, trials=())), None)
-        self.query_one("#common", Lines).show(found.common)
+        self.query_one("#common", Lines).show(self._common)
 
     def on_resize(self) -> None:
         # Of one size, so that both maps have one scale and one frame.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 
-from ddenv.learn.score import Score, data_of, score_of
+from ddenv.learn.score import Score, score_of
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import count
 
@@ -20,7 +21,7 @@ def all_scores() -> dict[str, Score]:
 def keep_score(lesson: str, score: Score) -> None:
     """Remembers it, if it can be written."""
     scores: Mapping[str, Score] = {**all_scores(), lesson: score}
-    write_state(FILE, {name: data_of(each) for name, each in scores.items()})
+    write_state(FILE, {name: asdict(each) for name, each in scores.items()})
 
 
 def in_words(score: Score | None) -> str:

@@ -80,15 +80,11 @@ def _blocks(blocks: Sequence[Block], room: int) -> Text:
     for before, block in zip((None, *blocks), blocks, strict=False):
         if before is not None:
             text.append("\n" if before.listed and block.listed else "\n\n")
-        text.append_text(_block(block, room))
+        words = Text("• " if block.listed else "")
+        for span, style in block.spans:
+            words.append(plain_words(span), STYLES[style])
+        text.append_text(_hung(words, BULLET, room) if block.listed else words)
     return text
-
-
-def _block(block: Block, room: int) -> Text:
-    text = Text("• " if block.listed else "")
-    for words, style in block.spans:
-        text.append(plain_words(words), STYLES[style])
-    return _hung(text, BULLET, room) if block.listed else text
 
 
 def _hung(text: Text, indent: int, room: int) -> Text:
@@ -119,22 +115,18 @@ def _question(question: Question, page: Page, room: int) -> Text:
             line.apply_meta({"@click": f"screen.answer({place})"})
         text.append("\n").append_text(line)
     # Answered, the hint would only take the room of what is said of the answers.
-    if page.hint and page.chosen is None:
-        text.append(f"\nHint: {plain(question.hint)}", "italic")
     if page.chosen is not None:
-        text.append_text(_verdict(question, page, room))
+        text.append_text(_verdict(question, page.chosen, page, room))
+    elif page.hint:
+        text.append(f"\nHint: {plain(question.hint)}", "italic")
     return text
 
 
-def _verdict(question: Question, page: Page, room: int) -> Text:
+def _verdict(question: Question, chosen: int, page: Page, room: int) -> Text:
     """Right or wrong, why, and what is wrong with the other answers."""
-    if page.chosen is None or page.chosen < 0:
-        first = f"\n\nSkipped. {LETTERS[question.right]} is right."
-    elif question.answers[page.chosen].right:
-        first = "\n\n✓ Right."
-    else:
-        first = f"\n\n✗ No: {LETTERS[question.right]} is right."
-    text = Text().append(first, "bold")
+    right = f"{LETTERS[question.right]} is right."
+    first = f"Skipped. {right}" if chosen < 0 else "✓ Right." if chosen == question.right else f"✗ No: {right}"
+    text = Text().append(f"\n\n{first}", "bold")
     for mark, why in page.remarks:
         text.append("\n").append_text(_hung(Text(f"{mark} {plain(why)}"), REMARK, room))
     return text
@@ -149,9 +141,8 @@ class Variables(Widget):
 
     def show(self, variables: tuple[Variable, ...]) -> None:
         """Other values."""
-        if variables != self._variables:
-            self._variables = variables
-            self.refresh()
+        self._variables = variables
+        self.refresh()
 
     def render(self) -> Text:
         width, height = self.size
@@ -160,18 +151,13 @@ class Variables(Widget):
         text = Text(no_wrap=True)
         for one in self._variables:
             value = plain(one.value) or "–"
-            rows = 1 + (spare > 0 and len(value) > room)
-            spare -= rows - 1
+            lines = [truncated(value, room)]
+            if spare > 0 and len(value) > room:
+                # A second line, indented, from a space on if there is one.
+                spare -= 1
+                cut = max(value.rfind(" ", 0, room + 1), 0) or room
+                lines = [value[:cut].rstrip(), " " * (WIDTH + 3) + truncated(value[cut:].strip(), room)]
             style = "bold" if one.changed else ""
             text.append(f"{CHANGED if one.changed else ' '} {one.name:<{WIDTH}} ", style or "dim")
-            text.append("\n".join(_cut(value, room, rows)), style).append("\n")
+            text.append("\n".join(lines), style).append("\n")
         return text
-
-
-def _cut(value: str, room: int, rows: int) -> list[str]:
-    """At most two lines; the second is indented."""
-    if rows == 1 or len(value) <= room:
-        return [truncated(value, room)]
-    cut = value.rfind(" ", 0, room + 1)
-    cut = cut if cut > 0 else room
-    return [value[:cut].rstrip(), " " * (WIDTH + 3) + truncated(value[cut:].strip(), room)]

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
+from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
-from textual.screen import Screen
 from textual.widgets import OptionList, Static
 
 from ddenv.errors import UserError
@@ -17,21 +16,22 @@ from ddenv.learn.lesson import Lesson
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, glance, open_lesson
 from ddenv.text import plain, truncated
-from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, in_words
+from ddenv.workbench.learn.learn_screen import LearnScreen
 
-SHOWN = ("lessons.open", "lessons.help", "lessons.back")
 
-
-class LessonsScreen(Screen[None]):
+class LessonsScreen(LearnScreen[None]):
     """Enter opens a lesson where it was left."""
 
-    CSS_PATH = "learn.tcss"
+    NAME = "lessons"
+    SHOWN = FIRST = "open help back"
+    # It has room for what matters in any terminal.
+    HORIZONTAL_BREAKPOINTS = VERTICAL_BREAKPOINTS = []
     BINDINGS: ClassVar = [
         Binding("enter", "open", "open", id="lessons.open", tooltip="open the lesson where you left it", priority=True),
-        Binding("question_mark,f1", "app.help", "help", id="lessons.help", tooltip="show every key", key_display="?"),
-        Binding("escape,q", "back", "back", id="lessons.back", tooltip="back, or leave", key_display="esc"),
+        *keys("lessons", HELP, ("back", "escape,q", "close", "back", "back, or leave", "esc")),
     ]
 
     def __init__(self, opens: Path | None = None) -> None:
@@ -40,15 +40,11 @@ class LessonsScreen(Screen[None]):
         self._opens = opens
         self._lessons: list[Lesson] = []
 
-    def compose(self) -> ComposeResult:
-        yield Static("", id="lessons-header", markup=False)
+    def body(self) -> ComposeResult:
         with Framed("Lessons", id="lessons-panel", classes="panel"):
             yield OptionList(id="lessons-list")
-        with Vertical(classes="panel", id="lesson-about-panel") as panel:
-            panel.styles.height = 8
-            panel.border_title = "Its aim"
+        with Framed("Its aim", classes="panel", id="lesson-about-panel"):
             yield Static("", id="lesson-about", markup=False)
-        yield KeyFooter(SHOWN, SHOWN)
 
     def on_mount(self) -> None:
         for file in bundled():
@@ -90,9 +86,7 @@ class LessonsScreen(Screen[None]):
         about = Text(f"{plain(lesson.aim)}\n", "").append(f"About {lesson.minutes} minutes.", "dim")
         self.query_one("#lesson-about", Static).update(about)
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        self._open(self._lessons[event.option_index].file)
-
+    @on(OptionList.OptionSelected)
     def action_open(self) -> None:
         place = self.query_one(OptionList).highlighted
         if place is not None:
@@ -112,9 +106,3 @@ class LessonsScreen(Screen[None]):
         if place < len(self._lessons):
             self._fill(place)
         self.app.push_screen(screen, lambda goes_on: self._open(after[0].file) if goes_on else None)
-
-    def action_back(self) -> None:
-        if len(self.app.screen_stack) > 2:
-            self.dismiss(None)
-        else:
-            self.app.exit(0)

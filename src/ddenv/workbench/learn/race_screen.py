@@ -8,24 +8,21 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Container, Vertical, VerticalScroll
-from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.learn.race import Play, Race, Turn, plays_of_runs, result, tally
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.text import count, plain, shortened, truncated
-from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.learn.world_maps import read_world, snapshot_of
+from ddenv.workbench.help.bindings import HELP, keys
+from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
 
 IN, OUT, GONE = "■", "□", "·"
-SMALLEST = (64, 20)
 # Time between two tests while the race runs, s.
 PACE = 0.7
 # Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
@@ -33,7 +30,7 @@ BARE, WITH_MAP, SAID, AROUND = 5, 11, 6, 2
 LEGEND = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
 # What the tests were good for; the rest is rare.
 COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
-NAME = 24
+LONGEST_NAME = 24
 
 
 class RacerPane(Vertical):
@@ -61,17 +58,9 @@ class RacerPane(Vertical):
         # As text: a name may look like markup.
         self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
         self.map.show(snapshot_of(self._base, left, turn), None if turn is None else turn.candidate)
-        self._said.update(Text("\n").join(_lines(play, turn, tests, room)))
-
-
-def _lines(play: Play, turn: Turn | None, tests: int, room: int) -> list[Text]:
-    left = play.after(tests)
-    there = frozenset(left if turn is None else turn.candidate.models)
-    return [
-        Text(truncated(_what(play, turn), room)),
-        _bar(play.begins, frozenset(left), there, room),
-        _signs(play.turns[:tests], room),
-    ]
+        there = frozenset(left if turn is None else turn.candidate.models)
+        bar, signs = _bar(play.begins, frozenset(left), there, room), _signs(play.turns[:tests], room)
+        self._said.update(Text(f"{truncated(_what(play, turn), room)}\n{bar}\n{signs}"))
 
 
 def _what(play: Play, turn: Turn | None) -> str:
@@ -81,67 +70,56 @@ def _what(play: Play, turn: Turn | None) -> str:
     return f"{turn.candidate.label}{again}: {count(turn.candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
 
 
-def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> Text:
+def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> str:
     """A cell for each model in the world's order; of more models than there is room, by their shares."""
     if len(models) <= room:
-        return Text("".join(GONE if name not in left else IN if name in there else OUT for name in models))
+        return "".join(GONE if name not in left else IN if name in there else OUT for name in models)
     kept = max(bool(left), round(room * len(left) / len(models)))
     tested = min(kept, max(bool(there & left), round(room * len(there & left) / len(models))))
-    return Text(IN * tested + OUT * (kept - tested) + GONE * (room - kept))
+    return IN * tested + OUT * (kept - tested) + GONE * (room - kept)
 
 
-def _signs(turns: tuple[Turn, ...], room: int) -> Text:
+def _signs(turns: tuple[Turn, ...], room: int) -> str:
     """How the tests ended, the last ones if there are many."""
-    cut = len(turns) > room
-    shown = turns[-(room - 1) :] if cut else turns
-    return Text(("…" if cut else "") + "".join(SIGNS.get(turn.outcome, "?") for turn in shown), no_wrap=True)
+    signs = "".join(SIGNS.get(turn.outcome, "?") for turn in turns)
+    return signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
 
 
-def _ids(names: str) -> tuple[str, ...]:
-    return tuple(f"race.{name}" for name in names.split())
-
-
-SHOWN = _ids("run back on begin end help close")
-FIRST = _ids("help close run on back end begin")
-
-
-class RaceScreen(Screen[None]):
+class RaceScreen(LearnScreen[None]):
     """The race of `plays`, each drawn over its own of the `bases`, in the world of `run`."""
 
-    CSS_PATH = "learn.tcss"
-    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
-    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-tall")]
     AUTO_FOCUS = ""
-    BINDINGS: ClassVar = [
-        Binding("space", "run", "run/pause", id="race.run", tooltip="run the race, or pause it"),
-        Binding("left", "move(-1)", "back", id="race.back", tooltip="one test of each back"),
-        Binding("right,enter", "move(1)", "one test on", id="race.on", tooltip="one test of each on", key_display="→"),
-        Binding("home", "go(0)", "start", id="race.begin", tooltip="to the beginning"),
-        Binding("end", "go(-1)", "result", id="race.end", tooltip="to the end: who needed the fewest tests, and why"),
-        Binding("question_mark,f1", "app.help", "help", id="race.help", tooltip="show every key", key_display="?"),
-        Binding("escape,q", "close", "leave", id="race.close", tooltip="back, or leave", key_display="esc"),
-    ]
+    NAME = "race"
+    SHOWN = "run back on begin end help close"
+    FIRST = "help close run on back end begin"
+    BINDINGS: ClassVar = keys(
+        "race",
+        ("run", "space", "run", "run/pause", "run the race, or pause it"),
+        ("back", "left", "move(-1)", "back", "one test of each back"),
+        ("on", "right,enter", "move(1)", "one test on", "one test of each on", "→"),
+        ("begin", "home", "go(0)", "start", "to the beginning"),
+        ("end", "end", "go(-1)", "result", "to the end: who needed the fewest tests, and why"),
+        HELP,
+        ("close", "escape,q", "close", "leave", "back, or leave", "esc"),
+    )
 
     def __init__(self, plays: Sequence[Play], bases: Sequence[Snapshot], run: Path) -> None:
         super().__init__()
         self.race, self._run = Race(tuple(plays)), run
         self._panes = [RacerPane(play, base) for play, base in zip(plays, bases, strict=True)]
 
-    def compose(self) -> ComposeResult:
-        yield Static("", id="race-header", markup=False)
+    def body(self) -> ComposeResult:
         with Container(id="race-body"):
             yield from self._panes
         with VerticalScroll(id="race-panel", classes="panel", can_focus=False):
             yield Static("", id="race-said", markup=False)
-        yield KeyFooter(SHOWN, FIRST)
-        yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:
         self._clock = self.set_interval(PACE, self._tick, pause=True)
         self._runs_on = False
         self._arrange()
         self._show()
-        self.call_after_refresh(read_world, self, self._run, [pane.map for pane in self._panes])
+        self.read_world(self._run, [pane.map for pane in self._panes])
 
     def on_resize(self) -> None:
         self._arrange()
@@ -204,18 +182,12 @@ class RaceScreen(Screen[None]):
         if self.race.go(self.race.at + by):
             self._show()
         else:
-            self.notify("the race is over" if by > 0 else "the race begins here", timeout=3, markup=False)
+            self.say("the race is over" if by > 0 else "the race begins here")
 
     def action_go(self, at: int) -> None:
         self._pause()
         self.race.go(at if at >= 0 else self.race.longest)
         self._show()
-
-    def action_close(self) -> None:
-        if len(self.app.screen_stack) > 2:
-            self.dismiss(None)
-        else:
-            self.app.exit(0)
 
 
 def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
@@ -231,16 +203,12 @@ def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
 
 def _table(race: Race) -> Text:
     """A line for each search: its tests so far, those that showed f, and those that did not, by kind."""
-    width = min(NAME, max(len(play.name) for play in race.plays))
-    heads = "".join(f"{head:>{_wide(head)}}" for head in COLUMNS.values())
-    text = Text(f"{'':<{width}}{'tests':>7}{heads}", "dim", no_wrap=True)
+    width = min(LONGEST_NAME, max(len(play.name) for play in race.plays))
+    heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
+    text = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
     for play in race.plays:
         spent = tally(play, race.at).spent
-        cells = "".join(f"{spent[kind] or '':>{_wide(head)}}" for kind, head in COLUMNS.items())
+        cells = "".join(f"{spent[kind] or '':>{len(head)}}" for kind, head in heads.items())
         name = shortened(plain(play.name), width)
         text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
     return text
-
-
-def _wide(head: str) -> int:
-    return len(head) + 2

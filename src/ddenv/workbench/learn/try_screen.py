@@ -8,9 +8,7 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.binding import Binding
-from textual.containers import Container, Vertical, VerticalScroll
-from textual.screen import Screen
+from textual.containers import Container, VerticalScroll
 from textual.widgets import Static
 
 from ddenv.errors import UserError
@@ -18,21 +16,13 @@ from ddenv.learn.attempt import Attempt, Tried
 from ddenv.learn.race import BOUND, Line, Play, comparison, in_one_sentence
 from ddenv.learn.variables import SIGNS
 from ddenv.text import count, plain, shortened, truncated
-from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.learn.world_maps import read_world, snapshot_of
+from ddenv.workbench.help.bindings import HELP, keys
+from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Snapshot
 
-SMALLEST = (64, 20)
-NAME = 16
-
-
-def _ids(names: str) -> tuple[str, ...]:
-    return tuple(f"try.{name}" for name in names.split())
-
-
-SHOWN = ("map.pick", "map.next", *_ids("without only back done again help close"))
-FIRST = (*_ids("help close without done"), "map.pick", *_ids("only"), "map.next", *_ids("back again"))
+LONGEST_NAME = 16
 SAID = {
     "similar": "f again without {out}: you hold {held} now.",
     "other": "another failure. That is not f, so nothing goes.",
@@ -40,29 +30,24 @@ SAID = {
 }
 
 
-class TryScreen(Screen[None]):
+class TryScreen(LearnScreen[None]):
     """The search `attempt` in the world of `run`; `keep` is called after each move. `plays` are compared with it at the end."""
 
-    CSS_PATH = "learn.tcss"
-    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
-    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-tall")]
     AUTO_FOCUS = "WorldMap"
-    BINDINGS: ClassVar = [
-        Binding(
-            "space", "mark", "mark", id="try.mark", tooltip="mark or unmark the model under the crosshair", show=False
-        ),
-        Binding(
-            "w", "test(False)", "test without", id="try.without", tooltip="test what is held without the marked models"
-        ),
-        Binding("o", "test(True)", "test only", id="try.only", tooltip="test the marked models alone"),
-        Binding("u", "back", "undo", id="try.back", tooltip="undo: hold again what the last reduction took away"),
-        Binding("m", "done", "minimal", id="try.done", tooltip="say that no single model can go: the verdict"),
-        Binding("n", "again", "new search", id="try.again", tooltip="begin again; the first result counts"),
-        Binding("question_mark,f1", "app.help", "help", id="try.help", tooltip="show every key", key_display="?"),
-        Binding(
-            "escape,q", "close", "leave", id="try.close", tooltip="back to the lesson; it is kept", key_display="esc"
-        ),
-    ]
+    NAME = "try"
+    SHOWN = "map.pick map.next without only back done again help close"
+    FIRST = "help close without done map.pick only map.next back again"
+    BINDINGS: ClassVar = keys(
+        "try",
+        ("mark", "space", "mark", "mark", "mark or unmark the model under the crosshair"),
+        ("without", "w", "test(False)", "test without", "test what is held without the marked models"),
+        ("only", "o", "test(True)", "test only", "test the marked models alone"),
+        ("back", "u", "back", "undo", "undo: hold again what the last reduction took away"),
+        ("done", "m", "done", "minimal", "say that no single model can go: the verdict"),
+        ("again", "n", "again", "new search", "begin again; the first result counts"),
+        HELP,
+        ("close", "escape,q", "close", "leave", "back to the lesson; it is kept", "esc"),
+    )
 
     def __init__(
         self, run: Path, base: Snapshot, attempt: Attempt, plays: tuple[Play, ...], keep: Callable[[Attempt], None]
@@ -73,23 +58,19 @@ class TryScreen(Screen[None]):
         self._map = WorldMap(id="try-map")
         self._asked = False
 
-    def compose(self) -> ComposeResult:
-        yield Static("", id="try-header", markup=False)
+    def body(self) -> ComposeResult:
         with Container(id="try-body"):
-            with Vertical(id="try-world", classes="panel") as world:
-                world.border_title = "World"
+            with Framed("World", id="try-world", classes="panel"):
                 yield self._map
             with VerticalScroll(id="try-tests", classes="panel", can_focus=False):
                 yield Static("", id="try-table", markup=False)
             with VerticalScroll(id="try-now", classes="panel", can_focus=False) as now:
                 now.border_title = "Now"
                 yield Static("", id="try-said", markup=False)
-        yield KeyFooter(SHOWN, FIRST)
-        yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:
         self._show()
-        self.call_after_refresh(read_world, self, self._run, [self._map])
+        self.read_world(self._run, [self._map])
 
     # What is shown.
 
@@ -132,7 +113,7 @@ class TryScreen(Screen[None]):
         models = Text("Held: ")
         for name in self.attempt.held:
             sign = "*" if name in marked else ""
-            word = Text(f"{sign}{shortened(plain(name), NAME)}", "bold reverse" if sign else "bold")
+            word = Text(f"{sign}{shortened(plain(name), LONGEST_NAME)}", "bold reverse" if sign else "bold")
             word.apply_meta({"@click": f"screen.mark_one({self.attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
         if not self.attempt.tests_left:
@@ -160,7 +141,7 @@ class TryScreen(Screen[None]):
     def action_test(self, only: bool) -> None:
         marked, held = self._map.selection, frozenset(self.attempt.held)
         if not marked:
-            self._say("mark some models first: enter or a click on the map")
+            self.say("mark some models first: enter or a click on the map")
             return
         self._do(lambda: self.attempt.test(marked if only else held - marked))
 
@@ -169,7 +150,7 @@ class TryScreen(Screen[None]):
 
     def action_done(self) -> None:
         if self.attempt.ended:
-            self._say("this search is over: n begins a new one")
+            self.say("this search is over: n begins a new one")
         elif not self._asked:
             self._asked = True
             self._say_where()
@@ -178,7 +159,7 @@ class TryScreen(Screen[None]):
 
     def action_again(self) -> None:
         if not self.attempt.moves:
-            self._say("nothing was tested yet")
+            self.say("nothing was tested yet")
             return
         self.attempt = Attempt(self.attempt.oracle, self.attempt.budget)
         self._do(lambda: None)
@@ -188,18 +169,12 @@ class TryScreen(Screen[None]):
         try:
             move()
         except UserError as error:
-            self._say(str(error))
+            self.say(str(error))
             return
         self._asked = False
         self._map.select(())
         self._keep(self.attempt)
         self._show()
-
-    def action_close(self) -> None:
-        self.dismiss(None)
-
-    def _say(self, why: str) -> None:
-        self.notify(why, timeout=4, markup=False)
 
 
 NO_TESTS = "None yet. Each one runs the robot with some of the models that you hold."
@@ -209,7 +184,7 @@ def _row(number: int, tried: Tried) -> Text:
     text = Text(f"{number:>2} ", no_wrap=True, overflow="ellipsis")
     text.append(f"{SIGNS[tried.outcome]} ", "bold")
     # The shorter list says it best.
-    kept, out = (", ".join(shortened(plain(name), NAME) for name in names) for names in (tried.kept, tried.out))
+    kept, out = (", ".join(shortened(plain(name), LONGEST_NAME) for name in names) for names in (tried.kept, tried.out))
     words = f"without {out}" if len(tried.out) <= len(tried.kept) else f"only {kept or 'no model'}"
     return text.append(words, "bold" if tried.outcome == "similar" else "")
 
@@ -218,7 +193,7 @@ def _last(attempt: Attempt) -> Text:
     if not attempt.tried:
         return Text("You hold the whole world, and it shows f. Which models does f need?")
     last = attempt.tried[-1]
-    out = ", ".join(shortened(plain(name), NAME) for name in last.out)
+    out = ", ".join(shortened(plain(name), LONGEST_NAME) for name in last.out)
     said = SAID[last.outcome].format(out=out, held=count(len(attempt.held), "model"))
     return Text(f"Test {len(attempt.tried)}: {SIGNS[last.outcome]} {said}", "bold")
 

@@ -66,14 +66,8 @@ def status(snapshot: Snapshot) -> Iterator[str]:
     if left is not None:
         time = f", about {about(*left.seconds)}" if left.seconds else ""
         yield f"about {count(rounded(left.tests[1]), 'test')} left{time}"
-    yield {"alive": "an engine is at work", "starting": "the engine starts"}.get(
-        snapshot.engine, "no engine is running"
-    )
-
-
-def why(snapshot: Snapshot) -> Iterator[str]:
-    """What is happening."""
-    yield from explain(snapshot).sentences
+    engines = {"alive": "an engine is at work", "starting": "the engine starts"}
+    yield engines.get(snapshot.engine, "no engine is running")
 
 
 def table(snapshot: Snapshot) -> Iterator[str]:
@@ -107,9 +101,7 @@ def models(snapshot: Snapshot) -> Iterator[str]:
 
 def decisions(snapshot: Snapshot) -> Iterator[str]:
     """What the user decided."""
-    yield from (plain(each.words) for each in snapshot.state.decisions)
-    if not snapshot.state.decisions:
-        yield NOTHING_DECIDED
+    yield from [plain(each.words) for each in snapshot.state.decisions] or [NOTHING_DECIDED]
 
 
 def baseline(snapshot: Snapshot) -> Iterator[str]:
@@ -120,7 +112,7 @@ def baseline(snapshot: Snapshot) -> Iterator[str]:
 
 QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
     "status": (status, "where the run is"),
-    "why": (why, "what is happening, and why"),
+    "why": (lambda snapshot: iter(explain(snapshot).sentences), "what is happening, and why"),
     "table": (table, "the candidates of this round with their verdicts"),
     "models": (models, "the models that are left"),
     "baseline": (baseline, "how often the whole world fails"),
@@ -131,15 +123,15 @@ QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
 def meaning(line: str, now: Situation) -> Offer | None:
     """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model that there is not."""
     first, _, rest = line.strip().partition(" ")
-    word = first if first in GUIDES else _KEYS.get(first)
-    if word is None:
+    word, rest = first if first in GUIDES else _KEYS.get(first, ""), rest.strip()
+    if not word:
         return None
-    action, rest = GUIDES[word][0], rest.strip()
-    if action in ("pin", "without", "only"):
-        if not rest:
-            raise UserError(f"{word}: which models? Type their names after it, separated by commas")
-        return offer(action, now, Pointed(models=_models(rest, now.state)))
-    return offer(action, now, Pointed(row=_row(rest, now.state) if rest else None))
+    action = GUIDES[word][0]
+    if action not in ("pin", "without", "only"):
+        return offer(action, now, Pointed(row=_row(rest, now.state) if rest else None))
+    if not rest:
+        raise UserError(f"{word}: which models? Type their names after it, separated by commas")
+    return offer(action, now, Pointed(models=_models(rest, now.state)))
 
 
 def _models(typed: str, state: RunState) -> tuple[str, ...]:
@@ -158,16 +150,8 @@ def _row(typed: str, state: RunState) -> Row:
     return found
 
 
-def follow_in_lines(path: Path, watch: bool, typed: TextIO, out: TextIO) -> None:
-    """Follows a run until the user quits, or until its engine has ended and nothing more can be typed.
-
-    Raises UserError for a file that is no run file.
-    """
-    LineMode(path, watch, out).follow(_lines(typed))
-
-
 class LineMode:
-    """Says what is new at each turn, and does what was typed meanwhile."""
+    """Follows a run: says what is new at each turn, and does what was typed meanwhile. Raises UserError for what is no run file."""
 
     def __init__(self, path: Path, watch: bool, out: TextIO) -> None:
         self._out = out
@@ -179,15 +163,18 @@ class LineMode:
         self._asked: Command | None = None
 
     def follow(self, lines: Iterator[str | None]) -> None:
-        """`lines` gives what was typed, "" for nothing yet, None once nothing more can come."""
+        """Until the user quits, or until the engine has ended and nothing more can be typed.
+
+        `lines` gives what was typed, "" for nothing yet, None once nothing more can come.
+        """
         self._look()
         self._say(f"{plain(self._poll.path.stem)}: type help for what you can do; quit leaves, and the engine goes on")
-        self._tell_news()
-        self._answer("status")
+        self._say(*self._news, *status(self._poll.snapshot))
         self._news = deque()
         for line in lines:
             self._look()
-            self._tell_news()
+            self._say(*self._news)
+            self._news.clear()
             if line is None and self._poll.snapshot.engine == "absent":
                 break
             if line and not self._do(line.strip()):
@@ -210,12 +197,9 @@ class LineMode:
             self._say(error)
         self._error = error
 
-    def _tell_news(self) -> None:
-        while self._news:
-            self._say(self._news.popleft())
-
-    def _say(self, words: str) -> None:
-        print(printable(words), file=self._out, flush=True)
+    def _say(self, *lines: str) -> None:
+        for words in lines:
+            print(printable(words), file=self._out, flush=True)
 
     # What is typed.
 
@@ -235,20 +219,14 @@ class LineMode:
         elif line in ("help", "?"):
             self._help()
         elif line in QUESTIONS:
-            self._answer(line)
+            self._say(*QUESTIONS[line][0](self._poll.snapshot))
         else:
             self._guide(line)
         return True
 
-    def _answer(self, question: str) -> None:
-        for words in QUESTIONS[question][0](self._poll.snapshot):
-            self._say(words)
-
     def _help(self) -> None:
-        for word, (_, what) in QUESTIONS.items():
-            self._say(f"{word}: {what}")
-        for word, (_, key, what) in GUIDES.items():
-            self._say(f"{word} or {key}: {what}")
+        self._say(*(f"{word}: {what}" for word, (_, what) in QUESTIONS.items()))
+        self._say(*(f"{word} or {key}: {what}" for word, (_, key, what) in GUIDES.items()))
         self._say("quit or q: leave; the engine goes on")
 
     def _guide(self, line: str) -> None:
@@ -290,7 +268,7 @@ class LineMode:
             self._say("the engine starts")
 
 
-def _lines(typed: TextIO) -> Iterator[str | None]:
+def typed_lines(typed: TextIO) -> Iterator[str | None]:
     """Lines as they are typed, "" when there was none for `PERIOD`, and None from the end of the input on."""
     handle, waiting = typed.fileno(), b""
     while True:

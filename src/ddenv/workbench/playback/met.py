@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from operator import itemgetter
 
 from rich.text import Text
 from textual.widget import Widget
@@ -16,15 +16,6 @@ from ddenv.workbench.playback.timeline import ROBOTS
 HERE = "▸"
 # The maximum number of lines of a test.
 LOGGED = 400
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """At `time`, simulated s, `words` happened in the test with this sign."""
-
-    time: float
-    sign: str
-    words: str
 
 
 def met(test: Test) -> tuple[tuple[float, str], ...]:
@@ -48,30 +39,26 @@ def how_it_ended(test: Test) -> str:
     return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"
 
 
-def lines_of(tests: tuple[Test, ...]) -> list[Line]:
-    """What happened in one or two tests, in order."""
-    signs = ROBOTS if len(tests) > 1 else ("",)
-    found = [Line(at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test)]
-    return sorted(found, key=lambda line: line.time)
-
-
 class Met(Widget):
     """The lines around the instant; what is still to come is dim. `lacks` stand above them."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._lines: list[Line] = []
+        # When, in which test by its sign, and what.
+        self._lines: list[tuple[float, str, str]] = []
         self._lacks: tuple[str, ...] = ()
         self._now = 0
 
     def put(self, tests: tuple[Test, ...], lacks: tuple[str, ...]) -> None:
         """Other tests."""
-        self._lines, self._lacks, self._now = lines_of(tests), lacks, 0
+        signs = ROBOTS if len(tests) > 1 else ("",)
+        lines = ((at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test))
+        self._lines, self._lacks, self._now = sorted(lines, key=itemgetter(0)), lacks, 0
         self.refresh()
 
     def show(self, time: float) -> None:
         """Another instant, simulated s."""
-        now = bisect_right(self._lines, time, key=lambda line: line.time)
+        now = bisect_right(self._lines, time, key=itemgetter(0))
         if now != self._now:
             self._now = now
             self.refresh()
@@ -81,18 +68,14 @@ class Met(Widget):
         lacks = Text("\n".join(f"▲ {plain(words)}" for words in self._lacks), "bold")
         above = lacks.wrap(self.app.console, max(1, width)) if self._lacks else ()
         text = Text("", no_wrap=True, overflow="ellipsis")
-        for words in above:
-            text.append_text(words).append("\n")
+        for line in above:
+            text.append_text(line).append("\n")
         room = max(1, height - len(above))
         # The latest line stands in the middle once there are more than fit.
         first = max(0, min(self._now - room // 2 - 1, len(self._lines) - room))
-        for number in range(first, min(first + room, len(self._lines))):
-            text.append_text(self._line(number, width)).append("\n")
+        for number, (at, sign, words) in enumerate(self._lines[first : first + room], first):
+            here = HERE if number == self._now - 1 else " "
+            head = f"{here}{at:6.1f} s {sign}{' ' if sign else ''}"
+            what = shortened(words, max(4, width - len(head)))
+            text.append(f"{head}{what}\n", "" if number < self._now else "dim")
         return text
-
-    def _line(self, number: int, width: int) -> Text:
-        line = self._lines[number]
-        here = HERE if number == self._now - 1 else " "
-        head = f"{here}{line.time:6.1f} s {line.sign}{' ' if line.sign else ''}"
-        words = shortened(line.words, max(4, width - len(head)))
-        return Text(f"{head}{words}", "" if number < self._now else "dim", no_wrap=True)

@@ -1,4 +1,4 @@
-"""What a map shows of finished tests: the models where they were at an instant, and the robots' ways."""
+"""What a map shows of finished tests: the robots' ways, and the models of one or two of them."""
 
 from __future__ import annotations
 
@@ -6,25 +6,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ddenv.map.footprints import Footprint
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round, RunState, Split, Trial
 from ddenv.runfile.supports import Names
 from ddenv.runs.playback import Played
-from ddenv.workbench.map.place import MovedPrints, Place, Way
+from ddenv.workbench.map.place import Way
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.world.pose import pose_at
-
-
-class Moving:
-    """The models of a place as they move in a test."""
-
-    def __init__(self, place: Place, one: Played) -> None:
-        self._prints, self._motions = MovedPrints(place), one.moving
-
-    def at(self, time: float) -> tuple[Footprint, ...]:
-        """The footprints of all models at simulated `time`, s; the same object if nothing has moved."""
-        return self._prints.at({name: pose_at(samples, time) for name, samples in self._motions.items()})
 
 
 class RobotWay:

@@ -2,35 +2,40 @@
 
 from __future__ import annotations
 
+import math
 import time
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import islice
 from typing import ClassVar
 
 from rich.text import Text
-from textual import on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal
-from textual.screen import Screen
-from textual.widgets import Static
+from textual.screen import ModalScreen, Screen
+from textual.widgets import OptionList, Static
+from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
+from ddenv.runfile.tested import purpose
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
-from ddenv.text import count, plain
+from ddenv.text import count, padded, plain, shortened
+from ddenv.words.signs import outcome
+from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
-from ddenv.workbench.map.place import Place, Point, place_of_run
+from ddenv.workbench.map.place import MovedPrints, Place, Point
+from ddenv.workbench.map.read_world import read_world
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.playback.beside_dialog import Beside
 from ddenv.workbench.playback.met import Met
-from ddenv.workbench.playback.moving import Moving, RobotWay, snapshot_with, without
+from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
-from ddenv.workbench.shared.background import call_if_open
+from ddenv.world.pose import pose_at
 
 # Simulated seconds in a second.
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -40,6 +45,9 @@ STEP = 1.0
 SMALLEST = (64, 18)
 # Time between two pictures, s: more would only send more to the terminal.
 PERIOD = 0.1
+# The maximum number of tests in the list of those to play beside one, and the widths of its columns.
+LISTED = 200
+NUMBER, WORDS, SEED, OUTCOME = 7, 36, 12, 16
 
 
 class Playing:
@@ -89,16 +97,8 @@ def now() -> float:
     return time.monotonic()
 
 
-def _ids(names: str) -> tuple[str, ...]:
-    return tuple(f"playback.{name}" for name in names.split())
-
-
-def _hidden(key: str, action: str, words: str, name: str, tooltip: str, display: str | None = None) -> Binding:
-    return Binding(key, action, words, id=f"playback.{name}", tooltip=tooltip, show=False, key_display=display)
-
-
-SHOWN = _ids("play back on frame_back frame_on slower faster parting beside swap before next help close")
-FIRST = _ids("help close play beside frame_back frame_on parting slower faster swap before next back on")
+SHOWN = ids("playback", "play back on frame_back frame_on slower faster parting beside swap before next help close")
+FIRST = ids("playback", "help close play beside frame_back frame_on parting slower faster swap before next back on")
 
 
 class Playback(Screen[None]):
@@ -108,30 +108,29 @@ class Playback(Screen[None]):
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low")]
     AUTO_FOCUS = ""
-    BINDINGS: ClassVar = [
-        Binding("space", "play", "play", id="playback.play", tooltip="play, or pause; at the end: from the start"),
-        _hidden("left", f"step({-STEP})", "1 s back", "back", "one second back"),
-        _hidden("right", f"step({STEP})", "1 s on", "on", "one second on"),
-        _hidden("comma", "frame(-1)", "frame back", "frame_back", f"one frame ({FRAME:g} s) back, and pause", ","),
-        _hidden("full_stop", "frame(1)", "frame on", "frame_on", f"one frame ({FRAME:g} s) on, and pause", "."),
-        _hidden("less_than_sign", "speed(-1)", "slower", "slower", "slower", "<"),
-        _hidden("greater_than_sign", "speed(1)", "faster", "faster", "faster", ">"),
-        _hidden("home", "go(0)", "start", "start", "to the start of the test"),
-        _hidden("end", "go(1)", "end", "end", "to the end of the test"),
-        _hidden("p", "parting", "they part", "parting", "to the instant at which the ways of the two tests part"),
-        _hidden("o", "beside", "two tests", "beside", "play another test over this one, or this one alone again"),
-        _hidden("x", "swap", "swap", "swap", "the second test becomes the first one: its models move"),
-        _hidden("up", "test(-1)", "test before", "before", "the finished test before this one"),
-        _hidden("down", "test(1)", "next test", "next", "the next finished test"),
-        _hidden("plus,equals_sign", "zoom(1.25)", "closer", "closer", "map: closer", "+"),
-        _hidden("minus", "zoom(0.8)", "farther", "farther", "map: farther away", "-"),
-        _hidden("0", "fit", "fit", "fit", "map: show all that matters"),
-        _hidden("k", "signs", "signs", "signs", "what the signs and letters on the map mean"),
-        Binding("question_mark,f1", "app.help", "help", id="playback.help", tooltip="show every key", key_display="?"),
-        Binding(
-            "escape,q", "close", "close", id="playback.close", tooltip="back to where it was opened", key_display="esc"
-        ),
-    ]
+    BINDINGS: ClassVar = keys(
+        "playback",
+        ("play", "space", "play", "play", "play, or pause; at the end: from the start"),
+        ("back", "left", f"step({-STEP})", "1 s back", "one second back"),
+        ("on", "right", f"step({STEP})", "1 s on", "one second on"),
+        ("frame_back", "comma", "frame(-1)", "frame back", f"one frame ({FRAME:g} s) back, and pause", ","),
+        ("frame_on", "full_stop", "frame(1)", "frame on", f"one frame ({FRAME:g} s) on, and pause", "."),
+        ("slower", "less_than_sign", "speed(-1)", "slower", "slower", "<"),
+        ("faster", "greater_than_sign", "speed(1)", "faster", "faster", ">"),
+        ("start", "home", "go(0)", "start", "to the start of the test"),
+        ("end", "end", "go(1)", "end", "to the end of the test"),
+        ("parting", "p", "parting", "they part", "to the instant at which the ways of the two tests part"),
+        ("beside", "o", "beside", "two tests", "play another test over this one, or this one alone again"),
+        ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
+        ("before", "up", "test(-1)", "test before", "the finished test before this one"),
+        ("next", "down", "test(1)", "next test", "the next finished test"),
+        ("closer", "plus,equals_sign", "zoom(1.25)", "closer", "map: closer", "+"),
+        ("farther", "minus", "zoom(0.8)", "farther", "map: farther away", "-"),
+        ("fit", "0", "fit", "fit", "map: show all that matters"),
+        ("signs", "k", "signs", "signs", "what the signs and letters on the map mean"),
+        HELP,
+        ("close", "escape,q", "close", "close", "back to where it was opened", "esc"),
+    )
 
     def __init__(self, file: RunFile, position: Position, place: Place, test: int, beside: int | None = None) -> None:
         """Raises UserError if a test is not finished."""
@@ -167,22 +166,11 @@ class Playback(Screen[None]):
         if self._place.prints:
             self._placed(self._place, "")
         else:
-            self.call_after_refresh(self._read_world)
-
-    # The world is read beside the screen, since it can be large.
-
-    @work(thread=True, group="world", exclusive=True)
-    def _read_world(self) -> None:
-        try:
-            place, notice = place_of_run(self._file.path), ""
-        except UserError as error:
-            place, notice = Place(), str(error)
-        call_if_open(self, self._placed, place, notice)
+            read_world(self, self._file.path, self._placed)
 
     def _placed(self, place: Place, notice: str) -> None:
-        self._place = place
+        self._place, self._prints = place, MovedPrints(place)
         self.map.set_place(place, notice)
-        self._moving = Moving(place, self._tests[0])
         self._show()
 
     def on_resize(self) -> None:
@@ -194,9 +182,8 @@ class Playback(Screen[None]):
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
         self._tests = tests
-        names = ["its way"] if len(tests) == 1 else [f"test {one.test.id}" for one in tests]
-        self._ways = tuple(RobotWay(one, name) for one, name in zip(tests, names, strict=True))
-        self._moving = Moving(self._place, tests[0])
+        self._ways = tuple(RobotWay(one, f"test {one.test.id}" if len(tests) == 2 else "its way") for one in tests)
+        self._prints = MovedPrints(self._place)
         self._parting = None
         if len(tests) == 2 and all(one.rows for one in tests):
             _, at, place = parted(tests[0].rows, tests[1].rows)
@@ -228,12 +215,12 @@ class Playback(Screen[None]):
         moves = f"{count(len(first.moving), 'model')} that moved" if first.moving else "no model moved"
         self.query_one("#playback-world").border_title = Text(f"World · {moves}" if first.rows else "World")
         lines = [f"test {one.test.id}: {plain(one.words)}, seed {one.test.seed}" for one in self._tests]
-        signs = ROBOTS if len(lines) > 1 else ("",)
-        header = Text("", no_wrap=True, overflow="ellipsis")
-        for sign, words, title in zip(signs, lines, (" Playback", "         "), strict=False):
-            header.append("\n" if header else "").append(title, "bold").append(
-                f" · {sign} {words}" if sign else f" · {words}"
-            )
+        if len(lines) == 2:
+            lines = [f"{sign} {line}" for sign, line in zip(ROBOTS, lines, strict=True)]
+        titles = (" Playback", "         ")
+        header = Text("\n", no_wrap=True, overflow="ellipsis").join(
+            Text.assemble((title, "bold"), f" · {line}") for title, line in zip(titles, lines, strict=False)
+        )
         self.query_one("#playback-header", Static).update(header)
         self._show()
 
@@ -249,7 +236,8 @@ class Playback(Screen[None]):
     def _show(self) -> None:
         """The robots, the models and the slider at the instant."""
         playing, at = self.playing, self.playing.time
-        prints = self._moving.at(at)
+        moving = self._tests[0].moving
+        prints = self._prints.at({name: pose_at(samples, at) for name, samples in moving.items()})
         place = None if self._parting is None else self._parting[1]
         self.map.show_ways(tuple(way.at(at) for way in self._ways), place, self._apart, prints)
         tests = tuple(one.test for one in self._tests)
@@ -266,10 +254,9 @@ class Playback(Screen[None]):
         if not playing.length:
             return "no way is stored"
         words = f"{'▶' if playing.on else '‖'} {playing.time:.1f} s of {playing.length:.1f} s · {playing.speed:g} × real time"
-        ends = [way.place(playing.time) for way in self._ways]
-        if len(ends) == 2 and ends[0] is not None and ends[1] is not None:
-            away = ((ends[0][0] - ends[1][0]) ** 2 + (ends[0][1] - ends[1][1]) ** 2) ** 0.5
-            words += f" · {away:.2f} m apart"
+        ends = [place for way in self._ways if (place := way.place(playing.time)) is not None]
+        if len(ends) == 2:
+            words += f" · {math.dist(*ends):.2f} m apart"
         return words
 
     def _show_legend(self) -> None:
@@ -279,14 +266,15 @@ class Playback(Screen[None]):
             self._legend = words
             legend.update(words)
 
-    @on(Timeline.Moved)
-    def _moved(self, event: Timeline.Moved) -> None:
-        self.playing.go(event.time)
-        self._show()
+    def on_timeline_moved(self, event: Timeline.Moved) -> None:
+        self._go(event.seconds)
 
-    @on(Timeline.Turned)
-    def _turned(self, event: Timeline.Turned) -> None:
+    def on_timeline_turned(self, event: Timeline.Turned) -> None:
         self.action_frame(event.frames)
+
+    def _go(self, time: float) -> None:
+        self.playing.go(time)
+        self._show()
 
     # The keys.
 
@@ -296,16 +284,14 @@ class Playback(Screen[None]):
         self._show()
 
     def action_step(self, seconds: float) -> None:
-        self.playing.go(self.playing.time + seconds)
-        self._show()
+        self._go(self.playing.time + seconds)
 
     def action_frame(self, number: int) -> None:
         self.playing.frames(number)
         self._show()
 
     def action_go(self, part: int) -> None:
-        self.playing.go(part * self.playing.length)
-        self._show()
+        self._go(part * self.playing.length)
 
     def action_speed(self, steps: int) -> None:
         if not self.playing.faster(steps):
@@ -314,8 +300,7 @@ class Playback(Screen[None]):
 
     def action_parting(self) -> None:
         if self._parting is not None:
-            self.playing.go(self._parting[0])
-            self._show()
+            self._go(self._parting[0])
         elif len(self._tests) == 2:
             self._refuse(f"the robots are never {APART:g} m apart")
         else:
@@ -359,3 +344,47 @@ class Playback(Screen[None]):
 
     def _refuse(self, why: str) -> None:
         self.notify(plain(why), severity="warning", timeout=4, markup=False)
+
+
+class Beside(ModalScreen[int | None]):
+    """Returns the number of the test to play beside `test`; 0 for none, or None if nothing is to change."""
+
+    CSS_PATH = "playback.tcss"
+    BINDINGS: ClassVar = keys("beside", ("close", "escape,o,q", "dismiss", "close", "back to the playback"))
+
+    def __init__(self, state: RunState, test: Test) -> None:
+        super().__init__()
+        self._state, self._test = state, test
+        self._tests = others(state.tests, test)
+
+    def compose(self) -> ComposeResult:
+        with Framed(f"Play beside test {self._test.id}", "enter plays both   escape closes"):
+            yield Static(_line("test", "of", "seed", "end"), id="head", markup=False)
+            alone = Option(Text(f"test {self._test.id} alone"))
+            options = (Option(self._words(test)) for test in self._tests)
+            yield OptionList(alone, *options, id="beside", compact=True, markup=False)
+
+    def on_mount(self) -> None:
+        options = self.query_one(OptionList)
+        options.focus()
+        options.highlighted = min(1, len(self._tests))
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        self.dismiss(self._tests[event.option_index - 1].id if event.option_index else 0)
+
+    def _words(self, test: Test) -> Text:
+        same = "= " if test.seed == self._test.seed else ""
+        return _line(str(test.id), purpose(self._state, test), f"{same}{test.seed}", outcome(test))
+
+
+def others(tests: Sequence[Test], one: Test) -> list[Test]:
+    """The other finished tests: first those with the same seed, the latest first."""
+    finished = (test for test in reversed(tests) if test.is_finished and test.id != one.id)
+    # Of very many tests the latest ones are looked at.
+    latest = list(islice(finished, 100 * LISTED))
+    return sorted(latest, key=lambda test: test.seed != one.seed)[:LISTED]
+
+
+def _line(number: str, words: str, seed: str, end: str) -> Text:
+    what = padded(shortened(words, WORDS), WORDS)
+    return Text(f"{number:>{NUMBER}}  {what}{seed:>{SEED}}  {shortened(end, OUTCOME)}", no_wrap=True)

@@ -36,19 +36,17 @@ class Timeline(Widget):
     ALLOW_SELECT = False
     DEFAULT_CSS = "Timeline { height: auto; }"
 
+    @dataclass
     class Moved(Message):
-        """The user wants to be at simulated `time`, s."""
+        """The user wants to be at simulated `seconds`."""
 
-        def __init__(self, time: float) -> None:
-            super().__init__()
-            self.time = time
+        seconds: float
 
+    @dataclass
     class Turned(Message):
         """The user turned the wheel by so many `frames`."""
 
-        def __init__(self, frames: int) -> None:
-            super().__init__()
-            self.frames = frames
+        frames: int
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)

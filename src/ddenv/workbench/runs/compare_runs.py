@@ -9,13 +9,13 @@ from typing import Any, ClassVar
 from rich.table import Table
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from ddenv.text import count, first_of, plain, truncated
 from ddenv.words.signs import brief
+from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
 
@@ -32,9 +32,9 @@ class CompareRuns(ModalScreen[None]):
     """A column for each run; a line is bold where they differ."""
 
     CSS_PATH = "runs.tcss"
-    BINDINGS: ClassVar = [
-        Binding("escape,c,q,enter", "dismiss", "close", id="compare_runs.close", tooltip="back to the list of runs"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "compare_runs", ("close", "escape,c,q,enter", "dismiss", "close", "back to the list of runs")
+    )
 
     def __init__(self, first: Recent, second: Recent) -> None:
         super().__init__()

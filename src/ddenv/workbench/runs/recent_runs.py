@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from ddenv.workbench.shared.observed import Busy, Observed
 SHOWN = 40
 # What SQLite says about a file that another program has locked.
 LOCKED = "database is locked"
+# The states in which no engine is expected.
+ENDED = ("created", "finished", "stopped", "failed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +77,7 @@ class Recent:
 
     @property
     def is_worked_on(self) -> bool:
-        return bool(self.status) and self.status not in ("created", "finished", "stopped", "failed", "lost")
+        return bool(self.status) and self.status not in (*ENDED, "lost")
 
 
 @dataclass(slots=True)
@@ -98,7 +101,7 @@ class RunsFolder:
 
         Not for the screen's thread.
         """
-        stamps = _stamps(self._folder)
+        stamps = dict(_stamps(self._folder))
         self._read = {path: read for path, read in self._read.items() if path in stamps}
         latest = sorted(stamps, key=lambda path: (-stamps[path][0], path.name))[:most]
         until = time.monotonic() + patience
@@ -109,41 +112,30 @@ class RunsFolder:
         read = self._read.get(path)
         if (read is None or read.stamp != stamp) and time.monotonic() < until:
             last, read = read, _read(path, stamp, read.state if read else None)
-            if read.stamp != stamp and last is not None:
+            if not read.stamp and last is not None:
                 read = last
             self._read[path] = read
         if read is None:
-            return Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3])
+            return Recent(path, *_age_and_size(stamp))
         recent = read.recent
-        if not recent.trouble and recent.status not in ("created", "finished", "stopped", "failed"):
-            alive = engine_is_alive(path)
-            if not alive:
-                # A run without an engine does not change, so its state is not kept.
-                read.state = None
-            return recent if alive else replace(recent, status="lost")
+        if not recent.trouble and recent.status not in ENDED and not engine_is_alive(path):
+            # A run without an engine does not change, so its state is not kept.
+            read.state = None
+            return replace(recent, status="lost")
         return recent
 
 
-def recent_runs(folder: Path) -> list[Recent]:
-    """The newest runs in `folder`; damaged ones are listed with their error."""
-    return RunsFolder(folder).look(most=SHOWN)
-
-
-def _stamps(folder: Path) -> dict[Path, tuple[int, ...]]:
+def _stamps(folder: Path) -> Iterator[tuple[Path, tuple[int, ...]]]:
     """When each run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
-    try:
-        paths = [path for path in folder.glob("*.ddenv") if not path.name.startswith(".")]
-    except OSError:
-        return {}
-    stamps = {path: _stamp(path) for path in paths}
-    return {path: stamp for path, stamp in stamps.items() if stamp}
+    with suppress(OSError):
+        for path in folder.glob("*.ddenv"):
+            with suppress(OSError):
+                if not path.name.startswith("."):
+                    yield path, _stamp(path)
 
 
 def _stamp(path: Path) -> tuple[int, ...]:
-    try:
-        file = path.stat()
-    except OSError:
-        return ()
+    file = path.stat()
     try:
         log = path.with_name(f"{path.name}-wal").stat()
     except OSError:
@@ -151,23 +143,25 @@ def _stamp(path: Path) -> tuple[int, ...]:
     return (max(file.st_mtime_ns, log.st_mtime_ns), file.st_size, log.st_mtime_ns, log.st_size)
 
 
+def _age_and_size(stamp: tuple[int, ...]) -> tuple[float, int]:
+    return stamp[0] / 1e9, stamp[1] + stamp[3]
+
+
 def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
+    age, size = _age_and_size(stamp)
     try:
-        file = Observed(path)
+        with Observed(path) as file:
+            first = file.events(0, 1)
+            state = fold(file.events(state.revision if state else 0), state)
     except UserError as error:
-        return _unread(path, stamp, error)
-    try:
-        first = file.events(0, 1)
-        state = fold(file.events(state.revision if state else 0), state)
-    except UserError as error:
-        return _unread(path, stamp, error)
-    finally:
-        file.close()
+        # A file that another program has locked is read again at the next call.
+        locked = isinstance(error, Busy) or LOCKED in str(error)
+        return _Read(() if locked else stamp, Recent(path, age, size, trouble=str(error)))
     options = settings(state)
     recent = Recent(
         path,
-        state.updated_at or stamp[0] / 1e9,
-        stamp[1] + stamp[3],
+        state.updated_at or age,
+        size,
         state.status,
         options.name,
         options.algorithm,
@@ -185,12 +179,6 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
     return _Read(stamp, recent, None if state.ended else state)
 
 
-def _unread(path: Path, stamp: tuple[int, ...], error: UserError) -> _Read:
-    """A run that cannot be read. A file locked by another program is read again at the next call."""
-    locked = isinstance(error, Busy) or LOCKED in str(error)
-    return _Read(() if locked else stamp, Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3], trouble=str(error)))
-
-
 def computed(state: RunState) -> float:
     """How long the simulations of a run took, s; results that were copied or implied cost nothing."""
     return sum(test.wall_seconds for test in state.tests if not test.taken and test.implied_by is None)
@@ -199,8 +187,5 @@ def computed(state: RunState) -> float:
 def named(runs: Iterable[Recent], part: str) -> list[Recent]:
     """Those whose name, scenario, method or state holds `part`."""
     wanted = part.strip().casefold()
-    return [run for run in runs if any(wanted in words.casefold() for words in _said(run))]
-
-
-def _said(run: Recent) -> tuple[str, ...]:
-    return run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words
+    said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in runs)
+    return [run for run, words in said if any(wanted in each.casefold() for each in words)]

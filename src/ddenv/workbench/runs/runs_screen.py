@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import shutil
 import time
+from asyncio import to_thread
 from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
 from textual import on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import DataTable, Input, Static
@@ -20,6 +20,7 @@ from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
 from ddenv.runs.folder import SUFFIX
 from ddenv.text import count, plain, shortened
+from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
@@ -38,14 +39,8 @@ PERIOD, PATIENCE = 1.0, 0.3
 # From this width on what is said of a run stands beside the table, else below it.
 WIDE = 110
 # The footer's keys in the order of the screen, then by priority.
-SHOWN = (
-    *("runs.open", "runs.watch", "runs.like", "runs.filter", "runs.sort", "runs.mark", "runs.compare", "runs.delete"),
-    *("runs.undo", "runs.path", "runs.help", "runs.back"),
-)
-FIRST = (
-    *("runs.help", "runs.back", "runs.open", "runs.sort", "runs.filter", "runs.delete", "runs.undo", "runs.mark"),
-    *("runs.compare", "runs.path", "runs.watch", "runs.like"),
-)
+SHOWN = ids("runs", "open watch like filter sort mark compare delete undo path help back")
+FIRST = ids("runs", "help back open sort filter delete undo mark compare path watch like")
 
 
 def delete_run(path: Path) -> None:
@@ -104,27 +99,20 @@ class RunsScreen(Screen[None]):
     CSS_PATH = "runs.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (WIDE, "-wide"), (160, "-huge")]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (20, "-low"), (30, "-tall")]
-    BINDINGS: ClassVar = [
-        Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it without changing anything"),
-        Binding("n", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
-        Binding("slash", "filter", "filter", id="runs.filter", tooltip="filter by name, scenario, method or state"),
-        Binding(
-            "s", "sort", "sort", id="runs.sort", tooltip="sort by the next column; a click on a column does so, too"
-        ),
-        Binding("m", "mark", "mark", id="runs.mark", tooltip="mark this run, to compare another with it"),
-        Binding("c", "compare", "compare", id="runs.compare", tooltip="compare the marked run with this one"),
-        Binding("d", "delete", "delete", id="runs.delete", tooltip="delete it; u brings it back for a week"),
-        Binding("u", "undo", "undo", id="runs.undo", tooltip="bring back the run that was deleted last"),
-        Binding(
-            "o",
-            "path",
-            "open a file",
-            id="runs.path",
-            tooltip="open a run by its path; or drop the file on the terminal",
-        ),
-        Binding("question_mark,f1", "app.help", "help", id="runs.help", tooltip="show every key", key_display="?"),
-        Binding("escape,q,R", "back", "back", id="runs.back", tooltip="back to the previous screen", key_display="esc"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "runs",
+        ("watch", "w", "watch", "watch", "watch it without changing anything"),
+        ("like", "n", "copy", "new like it", "a new run with its scenario and other settings"),
+        ("filter", "slash", "filter", "filter", "filter by name, scenario, method or state"),
+        ("sort", "s", "sort", "sort", "sort by the next column; a click on a column does so, too"),
+        ("mark", "m", "mark", "mark", "mark this run, to compare another with it"),
+        ("compare", "c", "compare", "compare", "compare the marked run with this one"),
+        ("delete", "d", "delete", "delete", "delete it; u brings it back for a week"),
+        ("undo", "u", "undo", "undo", "bring back the run that was deleted last"),
+        ("path", "o", "path", "open a file", "open a run by its path; or drop the file on the terminal"),
+        HELP,
+        ("back", "escape,q,R", "back", "back", "back to the previous screen", "esc"),
+    )
 
     def __init__(self) -> None:
         super().__init__()
@@ -250,35 +238,30 @@ class RunsScreen(Screen[None]):
         elif run.is_worked_on:
             self._complain("its engine is at work: open the run and stop it first")
         else:
-            self._delete(run.path)
+            self.app.run_worker(self._delete(run.path))
 
-    @work(thread=True, group="delete")
-    def _delete(self, path: Path) -> None:
+    async def _delete(self, path: Path) -> None:
         try:
-            delete_run(path)
+            await to_thread(delete_run, path)
         except UserError as error:
-            self.app.call_from_thread(self._complain, str(error))
+            self._complain(str(error))
             return
-        self.app.call_from_thread(self._deleted, path)
-
-    def _deleted(self, path: Path) -> None:
         self.notify(f"{plain(path.stem)} is deleted; u brings it back, for a week", timeout=4, markup=False)
         self._runs = [run for run in self._runs if run.path != path]
         if is_open(self):
             self._list()
 
-    @work(thread=True, group="delete")
     def action_undo(self) -> None:
+        self.app.run_worker(self._undo())
+
+    async def _undo(self) -> None:
         from ddenv.runs.folder import runs_folder
 
         try:
-            path = bring_back(runs_folder())
+            path = await to_thread(bring_back, runs_folder())
         except UserError as error:
-            self.app.call_from_thread(self._complain, str(error))
+            self._complain(str(error))
             return
-        self.app.call_from_thread(self._is_back, path)
-
-    def _is_back(self, path: Path) -> None:
         self.notify(f"{plain(path.stem)} is back", timeout=3, markup=False)
         if is_open(self):
             self._look()

@@ -8,13 +8,13 @@ from datetime import datetime
 from typing import Any, ClassVar
 
 from rich.text import Text
-from textual import events, work
-from textual.binding import Binding
+from textual import work
 from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.signs import brief
+from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
 from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
@@ -161,93 +161,62 @@ def moment(time: float) -> str:
 
 
 class RunTable(DataTable[Text]):
-    """One row per run; only changed cells are drawn again."""
+    """One row per run; only changed rows are drawn again."""
 
-    BINDINGS: ClassVar = [
-        Binding("enter", "select_cursor", "open", id="runs.open", tooltip="open the run under the cursor"),
-        Binding("home", "scroll_top", "first", id="runs.first", tooltip="to the first run", show=False),
-        Binding("end", "scroll_bottom", "last", id="runs.last", tooltip="to the last run", show=False),
-    ]
+    BINDINGS: ClassVar = keys(
+        "runs",
+        ("open", "enter", "select_cursor", "open", "open the run under the cursor"),
+        ("first", "home", "scroll_top", "first", "to the first run"),
+        ("last", "end", "scroll_bottom", "last", "to the last run"),
+    )
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, cursor_type="row", zebra_stripes=False)
         self._runs: list[Recent] = []
-        self._wide = 0
-        self._order = ""
-        self._name_width = NARROWEST_NAME
-        self._cells: dict[str, list[str]] = {}
+        self._wide, self._order = 0, ""
+        self._shown: list[_Column] = []
 
     @property
     def chosen(self) -> Recent | None:
         """The run under the cursor."""
         return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
 
-    def show(self, runs: list[Recent], order: str = "") -> None:
+    def show(self, runs: list[Recent], order: str) -> None:
         """Shows these in this order, whose column is marked; the cursor stays on its run."""
-        chosen = self.chosen
-        if order and order != self._order:
-            self._order, self._wide = order, 0
-        same = self._wide == self.size.width and [run.path for run in runs] == [run.path for run in self._runs]
+        before, paths, chosen = self._runs, [run.path for run in runs], self.chosen
         self._runs = list(runs)
-        if not same:
-            self._fill()
-            paths = [run.path for run in runs]
-            if chosen is not None and chosen.path in paths:
-                self.move_cursor(row=paths.index(chosen.path), animate=False)
+        if (self._wide, self._order) == (self.size.width, order) and paths == [run.path for run in before]:
+            for was, run in zip(before, runs, strict=True):
+                if run != was:
+                    for column, cell in zip(self.ordered_columns, self._row(run), strict=True):
+                        self.update_cell(str(run.path), column.key, cell)
             return
+        self._wide, self._order = self.size.width, order
+        self._arrange()
         for run in runs:
-            self._refill(run)
+            self.add_row(*self._row(run), key=str(run.path))
+        if chosen is not None and chosen.path in paths:
+            self.move_cursor(row=paths.index(chosen.path), animate=False)
 
-    def on_resize(self, event: events.Resize) -> None:
-        self.show(self._runs)
+    def on_resize(self) -> None:
+        self.show(self._runs, self._order)
 
-    def action_scroll_top(self) -> None:
-        self.move_cursor(row=0)
-
-    def action_scroll_bottom(self) -> None:
-        self.move_cursor(row=len(self._runs) - 1)
-
-    def _fill(self) -> None:
-        self._wide = self.size.width
+    def _arrange(self) -> None:
+        """The columns that fit; the name takes the rest."""
         self.clear(columns=True)
-        self._cells = {}
-        columns = self._columns()
-        name = self._wide - sum(column[1] + AROUND for column in columns) - AROUND - 1
-        self._name_width = max(NARROWEST_NAME, name)
-        self.add_column(self._title("name"), width=self._name_width, key="name")
-        for title, width, number, _ in columns:
-            self.add_column(Text(self._title(title), justify="right" if number else "left"), width=width, key=title)
-        for run in self._runs:
-            cells = self._row(run)
-            self._cells[str(run.path)] = cells
-            self.add_row(*self._drawn(cells), key=str(run.path))
-
-    def _title(self, name: str) -> str:
-        return f"▾{name}" if name == self._order else name
-
-    def _refill(self, run: Recent) -> None:
-        key, cells = str(run.path), self._row(run)
-        if self._cells.get(key) == cells:
-            return
-        before, self._cells[key] = self._cells[key], cells
-        for column, was, cell, drawn in zip(self.ordered_columns, before, cells, self._drawn(cells), strict=True):
-            if was != cell:
-                self.update_cell(key, column.key, drawn)
-
-    def _columns(self) -> list[_Column]:
-        columns = list(FIRST)
+        room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
+        self._shown = list(FIRST)
         for column in MORE:
-            if sum(each[1] + AROUND for each in (*columns, column)) + NARROWEST_NAME + AROUND < self._wide:
-                columns.append(column)
-        return columns
+            if room - column[1] - AROUND >= NARROWEST_NAME:
+                self._shown.append(column)
+                room -= column[1] + AROUND
+        self._shown.insert(0, ("name", max(NARROWEST_NAME, room), False, lambda run: plain(run.path.stem)))
+        for name, width, number, _ in self._shown:
+            title = f"▾{name}" if name == self._order else name
+            self.add_column(Text(title, justify="right" if number else "left"), width=width, key=name)
 
-    def _row(self, run: Recent) -> list[str]:
-        words = [shortened(say(run), width) for _, width, _, say in self._columns()]
-        return [shortened(plain(run.path.stem), self._name_width), *words]
-
-    def _drawn(self, cells: list[str]) -> list[Text]:
-        numbers = [False, *(number for _, _, number, _ in self._columns())]
+    def _row(self, run: Recent) -> list[Text]:
         return [
-            Text(cell, justify="right" if number else "left", no_wrap=True)
-            for cell, number in zip(cells, numbers, strict=True)
+            Text(shortened(say(run), width), justify="right" if number else "left", no_wrap=True)
+            for _, width, number, say in self._shown
         ]

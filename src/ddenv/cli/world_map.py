@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product, zip_longest
 
 import numpy as np
@@ -32,16 +31,6 @@ Pose = tuple[float, float, float]
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    """The cells of the picture, and the lines of the legend, which stands `beside` the picture or below it."""
-
-    columns: int
-    rows: int
-    legend_lines: int
-    beside: bool
-
-
 def terminal_map(
     world: World,
     columns: int,
@@ -64,21 +53,36 @@ def terminal_map(
     margin = np.maximum(0.3, 0.03 * (high - low))
     low, high = low - margin, high + margin
     entries = [entry for entry in _entries(models) if entry[1] not in dim]
-    layout = _layout(high - low, columns, rows, entries)
-    view = _view(low, high, layout)
+    # The legend stands beside the picture or below it, whichever leaves the larger map.
+    widths = _widths(entries, columns // 2)
+    lines = min(1 + math.ceil(len(entries) / _blocks(widths, columns)), max(3, rows // 3)) if entries else 0
+    view = _view(low, high, columns - AXIS, rows - AROUND - lines)
+    room, beside = columns - AXIS - len(GAP) - _wide(widths), False
+    if entries and room >= 2 * NUMBERS:
+        other = _view(low, high, room, rows - AROUND)
+        if beside := view.scale >= other.scale:
+            view, lines = other, rows - 1
     axes = _axes(view)
     canvas = picture(models, view, color=color, dim=dim)
     _grid(canvas, *axes)
     _marks(canvas, view, spawn, goal, color)
     drawn = list(_framed(canvas, view, *axes, color))
-    left = columns - AXIS - view.columns - len(GAP) if layout.beside else columns
-    legend = _legend(entries, left, layout.legend_lines)
+    legend = _legend(entries, columns - AXIS - view.columns - len(GAP) if beside else columns, lines)
     title = shortened(_title(world, models, spawn, goal), columns)
-    if not layout.beside:
+    if not beside:
         return "\n".join([title, *drawn, *legend])
     empty = " " * (view.columns + AXIS)
     both = zip_longest(drawn, legend)
     return "\n".join([title, *(f"{line or empty}{GAP}{text or ''}".rstrip() for line, text in both)])
+
+
+def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
+    """At most so many cells, as many as the world needs, so that the frame fits tightly."""
+    wide, tall = (high - low).tolist()
+    scale = max(wide / columns, tall / (2 * rows), FINEST)
+    x, y = ((low + high) / 2).tolist()
+    needs, need_rows = math.ceil(wide / scale - 1e-6), math.ceil(tall / (2 * scale) - 1e-6)
+    return View(x, y, scale, min(columns, max(2 * NUMBERS, needs)), min(rows, max(3, need_rows)))
 
 
 def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Point | None) -> str:
@@ -143,34 +147,6 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
     sign, name, center, size = entry
     left = f"{padded(sign, widths[0])}{GAP}{padded(shortened(name, widths[1]), widths[1])}"
     return f"{left}{GAP}{center:>{widths[2]}}{GAP}{size:>{widths[3]}}"
-
-
-# The layout.
-
-
-def _layout(spans: np.ndarray, columns: int, rows: int, entries: Sequence[Entry]) -> _Layout:
-    """The layout with the larger map; `spans` is what it shows, m."""
-    widths = _widths(entries, columns // 2)
-    beside = _Layout(columns - AXIS - len(GAP) - _wide(widths), rows - AROUND, rows - 1, True)
-    lines = min(1 + math.ceil(len(entries) / _blocks(widths, columns)), max(3, rows // 3)) if entries else 0
-    below = _Layout(columns - AXIS, rows - AROUND - lines, lines, False)
-    if not entries or beside.columns < 2 * NUMBERS or _scale(spans, below) < _scale(spans, beside):
-        return below
-    return beside
-
-
-def _scale(spans: np.ndarray, layout: _Layout) -> float:
-    """Metres of one pixel, of which a cell has two, one above the other."""
-    return max(float(spans[0]) / layout.columns, float(spans[1]) / (2 * layout.rows), FINEST)
-
-
-def _view(low: np.ndarray, high: np.ndarray, layout: _Layout) -> View:
-    """The number of cells that the world needs, so that the frame fits tightly."""
-    scale = _scale(high - low, layout)
-    x, y = ((low + high) / 2).tolist()
-    columns = math.ceil((high[0] - low[0]) / scale - 1e-6)
-    rows = math.ceil((high[1] - low[1]) / (2 * scale) - 1e-6)
-    return View(x, y, scale, min(layout.columns, max(2 * NUMBERS, columns)), min(layout.rows, max(3, rows)))
 
 
 # Axes and marks.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -21,41 +22,41 @@ from ddenv.runs.folder import find_run
 @click.option("--race", is_flag=True, help="Two to four runs of one world side by side, test by test.")
 @click.option("--page", type=Path, metavar="FILE", help="Write the lesson's summary as one HTML page to hand out.")
 def learn_command(
-    lesson: str | None,
-    runs: tuple[str, ...],
-    listed: bool,
-    check: Path | None,
-    new: Path | None,
-    run: str | None,
-    race: bool,
-    page: Path | None,
+    lesson: str | None, runs: tuple[str, ...], check: Path | None, new: Path | None, run: str | None, **given: Any
 ) -> int:
     """Lessons on delta debugging, on recorded runs: step by step, with predictions and questions. They need no Drake.
 
     LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn' alone shows the list.
     """
-    given = {"--list": listed, "--check": check, "--new": new, "--race": race, "--page": page}
-    asked = [name for name, value in given.items() if value]
+    from ddenv.learn.shelf import open_lesson, write_template
+
+    given = {"list": given["listed"], "check": check, "new": new, "race": given["race"], "page": given["page"]}
+    asked = [f"--{name}" for name, value in given.items() if value]
     if len(asked) > 1:
         raise UserError(f"{' and '.join(asked)}: give one of them")
-    if race:
+    if given["race"]:
         return _race([*([lesson] if lesson else ()), *runs])
     if runs:
         raise UserError(f"{runs[0]!r}: expected one lesson or run; --race shows several runs")
     if run is not None and new is None:
         raise UserError("--run: only with --new")
-    if listed:
-        return _list()
-    if check is not None:
-        return _check(check)
-    if new is not None:
-        return _new(new, run)
-    if page is not None:
-        return _page(lesson, page)
-    return _open(lesson)
+    if given["list"]:
+        _list()
+    elif check is not None:
+        opened = open_lesson(check)
+        print(f"{check}: {len(opened.lesson.steps)} steps, {opened.asked} questions, no mistake found")
+    elif new is not None:
+        if run is None:
+            raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
+        say_written(write_template(new, find_run(run)))
+    elif given["page"] is not None:
+        _page(lesson, given["page"])
+    else:
+        return _open(lesson)
+    return 0
 
 
-def _list() -> int:
+def _list() -> None:
     from ddenv.learn.shelf import bundled, glance
     from ddenv.workbench.learn.kept_scores import all_scores, in_words
 
@@ -63,24 +64,6 @@ def _list() -> int:
     for number, file in enumerate(bundled(), 1):
         lesson = glance(file)
         print(f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name))}")
-    return 0
-
-
-def _check(file: Path) -> int:
-    from ddenv.learn.shelf import open_lesson
-
-    opened = open_lesson(file)
-    print(f"{file}: {len(opened.lesson.steps)} steps, {opened.asked} questions, no mistake found")
-    return 0
-
-
-def _new(file: Path, run: str | None) -> int:
-    from ddenv.learn.shelf import write_template
-
-    if run is None:
-        raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
-    say_written(write_template(file, find_run(run)))
-    return 0
 
 
 def _race(names: list[str]) -> int:
@@ -96,7 +79,7 @@ def _race(names: list[str]) -> int:
     return run_workbench(first=ShowRace(runs))
 
 
-def _page(name: str | None, file: Path) -> int:
+def _page(name: str | None, file: Path) -> None:
     from ddenv.learn.handout import handout
     from ddenv.learn.shelf import find_lesson, open_lesson
     from ddenv.page.html import html
@@ -113,7 +96,6 @@ def _page(name: str | None, file: Path) -> int:
         raise UserError(f"no lesson {name!r}; 'ddenv learn --list' shows them")
     write_file(file, html(handout(open_lesson(lesson))).encode())
     say_written([file])
-    return 0
 
 
 def _open(name: str | None) -> int:

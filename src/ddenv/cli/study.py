@@ -47,16 +47,7 @@ from ddenv.cli.terminal import asking
 )
 @setting_options(without=("pair", "algorithm", "seed", "budget", "timeout", "cluster"))
 @trust_option
-def study_command(
-    scenarios: tuple[str, ...],
-    pairs: str,
-    algorithms: str,
-    seeds: int,
-    jobs: int,
-    folder: Path,
-    trust: bool,
-    **options: Any,
-) -> int:
+def study_command(scenarios: tuple[str, ...], jobs: int, folder: Path, trust: bool, **given: Any) -> int:
     """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
 
     It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.
@@ -66,7 +57,7 @@ def study_command(
     from ddenv.study.conduct import conduct
     from ddenv.study.plan import make_plan, scenario_names
 
-    plan = make_plan(scenarios, pairs, algorithms, seeds, **options)
+    plan = make_plan(scenarios, **given)
     for scenario, name in zip(plan.scenarios, scenario_names(scenarios), strict=True):
         check_named(scenario, name, asking(trust))
     return conduct(plan, folder, jobs, sys.stdout)

@@ -1,4 +1,4 @@
-"""Commands that open the workbench, here or in a browser: `ddenv open` and `serve`; and `config`, its keys and theme."""
+"""Commands that open the workbench, here or in a browser: `ddenv open` and `serve`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,13 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     if kind == "run" and path.is_file():
         if any(reading.values()):
             raise UserError("options for reading worlds: a run keeps its own")
-        return _follow(path, watch) if lines else run_workbench(path, watch=watch)
+        if not lines:
+            return run_workbench(path, watch=watch)
+        from ddenv.workbench.lines.line_mode import LineMode, typed_lines
+
+        # Interrupted as after quit, the engine goes on.
+        LineMode(path, watch, sys.stdout).follow(typed_lines(sys.stdin))
+        return 0
     if is_folder(Path(run)):
         raise UserError(f"{run}: is a folder; expected a run, a scenario or a world")
     if kind == "run":
@@ -43,17 +49,6 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     if watch or lines:
         raise UserError(f"{'--watch' if watch else '--lines'}: only for runs")
     return run_workbench(None, reading=given_reading(reading), file=path.absolute())
-
-
-def _follow(run: Path, watch: bool) -> int:
-    from ddenv.workbench.lines.line_mode import follow_in_lines
-
-    try:
-        follow_in_lines(run, watch, sys.stdin, sys.stdout)
-    except KeyboardInterrupt:
-        # As quit: the engine goes on.
-        return 130
-    return 0
 
 
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:
@@ -68,11 +63,7 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 @click.argument("run", required=False, shell_complete=runs)
 @click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
 @click.option(
-    "--font-size",
-    type=whole(6, 72),
-    default=16,
-    show_default=True,
-    help="Of the text, in pixels; 28 for a projector.",
+    "--font-size", type=whole(6, 72), default=16, show_default=True, help="Of the text, in pixels; 28 for a projector."
 )
 @click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
 def serve_command(run: str | None, port: int, font_size: int) -> int:
@@ -80,14 +71,4 @@ def serve_command(run: str | None, port: int, font_size: int) -> int:
     from ddenv.workbench.terminal.served import serve
 
     serve(port, run, font_size)
-    return 0
-
-
-@click.command("config")
-@click.option("--example", is_flag=True, help="Print an example file with every action.")
-def config_command(example: bool) -> int:
-    """Shows the path of the file with your keys and theme, and lists all actions with their keys."""
-    from ddenv.workbench.config import example_lines, lines
-
-    print("\n".join(example_lines() if example else lines()))
     return 0

@@ -1,75 +1,56 @@
-"""Commands that start an engine and follow it without a screen: `ddenv run`, and on a run `resume`, `certify` and `isolate`."""
+"""Commands that start an engine and follow it without a screen: `ddenv run`, and on a run `resume` and `certify`."""
 
 from __future__ import annotations
 
-import json
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import (
-    Number,
-    cluster_option,
-    jobs_option,
-    json_option,
-    reading_options,
-    run_argument,
-    scenario_options,
-    scenarios,
-    setting_options,
-    trust_option,
-    whole,
-)
-from ddenv.cli.terminal import announce, asking, say
+from ddenv.cli import options
+from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
 from ddenv.settings import SETTINGS
-from ddenv.text import count, printable
+from ddenv.text import count, first_of, printable, shortened
 
 if TYPE_CHECKING:
     from ddenv.runfile.state import RunState
     from ddenv.world.model import World
 
+# Columns.
+LONGEST_URI = 80
+
 
 @click.command("run")
-@click.argument("scenario", shell_complete=scenarios)
-@scenario_options
-@reading_options
-@setting_options()
+@click.argument("scenario", shell_complete=options.scenarios)
+@options.scenario_options
+@options.reading_options
+@options.setting_options()
 @click.option(
     "--exact",
     is_flag=True,
     help="Reduce failing runs of the baseline themselves, each repeated with its seed, as --accept-rate exact does.",
 )
-@jobs_option()
+@options.jobs_option()
 @click.option("--name", help="Name of the run.")
 @click.option(
     "--output", type=Path, help="A .ddenv file or a folder for the run; or an .sdf file for the minimal world."
 )
-@trust_option
-@json_option
+@options.trust_option
+@options.json_option
 def run_command(
-    scenario: str,
-    name: str | None,
-    output: Path | None,
-    exact: bool,
-    jobs: int,
-    trust: bool,
-    as_json: bool,
-    **options: Any,
+    scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
 ) -> int:
     """Reduces SCENARIO (ditch, rubble, friction, a YAML file or an SDF world) without a screen."""
     from ddenv.cli.follow import follow_to_summary
-    from ddenv.cli.result_command import announce_needs
     from ddenv.runs.creation import create_named
     from ddenv.runs.export import export_world
     from ddenv.runs.programs import start_engine
 
-    if exact:
-        options["accept_rate"] = "exact"
-    path, world = create_named(scenario, options, asking(trust), name, output, announce)
+    if given.pop("exact"):
+        given["accept_rate"] = "exact"
+    path, world = create_named(scenario, given, asking(trust), name, output, announce)
     announce_notes(world, as_json)
     code, state = follow_to_summary(path, start_engine(path, jobs), as_json)
     if output is not None and output.suffix in (".sdf", ".world") and state.baseline is not None:
@@ -85,15 +66,21 @@ def announce_notes(world: World, as_json: bool) -> None:
         print(printable(line), file=sys.stderr if as_json else sys.stdout, flush=True)
 
 
+def announce_needs(sdf: Path, uris: list[str]) -> None:
+    """Lists the other files that a written world still needs, since it keeps their names."""
+    if uris:
+        announce(f"{sdf} still needs {first_of([shortened(uri, LONGEST_URI) for uri in uris], 3)}")
+
+
 @click.command("resume")
-@run_argument
-@jobs_option()
-@cluster_option()
+@options.run_argument
+@options.jobs_option()
+@options.cluster_option
 @click.option("--mixed", is_flag=True, help="Go on even if other versions or another processor give other results.")
 @click.option("--anyway", is_flag=True, help="Go on even if the last engines died again and again.")
 @click.option("--again", is_flag=True, help="Make all tests again, in a new run of the same scenario.")
-@trust_option
-@json_option
+@options.trust_option
+@options.json_option
 def resume_command(
     run: str, jobs: int, cluster: str | None, mixed: bool, anyway: bool, again: bool, trust: bool, as_json: bool
 ) -> int:
@@ -120,49 +107,43 @@ def resume_command(
                 # Going back while no engine works ends in a pause, and without a screen nobody can end it.
                 if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
                     file.send("resume")
+    # Without a screen there is nobody to ask.
+    how = {"bits": "mixed" if mixed else "same", "anyway": "yes" if anyway else "no", "accept_mode": "automatic"}
     if again:
         new = run_path(scenario.name, None, path.parent)
         create_like(path, scenario, new)
         announce(f"makes the tests of {path} again in {new}")
-        return follow_to_summary(new, start_engine(new, jobs, cluster=cluster), as_json)[0]
-    # Without a screen there is nobody to ask.
-    how = {"bits": "mixed" if mixed else "same", "anyway": "yes" if anyway else "no", "accept_mode": "automatic"}
+        path, how = new, {}
     return follow_to_summary(path, start_engine(path, jobs, cluster=cluster, **how), as_json)[0]
 
 
 @click.command("certify")
-@run_argument
+@options.run_argument
 @click.option(
     "--runs",
-    type=whole(1),
+    type=options.whole(1),
     metavar="N",
     help="Run what is left at least so often; as often as the baseline's whole world if not given.",
 )
 @click.option(
     "--certify-rate",
-    type=Number(SETTINGS["certify_rate"]),
+    type=options.Number(SETTINGS["certify_rate"]),
     metavar="PART",
     help="Go on with the last certificate, and keep all of its runs, until it shows that this part of the rate is kept.",
 )
-@jobs_option()
-@cluster_option()
-@trust_option
-@json_option
+@options.jobs_option()
+@options.cluster_option
+@options.trust_option
+@options.json_option
 def certify_command(
-    run: str,
-    runs: int | None,
-    certify_rate: float | None,
-    jobs: int,
-    cluster: str | None,
-    trust: bool,
-    as_json: bool,
+    run: str, runs: int | None, certify_rate: float | None, jobs: int, cluster: str | None, trust: bool, as_json: bool
 ) -> int:
     """Makes one more certificate of what RUN (a name or a file) has left, with fresh seeds; it changes nothing else."""
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.run_settings import settings
     from ddenv.runs.programs import start_engine
 
-    path, state = _idle_run(run, trust, cluster)
+    path, state = idle_run(run, trust, cluster)
     if state.baseline is None:
         raise UserError(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
@@ -174,63 +155,7 @@ def certify_command(
     return follow_to_summary(path, engine, as_json)[0]
 
 
-@click.command("isolate")
-@run_argument
-@click.option(
-    "--runs",
-    type=whole(1),
-    metavar="N",
-    help="Run the world that passes at least so often with fresh seeds; at least 20 times if not given.",
-)
-@click.option("--again", is_flag=True, help="Search again, although the nearest world that passes is known.")
-@click.option("--give-up", is_flag=True, help="End a search that was interrupted; the run is as it was before.")
-@jobs_option()
-@cluster_option()
-@trust_option
-@json_option
-def isolate_command(
-    run: str, runs: int | None, again: bool, give_up: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
-) -> int:
-    """Finds the nearest world that passes: as few models removed from the whole world of RUN (a name or a file) as it takes for the
-    robot to reach its goal. It changes nothing else.
-    """
-    from ddenv.cli.follow import Interrupted, follow
-    from ddenv.guiding.course import Isolate
-    from ddenv.guiding.situation import Situation
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.nearest import nearest
-    from ddenv.runs.programs import start_engine
-
-    path, state = _idle_run(run, trust, cluster)
-    if give_up:
-        if state.isolating is None:
-            raise UserError(f"{path}: no search for the nearest world that passes is open, so there is none to give up")
-        follow(path, start_engine(path, 1, give_up="yes"), as_json)
-        return 0
-    if why := Isolate(again=True).refusal(Situation(state, "absent")):
-        raise UserError(f"{path}: {why}: ddenv resume {path}")
-    if state.isolated is None or state.isolating is not None or again or runs is not None:
-        try:
-            follow(path, start_engine(path, jobs, isolate=runs or 0, cluster=cluster), as_json)
-        except Interrupted as interrupted:
-            if interrupted.state.isolating is not None or interrupted.state.isolated is None:
-                announce(f"interrupted; continue with: ddenv isolate {path}, or end it with --give-up")
-                return 130
-    with RunFile(path) as file:
-        state = fold(file.events())
-        found = nearest(file, state)
-    if found is None:
-        # The engine was stopped from elsewhere.
-        raise UserError(f"{path}: {state.reason}")
-    if as_json:
-        print(json.dumps({"nearest": asdict(found)}))
-    else:
-        say(found.sentences)
-    return 0 if found.gone else 1
-
-
-def _idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState]:
+def idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState]:
     """The file and the state of a run that no engine works on, and that may start what it brings along. Raises UserError."""
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock

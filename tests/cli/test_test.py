@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from ddenv.cli.test_summary import elsewhere, lines, summary
+from ddenv.cli.test import elsewhere, lines, summary
 from ddenv.runfile.progress import Claim
 from tests.command import in_process
 from tests.conftest import DATA

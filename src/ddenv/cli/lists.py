@@ -1,0 +1,138 @@
+"""Commands that only look: `ddenv runs`, `schemas`, `config` and `doctor`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ddenv.cli.options import json_option, runs
+from ddenv.cli.terminal import terminal_columns, wrapped
+from ddenv.cli.workbench import PORT
+from ddenv.doctor import Finding, is_well
+from ddenv.errors import UserError
+from ddenv.runs.folder import find_run, runs_folder
+from ddenv.schemas import Kind, explanation, names
+from ddenv.text import printable
+
+if TYPE_CHECKING:
+    from ddenv.workbench.runs.recent_runs import Recent
+
+TITLES: dict[Kind, str] = {
+    "partitioning": "partitionings: how the environment is split",
+    "prioritization": "prioritizations: in which order the parts are tried",
+    "algorithm": "algorithms: how the environment is searched",
+}
+SIGNS = {"ok": " ", "note": "!", "wrong": "✗"}
+
+
+@click.command("runs")
+def runs_command() -> int:
+    """Lists the runs."""
+    lines = run_lines(runs_folder())
+    print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
+    return 0
+
+
+def run_lines(folder: Path) -> list[str]:
+    """One line a run, last changed first: name, status, models left, tests. A damaged file says so in its line."""
+    from ddenv.workbench.runs.recent_runs import RunsFolder
+
+    found = RunsFolder(folder).look()
+    width = max((len(run.path.stem) for run in found), default=0)
+    return [printable(f"{run.path.stem:<{width}}  {_line(run)}") for run in found]
+
+
+def _line(run: Recent) -> str:
+    if run.trouble:
+        return run.trouble
+    status = "minimal" if run.minimal else "engine not running" if run.status == "lost" else run.status
+    size = f"{len(run.kept)} of {run.total} models"
+    return f"{status:<18}  {size:<20}  {run.tests} tests"
+
+
+@click.command("schemas")
+@click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
+def schemas_command(as_json: bool) -> int:
+    """Lists the partitionings, prioritizations and algorithms, each with its explanation."""
+    print(json.dumps(schemas_report()) if as_json else "\n".join(schemas_lines(terminal_columns())))
+    return 0
+
+
+def schemas_report() -> dict[str, dict[str, str]]:
+    """The object that `--json` prints: the explanations of each kind by name."""
+    return {f"{kind}s": {name: explanation(kind, name) for name in names(kind)} for kind in TITLES}
+
+
+def schemas_lines(columns: int | None = None) -> list[str]:
+    """A paragraph for each, no line wider than `columns`; each is one line if that is None."""
+    said: list[str] = []
+    for kind, title in TITLES.items():
+        said += ["", *wrapped(title, columns)]
+        for name in names(kind):
+            words = printable(explanation(kind, name)) or "(no explanation)"
+            said += ["", *wrapped(printable(name), columns, "  "), *wrapped(words, columns, "    ")]
+    return said[1:]
+
+
+@click.command("config")
+@click.option("--example", is_flag=True, help="Print an example file with every action.")
+def config_command(example: bool) -> int:
+    """Shows the path of the file with your keys and theme, and lists all actions with their keys."""
+    from ddenv.workbench.config import example_lines, lines
+
+    print("\n".join(example_lines() if example else lines()))
+    return 0
+
+
+@click.command("doctor")
+@click.argument("run", required=False, shell_complete=runs)
+@click.option(
+    "--repair", type=Path, metavar="COPY", help="Write all that is whole of RUN to a new run file; RUN stays as it is."
+)
+@json_option
+def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
+    """Checks the installation, the terminal and the machine; with RUN (a name or a file) also that run.
+
+    Exits with 1 if something is wrong.
+    """
+    if run is None and repair is not None:
+        raise UserError("--repair: needs a run: ddenv doctor RUN --repair COPY")
+    found = list(_found(run, repair))
+    if as_json:
+        print(json.dumps({"well": is_well(found), "findings": [asdict(finding) for finding in found]}))
+    else:
+        print("\n".join(map(printable, finding_lines(found, terminal_columns()))))
+    return 0 if is_well(found) else 1
+
+
+def _found(run: str | None, copy: Path | None) -> Iterator[Finding]:
+    from ddenv.doctor.machine import installation, machine, runs, terminal
+    from ddenv.doctor.run_health import repair, run_health
+    from ddenv.runs.programs import FIRST_PORT
+
+    if run is None:
+        yield from (*installation(), *terminal(), *machine({"scene": FIRST_PORT, "serve": PORT}), *runs())
+        return
+    # Asked about one run, only what is wrong elsewhere is worth a line.
+    yield from (repair(find_run(run), copy) if copy is not None else run_health(find_run(run)))
+    yield from (finding for finding in (*installation(), *runs()) if finding.state == "wrong")
+
+
+def finding_lines(found: Iterable[Finding], columns: int | None) -> Iterator[str]:
+    """The findings by group, in aligned lines as wide as the terminal; then what that comes to."""
+    found = list(found)
+    width = max(len(finding.what) for finding in found)
+    for group, members in groupby(found, key=lambda finding: finding.group):
+        yield group
+        for finding in members:
+            yield from wrapped(finding.says, columns, f"{SIGNS[finding.state]} {finding.what:<{width}}  ")
+            if finding.advice:
+                yield from wrapped(finding.advice, columns, f"  {'':<{width}}  → ")
+    wrong, notes = (sum(finding.state == state for finding in found) for state in ("wrong", "note"))
+    yield f"✗ {wrong} wrong" if wrong else "all is well" + (f"; ! {notes} worth a look" if notes else "")

@@ -1,0 +1,160 @@
+"""Commands that take a run to others: `ddenv report` and `export` write it to files, `reproduce` asks whether it still fails."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from ddenv.cli import options
+from ddenv.cli.run import announce_needs
+from ddenv.cli.terminal import announced, asking, say_written
+from ddenv.errors import UserError
+from ddenv.runs.folder import find_run
+from ddenv.text import percent
+
+# How `git bisect run` reads exit codes.
+FAILS, PASSES, CANNOT_SAY = 1, 0, 125
+
+
+@click.command("report")
+@options.run_argument
+@click.option(
+    "-o",
+    "--output",
+    "file",
+    type=Path,
+    metavar="FILE",
+    help="A .html page, or a .md file with its pictures beside it; has to be given.",
+)
+@click.option("--force", is_flag=True, help="Replace files that exist.")
+def report_command(run: str, file: Path | None, force: bool) -> int:
+    """Writes a report on RUN: one page to read, print or mail."""
+    from ddenv.report.report import write_report
+    from ddenv.runfile.store import RunFile
+
+    path = find_run(run)
+    if file is None:
+        # A run that is not there needs no file either.
+        RunFile(path).close()
+        raise UserError(f"give the file to write, such as -o {path.stem}.html")
+    say_written(write_report(path, file, force))
+    return 0
+
+
+@click.command("export")
+@options.run_argument
+@click.option("--sdf", type=Path, help="Write the environment as an SDF world.")
+@click.option(
+    "--passes",
+    is_flag=True,
+    help="With --sdf: write the nearest world that passes, in place of what is left ('ddenv isolate RUN' finds it).",
+)
+@click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
+@click.option(
+    "--bundle",
+    type=Path,
+    metavar="FOLDER_OR_ZIP",
+    help="Write all that reproduces the failure on another machine: run, world, scenario, report, an issue's text, a program.",
+)
+@click.option(
+    "--mcap",
+    type=Path,
+    metavar="FILE",
+    help="Write what the robot sensed and did, for Foxglove, Rerun and ros2 bag; its runs are made again from their seeds.",
+)
+@click.option(
+    "--pytest",
+    "test",
+    type=Path,
+    metavar="FOLDER",
+    help="Write a test for pytest that fails as long as the robot fails.",
+)
+@options.trust_option
+def export_command(
+    run: str,
+    sdf: Path | None,
+    passes: bool,
+    scenario: Path | None,
+    bundle: Path | None,
+    mcap: Path | None,
+    test: Path | None,
+    trust: bool,
+) -> int:
+    """Writes the environment of RUN, the models that are left, to files."""
+    from ddenv.report.bundle import write_bundle, write_test
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.export import export_world
+
+    path = find_run(run)
+    if sdf is None and bundle is None and mcap is None and test is None:
+        RunFile(path).close()
+        raise UserError("nothing to export: give --sdf FILE, --bundle FOLDER, --mcap FILE or --pytest FOLDER")
+    for given, option in ((scenario is not None, "--scenario"), (passes, "--passes")):
+        if given and sdf is None:
+            raise UserError(f"{option}: needs --sdf FILE")
+    if bundle is not None:
+        say_written(write_bundle(path, bundle))
+    if test is not None:
+        say_written(write_test(path, test))
+    if mcap is not None:
+        _write_mcap(path, mcap, trust)
+    if sdf is not None:
+        exported = export_world(path, sdf, scenario, passes)
+        say_written(exported.files)
+        announce_needs(sdf, exported.needs)
+    return 0
+
+
+def _write_mcap(run: Path, file: Path, trust: bool) -> None:
+    from ddenv.engine.mcap_file import write_mcap
+    from ddenv.robot import check_drake
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.trust import trusted_scenario
+
+    check_drake()
+    with RunFile(run) as opened:
+        trusted_scenario(opened, asking(trust))
+    with announced(f"making runs of {run.stem} again ...") as say_so:
+        lines = write_mcap(run, file, lambda name, seconds: say_so(f"/{name}: {seconds:.1f} s made again"))
+    print("\n".join([f"wrote {file}", *(f"  {line}" for line in lines)]))
+
+
+@click.command("reproduce")
+@options.run_argument
+@click.option("--most", type=click.IntRange(1, 10_000), default=60, show_default=True, help="Runs at most.")
+@click.option(
+    "--folder",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Where the controller or the simulator of your own lies; the folder of the run's scenario if not given.",
+)
+@options.jobs_option("Runs")
+@options.trust_option
+@options.json_option
+def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool) -> int:
+    """Runs what RUN (a name or a file) has left until it is known whether it still fails at the rate of its certificate.
+
+    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 it cannot be
+    said: the runs do not decide, or something is wrong.
+    """
+    from ddenv.cli.test import line
+    from ddenv.engine.single_test import expected, reproduce, subject_in
+    from ddenv.runs.trust import check_trusted
+
+    path = find_run(run)
+    subject = subject_in(path, folder)
+    certificate = expected(subject, path)
+    claim = certificate.claims[0]
+    check_trusted(subject.scenario, path, asking(trust))
+    for result, so_far in reproduce(subject, certificate, most, jobs):
+        found = so_far
+        if not as_json:
+            print(line(result), flush=True)
+    if as_json:
+        print(json.dumps(asdict(found) | {"expected": {"low": claim.low, "high": claim.high}}))
+    else:
+        rate = f"{percent(claim.low)} to {percent(claim.high)}"
+        print(f"{found}; {'each run with a chosen seed' if certificate.seeds else rate} expected")
+    return {True: FAILS, False: PASSES, None: CANNOT_SAY}[found.fails]

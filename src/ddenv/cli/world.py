@@ -1,0 +1,340 @@
+"""`ddenv world ...`: looks at SDF worlds, and writes clean or settled ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ddenv.cli.options import Numbers, reading_options, scenarios, together
+from ddenv.cli.terminal import announce, announced, say_written, terminal_columns, wrapped
+from ddenv.errors import UserError
+from ddenv.runs.folder import find_run
+from ddenv.text import count, first_of, padded, printable, shortened, width
+
+if TYPE_CHECKING:
+    from ddenv.world.model import Model, Note, World
+    from ddenv.world.scenario import Reading
+
+# A line names so many models.
+MOST_NAMES = 5
+LONGEST_NAME, SHORTEST_NAME = 34, 10
+GAP = "  "
+# The columns of the table. A row has the notes of a model twice: with details, and as numbers only.
+HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes", "notes")
+TO_THE_RIGHT = (2, 6)
+# Which of them are shown, from wide terminals to narrow ones.
+CHOICES = (
+    (0, 1, 2, 3, 4, 5, 6, 7),
+    (0, 1, 2, 3, 4, 5, 6, 8),
+    (0, 1, 3, 4, 5, 6, 8),
+    (0, 1, 4, 5, 6, 8),
+    (0, 1, 4, 5, 8),
+)
+
+# A world, as it is read.
+world_argument = together(
+    click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
+    reading_options,
+)
+
+
+@click.group("world")
+def world_group() -> None:
+    """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
+
+
+def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
+    """The world of an SDF file, or of a scenario, and how it was read. Raises UserError."""
+    from ddenv.runs.subject import named_file, reading_of
+    from ddenv.world.load import load_scenario
+    from ddenv.world.scenario import PLAIN
+    from ddenv.world.sdf.read import read_world
+
+    kind, path = named_file(str(file)) or ("world", file)
+    scenario = load_scenario(path) if kind == "scenario" else None
+    file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
+    read_as = reading_of(own, **reading)
+    return read_world(file, read_as, announce), read_as
+
+
+# How a world was read: a table for people, plain data for programs.
+
+
+@world_group.command()
+@world_argument
+@click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
+def check(file: Path, as_json: bool, **reading: Any) -> int:
+    """Shows how FILE is read: each model, what was replaced or ignored, and why."""
+    world, _ = _read(file, reading)
+    print(json.dumps(world_report(world)) if as_json else "\n".join(world_lines(world, terminal_columns())))
+    return 0
+
+
+def world_report(world: World) -> dict[str, Any]:
+    """Everything of the table and more; lengths in m, angles in rad."""
+    from ddenv.world.placement import inside
+
+    return {
+        "file": str(world.path),
+        "version": world.version,
+        "world": world.name,
+        "gravity": list(world.gravity),
+        "models": [_described(model, world) for model in world.models],
+        "notes": _notes(world, ""),
+        "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
+    }
+
+
+def _described(model: Model, world: World) -> dict[str, Any]:
+    from ddenv.world.extent import model_bounds
+
+    box = model_bounds(model)
+    return {
+        "name": model.name,
+        "kind": _kind(model),
+        "removable": model.name in world.elements(),
+        "line": model.line,
+        "pose": [*model.pose.position, *model.pose.quaternion],
+        "links": [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links],
+        "joints": [{"name": joint.name, "kind": joint.kind} for joint in model.joints],
+        "shapes": dict(_shapes(model)),
+        "low": None if box is None else box[0].tolist(),
+        "high": None if box is None else box[1].tolist(),
+        "friction": sorted({collision.mu for collision in model.collisions}),
+        "mass": sum(link.inertia.mass for link in model.links if link.inertia is not None) or None,
+        "notes": _notes(world, model.name),
+    }
+
+
+def _notes(world: World, model: str) -> list[dict[str, str]]:
+    return [
+        {"kind": note.kind, "what": note.what, "why": note.why, "detail": note.detail, "place": note.place}
+        for note in world.notes
+        if note.model == model
+    ]
+
+
+def _kind(model: Model) -> str:
+    from ddenv.world.model import is_ground
+
+    return "ground" if is_ground(model) else "static" if model.static else "dynamic"
+
+
+def _shapes(model: Model) -> Counter[str]:
+    """How many shapes of each kind; a mesh is simulated as its hull."""
+    kinds = (type(collision.shape).__name__.lower() for collision in model.collisions)
+    return Counter("hull" if kind == "mesh" else kind for kind in kinds)
+
+
+def world_lines(world: World, columns: int | None = None) -> list[str]:
+    """The table: a line for each model, then the notes by number, then the totals.
+
+    No line is wider than `columns`, so the table leaves out the least important columns; with None it has all.
+    """
+    from ddenv.world.placement import note_inside
+
+    numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
+    by_model: dict[str, dict[str, str]] = {}
+    for note in sorted(world.notes, key=lambda note: numbers[_text(note)]):
+        number = str(numbers[_text(note)])
+        detail = printable(note.detail.removesuffix(" away"))
+        by_model.setdefault(note.model, {})[f"{number} ({detail})" if detail else number] = number
+    table = _table([HEADER, *(_row(model, by_model.get(model.name, {})) for model in world.models)], columns)
+    notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
+    below = ["", "notes", *notes] if notes else []
+    wrong = [line for _, words in note_inside(world) for line in wrapped(words, columns)]
+    gravity = " ".join(f"{part:g}" for part in world.gravity)
+    title = printable(f"{world.path}: SDF {world.version}, world '{world.name}', gravity {gravity} m/s^2")
+    return [*wrapped(title, columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
+
+
+def _text(note: Note) -> str:
+    return printable(f"{note.kind}: {note.what} {note.why}")
+
+
+def _row(model: Model, notes: Mapping[str, str]) -> tuple[str, ...]:
+    """A cell for each of HEADER; `notes` are those with details, and the number of each."""
+    from ddenv.world.extent import center, model_bounds
+
+    box = model_bounds(model)
+    return (
+        shortened(model.name, LONGEST_NAME),
+        _kind(model),
+        str(len(model.links)),
+        ", ".join(f"{number} {shape}" for shape, number in _shapes(model).items()) or "none",
+        "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0]),
+        ", ".join(f"{part:.2f}" for part in center(model)),
+        f"{model.links[0].pose.yaw():.2f}",
+        ", ".join(notes),
+        ", ".join(dict.fromkeys(notes.values())),
+    )
+
+
+def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:
+    """The rows, with as many columns as fit, and names shortened if needed."""
+    from rich.cells import set_cell_size
+
+    widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
+    wide = {choice: sum(widths[i] for i in choice) + len(GAP) * (len(choice) - 1) for choice in CHOICES}
+    shown = next((choice for choice in CHOICES if columns is None or wide[choice] <= columns), CHOICES[-1])
+    if columns is not None and wide[shown] > columns:
+        widths[0] = max(SHORTEST_NAME, widths[0] - (wide[shown] - columns))
+    lines = [GAP.join(_cell(row[i], widths[i], i) for i in shown).rstrip() for row in rows]
+    if columns is None:
+        return lines
+    return [line if width(line) <= columns else f"{set_cell_size(line, columns - 1)}…" for line in lines]
+
+
+def _cell(text: str, columns: int, which: int) -> str:
+    text = shortened(text, columns)
+    return f"{' ' * (columns - width(text))}{text}" if which in TO_THE_RIGHT else padded(text, columns)
+
+
+def _totals(world: World) -> str:
+    said = [f"{number} {kind}" for kind in ("replaced", "ignored") if (number := _count(world, kind))]
+    stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
+    they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
+    why = f"; {they} since others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
+    models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
+    return f"{models}; {', '.join(said) or 'nothing was replaced or ignored'}"
+
+
+def _count(world: World, kind: str) -> int:
+    return sum(note.kind == kind for note in world.notes)
+
+
+# Its map.
+
+
+@world_group.command()
+@world_argument
+@click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
+@click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
+@click.option("--svg", type=Path, help="Write the map to this file instead.")
+@click.option("--took-part", is_flag=True, help="FILE is a run: show what took part in its runs of the whole world.")
+@click.option("--passes", is_flag=True, help="FILE is a run: show the nearest world that passes, and what it lacks.")
+def show(
+    file: Path,
+    spawn: tuple[float, ...] | None,
+    goal: tuple[float, float] | None,
+    svg: Path | None,
+    took_part: bool,
+    passes: bool,
+    **reading: Any,
+) -> int:
+    """Draws the map of FILE, from above."""
+    from ddenv.map.svg import svg_map
+    from ddenv.world.access import write_file
+
+    if took_part or passes:
+        if spawn is not None or goal is not None or svg is not None or (took_part and passes):
+            option = "--took-part" if took_part else "--passes"
+            raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run do not go with it")
+        world, dim, below = _of_run(str(file), passes)
+        print("\n".join([_map(world, dim=dim), *below]))
+        return 0
+    world, _ = _read(file, reading)
+    start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
+    if svg is not None:
+        write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
+        say_written([svg])
+    else:
+        print(_map(world, spawn=start, goal=goal))
+    return 0
+
+
+def _map(world: World, **marks: Any) -> str:
+    from ddenv.cli.world_map import terminal_map
+
+    columns, rows = shutil.get_terminal_size((100, 36))
+    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    return terminal_map(world, columns, rows - 1, color=color, **marks)
+
+
+def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
+    """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what did not affect the
+    runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
+    """
+    from ddenv.evidence.took_part import in_whole_world
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.nearest import removed_in_passing
+    from ddenv.runs.subject import read_parts
+
+    path = find_run(name)
+    with RunFile(path) as run:
+        world, state = read_parts(run)[1], fold(run.events())
+    if passes:
+        gone = removed_in_passing(state, path)
+        head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"
+        return world, frozenset(gone), [head, *(f"  {printable(model)}" for model in gone)]
+    times, runs = in_whole_world(state)
+    if not times or state.baseline is None:
+        raise UserError(f"{path}: it is not recorded what took part in its runs of the whole world; make a new run")
+    head = f"{count(len(times), 'model')} of {len(state.elements)} took part in the runs of the whole world:"
+    lines = [f"  {printable(model)}: {number} of {count(runs, 'run')}" for model, number in times.most_common()]
+    return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
+
+
+# Other worlds made from it.
+
+
+@world_group.command()
+@world_argument
+@click.option(
+    "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
+)
+def convert(file: Path, output: Path, **reading: Any) -> int:
+    """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
+    from ddenv.world.write import write_converted
+
+    say_written(write_converted(_read(file, reading)[0], output))
+    return 0
+
+
+@world_group.command()
+@world_argument
+@click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
+def settle(file: Path, output: Path, **reading: Any) -> int:
+    """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
+    from ddenv.robot import check_drake
+
+    world, read_as = _read(file, reading)
+    check_drake()
+    from ddenv.robot.settled import moved, notes_on
+    from ddenv.robot.simulation.template import Variants
+    from ddenv.runs.subject import scenario_for_world
+    from ddenv.world.access import write_file
+    from ddenv.world.placement import note_inside
+    from ddenv.world.sdf.moved import with_places
+    from ddenv.world.sdf.read import read_model
+
+    if output.resolve() == world.path.resolve():
+        raise UserError(f"{output}: is the world itself; choose another file")
+    able = sum(bool(model.links) and not model.static for model in world.models)
+    # Drake's plant needs a robot; piles settle as if there were none.
+    scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    with announced(f"settling {count(able, 'model')} that can move"):
+        settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
+    for about, words in (*note_inside(world), *notes_on(world, settled)):
+        if about != "unrest":
+            announce(words)
+    places = {name: links for name, links in settled.places.items() if name not in settled.fallen}
+    text, stay = with_places(world, places, read_as)
+    write_file(output, text)
+    ways = {name: way for name, way in moved(world, settled).items() if name not in stay and way > 0}
+    farthest = max(ways, key=lambda name: ways[name], default="")
+    far = f", {farthest} farthest, by {ways[farthest]:.3f} m" if farthest else ""
+    print(printable(f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"))
+    if stay:
+        why = "their parts move, or others are placed relative to them"
+        print(printable(f"not moved: {first_of(stay, MOST_NAMES)}: {why}"))
+    return 0

@@ -1,0 +1,23 @@
+"""The keys of a screen as a table."""
+
+from __future__ import annotations
+
+from textual.binding import Binding, BindingType
+
+HELP = ("help", "question_mark,f1", "app.help", "help", "show every key", "?")
+
+
+def keys(screen: str, *rows: tuple[str, ...]) -> list[BindingType]:
+    """The bindings of a screen or a pane, whose names in the file of keys begin with `screen`.
+
+    A row has the name, the keys, the action, its word in the footer, what the help says, and maybe how the footer writes the key.
+    """
+    return [
+        Binding(each, action, word, id=f"{screen}.{name}", tooltip=words, key_display=display[0] if display else None)
+        for name, each, action, word, words, *display in rows
+    ]
+
+
+def ids(screen: str, names: str) -> tuple[str, ...]:
+    """The ids of some of them, for the footer; one with a dot in it is of a pane."""
+    return tuple(name if "." in name else f"{screen}.{name}" for name in names.split())
