@@ -77,9 +77,9 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
     groups = {int(signs.groups[index]) for index in placed}
     for index in missing:
         group = int(signs.groups[index])
-        if (group not in groups or signs.sure[index]) and any(
-            put(index, *cell) for cell in _around(grid, index, len(signs.texts[index]))
-        ):
+        if group in groups and not signs.sure[index]:
+            continue
+        if any(put(index, *cell) for cell in _around(grid, index, len(signs.texts[index]))):
             groups.add(group)
     return placed
 
