@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,16 +60,28 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
         if sum(len(signs.texts[index]) for index in seen[first].tolist()) * LEAST_ROOM <= rows * columns:
             kept[first] = True
         seen = seen[kept]
-    board, missing = _Board(columns, set(taken)), []
-    for index, (row, column) in zip(seen.tolist(), cells[seen].tolist(), strict=True):
-        if not board.put(index, signs.texts[index], row, column):
-            missing.append(index)
-    groups = {int(signs.groups[index]) for index in board.placed}
+    occupied, placed = set(taken), dict[int, Cell]()
+
+    def put(index: int, row: int, column: int) -> bool:
+        """Puts the sign of a model there if all its cells are free. Returns whether they are."""
+        length = len(signs.texts[index])
+        column = max(0, min(column, columns - length))
+        own = [(row, column + offset) for offset in range(length)]
+        if not occupied.isdisjoint(own):
+            return False
+        occupied.update(own)
+        placed[index] = row, column
+        return True
+
+    missing = [index for index, cell in zip(seen.tolist(), cells[seen].tolist(), strict=True) if not put(index, *cell)]
+    groups = {int(signs.groups[index]) for index in placed}
     for index in missing:
         group = int(signs.groups[index])
-        if (group not in groups or signs.sure[index]) and board.put_anywhere(index, signs.texts[index], grid):
+        if group in groups and not signs.sure[index]:
+            continue
+        if any(put(index, *cell) for cell in _around(grid, index, len(signs.texts[index]))):
             groups.add(group)
-    return board.placed
+    return placed
 
 
 def _readable(blocks: np.ndarray, sure: np.ndarray) -> np.ndarray:
@@ -79,31 +91,12 @@ def _readable(blocks: np.ndarray, sure: np.ndarray) -> np.ndarray:
     return kept
 
 
-@dataclass
-class _Board:
-    """Signs `placed` so far by model, on a map of `columns`, and the `occupied` cells."""
-
-    columns: int
-    occupied: set[Cell]
-    placed: dict[int, Cell] = field(default_factory=dict)
-
-    def put(self, index: int, text: str, row: int, column: int) -> bool:
-        """Puts the sign of model `index` there if all its cells are free. Returns whether they are."""
-        column = max(0, min(column, self.columns - len(text)))
-        own = [(row, column + offset) for offset in range(len(text))]
-        if not self.occupied.isdisjoint(own):
-            return False
-        self.occupied.update(own)
-        self.placed[index] = row, column
-        return True
-
-    def put_anywhere(self, index: int, text: str, grid: np.ndarray) -> bool:
-        """Puts the sign on another cell of its model, or beside one. Returns whether there was room."""
-        rows, columns = np.nonzero((grid[0::2] == index) | (grid[1::2] == index))
-        cells = list(zip(rows.tolist(), columns.tolist(), strict=True))
-        beside = [(row, column + step) for row, column in cells for step in (1, -1, -len(text))]
-        inside = [cell for cell in beside if 0 <= cell[1] < grid.shape[1]]
-        return any(self.put(index, text, *cell) for cell in [*cells, *inside])
+def _around(grid: np.ndarray, index: int, length: int) -> list[Cell]:
+    """All cells of a model, then those beside it where a sign of this length may begin."""
+    rows, columns = np.nonzero((grid[0::2] == index) | (grid[1::2] == index))
+    cells = list(zip(rows.tolist(), columns.tolist(), strict=True))
+    beside = ((row, column + step) for row, column in cells for step in (1, -1, -length))
+    return [*cells, *(cell for cell in beside if 0 <= cell[1] < grid.shape[1])]
 
 
 def signs(models: Sequence[Drawn]) -> list[str]:
