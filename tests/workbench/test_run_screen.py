@@ -100,9 +100,7 @@ async def test_keys_that_only_look(run):
         assert type(session.app.screen).__name__ == "ExportScreen"
         await session.press("escape", "question_mark")
         assert isinstance(session.app.screen, Help)
-        words = {
-            (shortcut.keys, shortcut.words) for group in session.app.screen._groups for shortcut in group.shortcuts
-        }
+        words = {(shortcut.keys, shortcut.words) for group in session.app.screen.groups for shortcut in group.shortcuts}
         keys = {key for each, _ in words for key in each.split()}
         assert keys >= {*"?+-012345/acdeghlmopqrstuvwxy", "space", "shift+s", "shift+r"}
         await session.press("escape", "R")

@@ -13,6 +13,7 @@ from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
 from ddenv.text import about, duration, percent, plain, truncated
 from ddenv.words.signs import brief, metres
+from ddenv.workbench.map.map_colors import mixed
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.map.picture import strip
 from ddenv.workbench.runs.recent_runs import RunsFolder
@@ -73,7 +74,7 @@ def looks_of(run, candidate=None):
     state = fold(run.file.events())
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     chosen = state.round.candidates[candidate] if candidate is not None else None
-    how = looks(prints, kept(state, chosen), (0, 0, 0), (255, 255, 255))
+    how = looks(prints, kept(state, chosen), mixed((0, 0, 0), (255, 255, 255)))
     return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.labels, strict=True)}
 
 
@@ -104,7 +105,7 @@ def test_without_colours_the_cells_still_differ(run):
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     view = View(0, 0, 0.25, 64, 18)
     canvas = Canvas(view.rows, view.columns, (0, 0, 0))
-    how = looks(prints, kept(state, state.round.candidates[1]), (0, 0, 0), (255, 255, 255))
+    how = looks(prints, kept(state, state.round.candidates[1]), mixed((0, 0, 0), (255, 255, 255)))
     fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
     signs = {chr(char) for char in canvas.chars.flat}
     assert {"█", "▓", "▒", " "} <= signs

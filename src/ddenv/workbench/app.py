@@ -95,41 +95,23 @@ class Workbench(App[int]):
     COMMANDS: ClassVar[set[type[Provider] | Callable[[], type[Provider]]]] = {_commands}
     BINDINGS: ClassVar = [
         Binding(
-            "ctrl+q",
-            "leave",
-            "quit",
-            id="app.leave",
-            tooltip="quit; an engine keeps running",
-            show=False,
-            priority=True,
+            "ctrl+q", "leave", "quit", False, priority=True, id="app.leave", tooltip="quit; an engine keeps running"
         ),
-        Binding(
-            "ctrl+z",
-            "suspend_process",
-            "suspend",
-            id="app.suspend",
-            tooltip="suspend; fg brings it back",
-            show=False,
-        ),
+        Binding("ctrl+z", "suspend_process", "suspend", False, id="app.suspend", tooltip="suspend; fg brings it back"),
         Binding(
             "ctrl+p",
             "command_palette",
             "commands",
+            False,
+            priority=True,
             id="app.commands",
             tooltip="find any command, theme or model by name",
-            show=False,
-            priority=True,
         ),
         Binding(
-            "ctrl+t", "change_theme", "theme", id="app.theme", tooltip="choose the colours for this session", show=False
+            "ctrl+t", "change_theme", "theme", False, id="app.theme", tooltip="choose the colours for this session"
         ),
         Binding(
-            "f12",
-            "screenshot",
-            "screenshot",
-            id="app.screenshot",
-            tooltip="save a picture of the screen (SVG)",
-            show=False,
+            "f12", "screenshot", "screenshot", False, id="app.screenshot", tooltip="save a picture of the screen (SVG)"
         ),
     ]
 
@@ -289,15 +271,17 @@ class Workbench(App[int]):
         """The list of all runs, above the screen that asks for it."""
         from ddenv.workbench.runs.runs_screen import RunsScreen
 
-        if not any(isinstance(screen, RunsScreen) for screen in self.screen_stack):
-            self.push_screen(RunsScreen())
+        self._push_once(RunsScreen)
 
     def action_lessons(self) -> None:
         """The list of lessons, above the screen that asks for it."""
         from ddenv.workbench.learn.lessons_screen import LessonsScreen
 
-        if not any(isinstance(screen, LessonsScreen) for screen in self.screen_stack):
-            self.push_screen(LessonsScreen())
+        self._push_once(LessonsScreen)
+
+    def _push_once(self, kind: type[Screen[Any]]) -> None:
+        if not any(type(screen) is kind for screen in self.screen_stack):
+            self.push_screen(kind())
 
     def action_leave(self) -> None:
         """Quits at once. An engine keeps running, and the terminal shows how to attach again."""

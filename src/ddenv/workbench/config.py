@@ -194,13 +194,11 @@ def lines() -> list[str]:
     width = max(len(id) for id in actions())
     keys = {id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()}
     room = max(len(key) for key in keys.values())
-    section = ""
-    for id, action in sorted(actions().items(), key=_place):
-        if section != _section(action):
-            section = _section(action)
-            found.append("")
-        changed = "*" if id in config.keys else " "
-        found.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
+    for _, group in _sections():
+        found.append("")
+        for id, action in group:
+            changed = "*" if id in config.keys else " "
+            found.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
     return [*found, "", "* is your own key"] if config.keys else found
 
 
@@ -208,12 +206,10 @@ def example_lines() -> list[str]:
     """An example file that changes nothing: every action is a comment."""
     begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
     found = begin.splitlines()
-    section = ""
-    for id, action in sorted(actions().items(), key=_place):
-        if section != _section(action):
-            section = _section(action)
-            found.append(f"  # {section}")
-        found.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
+    for section, group in _sections():
+        found.append(f"  # {section}")
+        for id, action in group:
+            found.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
     return found
 
 
@@ -226,12 +222,12 @@ def _quoted(keys: str) -> str:
     return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
 
 
-def _section(action: Action) -> str:
-    return action.id.split(".")[0]
-
-
-def _place(entry: tuple[str, Action]) -> tuple[int, str]:
-    """The app first, then the screens that are used most."""
+def _sections() -> Iterator[tuple[str, list[tuple[str, Action]]]]:
+    """All actions by section: the app first, then the screens that are used most."""
     order = ("app", "setup", "run", "map", "runs")
-    section = _section(entry[1])
-    return (order.index(section) if section in order else len(order), section)
+    groups: dict[str, list[tuple[str, Action]]] = {}
+    for id, action in actions().items():
+        groups.setdefault(id.split(".")[0], []).append((id, action))
+    yield from sorted(
+        groups.items(), key=lambda each: (order.index(each[0]) if each[0] in order else len(order), each[0])
+    )

@@ -33,28 +33,18 @@ def run_workbench(
     # What is made until the first paint stays: looking through it for garbage would only delay that. The app goes on with it.
     gc.disable()
     try:
-        return _run(run, reading, watch, file, first)
+        from ddenv.workbench.app import Workbench
+        from ddenv.workbench.config import read_config
+        from ddenv.workbench.terminal.themes import fitting
+
+        config = read_config()
+        app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
+        check_terminal()
+        if not config.theme:
+            app.theme = fitting(app.console.color_system)
+        result = app.run()
     finally:
         gc.enable()
-
-
-def _run(
-    run: Path | None,
-    reading: Mapping[str, Any] | None,
-    watch: bool,
-    file: Path | None,
-    first: ShowLessons | ShowLesson | ShowRace | None,
-) -> int:
-    from ddenv.workbench.app import Workbench
-    from ddenv.workbench.config import read_config
-    from ddenv.workbench.terminal.themes import fitting
-
-    config = read_config()
-    app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
-    check_terminal()
-    if not config.theme:
-        app.theme = fitting(app.console.color_system)
-    result = app.run()
     return result if isinstance(result, int) else app.return_code or 0
 
 

@@ -57,7 +57,7 @@ def pressing(key: str, action: str = "") -> Style:
     return Style.from_meta({"@click": action or f"press({key!r})", "key": key})
 
 
-class Framed(Keys, Vertical):
+class Framed(Vertical, Keys):
     """`hints` are keys with what they do, three spaces apart: `enter opens   escape cancels`."""
 
     def __init__(self, title: str | Text, hints: str = "", *, id: str | None = None, classes: str = "dialog") -> None:

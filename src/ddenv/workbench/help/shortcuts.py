@@ -157,7 +157,8 @@ class Help(Reading):
     ]
 
     def __init__(self, groups: Iterable[Group]) -> None:
-        super().__init__("Keys", [(each.title, self._rows(each)) for each in groups])
+        self.groups = tuple(groups)
+        super().__init__("Keys", [(each.title, self._rows(each)) for each in self.groups])
 
     @staticmethod
     def _rows(group: Group) -> Iterator[tuple[str | Text, str | Text]]:

@@ -145,9 +145,8 @@ class OptionsForm(Vertical):
         super().__init__(id=id)
         self._name_given = False
         self._suggested = ""
-        # What is wrong with the fields that are marked, by id, and what else is wrong.
+        # What is wrong with fields, by id, and what else is wrong.
         self._problems: dict[str, str] = {}
-        self._marked: frozenset[str] = frozenset()
         self._message = ""
         # The texts of the rarely used fields, while they are not opened: with these the screen would open 0.15 s later.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
@@ -322,10 +321,8 @@ class OptionsForm(Vertical):
         line, words = self.query_one("#wrong", Static), f"{MARK}{first}" if first else self._message
         line.display = bool(words)
         line.update(Text(plain(words)))
-        for id in self._marked ^ self._problems.keys():
-            for field in self.query(f"#{id}"):
-                field.set_class(id in self._problems, "-wrong")
-        self._marked = frozenset(self._problems)
+        for id, field in self._fields():
+            field.set_class(id in self._problems, "-wrong")
 
     def on_descendant_blur(self, event: events.DescendantBlur) -> None:
         """A field is checked when it is left; an empty one only at the start of a run."""

@@ -12,6 +12,8 @@ from ddenv.errors import UserError
 from ddenv.runs.wanted import Wanted, written
 from ddenv.text import plain
 
+# Maximum time that the screen waits for a program to end, s.
+A_MOMENT = 0.3
 # Exit codes of an engine that has finished or was stopped.
 GOOD_ENDS = (0, 1)
 
@@ -113,7 +115,9 @@ class Scene:
         if process is None:
             return
         process.terminate()
-        # The screen does not wait for it.
+        # The screen waits no longer.
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(A_MOMENT)
         Thread(target=_end, args=(process,), name="scene").start()
 
 
