@@ -82,25 +82,26 @@ def world_report(world: World) -> dict[str, Any]:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.placement import inside
 
+    removable = frozenset(world.elements())
     return {
         "file": str(world.path),
         "version": world.version,
         "world": world.name,
         "gravity": list(world.gravity),
-        "models": [_described(model, world) for model in world.models],
+        "models": [_described(model, world, removable) for model in world.models],
         "notes": _notes(world, ""),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
     }
 
 
-def _described(model: Model, world: World) -> dict[str, Any]:
+def _described(model: Model, world: World, removable: frozenset[str]) -> dict[str, Any]:
     from ddenv.world.extent import model_bounds
 
     box = model_bounds(model)
     return {
         "name": model.name,
         "kind": _kind(model),
-        "removable": model.name in world.elements(),
+        "removable": model.name in removable,
         "line": model.line,
         "pose": [*model.pose.position, *model.pose.quaternion],
         "links": [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links],
