@@ -68,7 +68,7 @@ class Participation:
         return self.run(keep, seed)[0]
 
     def senses(self, keep: Keep, seed: int) -> dict[str, float]:
-        """When each model is in view: what others hide of those that took no part differs between worlds with the same bits."""
+        """When each model is in view. For models that did not affect the run this differs between worlds with equal runs."""
         met = self.run(keep, seed)[1]
         order = {name: crc32(f"{seed} {name} {'' if name in met else sorted(keep)}".encode()) % 100 for name in keep}
         return {name: place / 10 for name, place in order.items() if name in met or place % 2}

@@ -296,8 +296,8 @@ def promise(state: RunState, certificate: Certificate) -> str:
     """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
     if certificate.seeds:
         return (
-            "minimal means: a run with a chosen seed repeats to the last bit, so this is exact for these seeds; for others fresh "
-            "runs say how often f shows, and nothing more"
+            "minimal means: for the chosen seeds this is exact, since a run repeats for its seed; for others fresh runs say how "
+            "often f shows, and nothing more"
         )
     kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
     most = _at_most(certificate)

@@ -87,7 +87,8 @@ class Run:
         if self.reached and outcome != "error":
             read = self.lidar.took_part if self.lidar else {}
             took_part = self.reached.names | self.sleep.took_part | read.keys() | self.unusual
-            # What takes no part may hide these in scans that nobody reads: their times have to follow from what takes part.
+            # In scans that nobody reads, a model that does not affect the run may hide one that does: only scans that were read
+            # give the same times in smaller worlds.
             seen = {name: at for name, at in seen.items() if name not in took_part} | read
         return RunResult(
             outcome=outcome,
