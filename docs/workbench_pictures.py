@@ -77,6 +77,7 @@ PICTURES = {
     "run-light": Picture("RunScreen", "The run screen in the light theme"),
     "run-ansi": Picture("RunScreen", "The run screen in sixteen colours"),
     "waiting": Picture("RunScreen", "A reduction waits to be accepted"),
+    "reduction-waits": Picture("ReductionWaits", "What becomes of a reduction that waits"),
     "watch": Picture("RunScreen", "Watching a run"),
     "log": Picture("RunScreen", "The log"),
     "trial": Picture("RunScreen", "A selection by hand shows f, and waits to be adopted"),
@@ -229,7 +230,9 @@ async def begin(pilot: Pilot[int], run: Path) -> None:
     await take_dialogs(pilot)
     async with opened(run, TINY) as other:
         await take(other, "tiny")
-    await press(pilot, "a")
+    await press(pilot, "p", "enter")
+    await take(pilot, "reduction-waits")
+    await press(pilot, "escape", "a")
     await take_live(pilot, "run", pilot)
     # The next screens take a moment to open.
     await pause(pilot, True)

@@ -86,6 +86,29 @@ async def test_a_and_x_decide_on_the_reduction_that_waits(run, key, kind):
         assert session.asked() == [(kind, {"round": 1, "candidate": 0})]
 
 
+@pytest.mark.parametrize(
+    ("answer", "first"),
+    [("a", ["accept"]), ("x", ["reject"]), ("d", []), ("escape", None)],
+    ids=["accept", "reject", "drop", "cancel"],
+)
+async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(run, answer, first):
+    fake_moments.waiting(run).hold()
+    pin = ("pin", {"models": [4]})
+    async with Attached(run) as session:
+        await session.press("p", *"04", "enter")
+        assert "The reduction to part A (11 → 4 models) waits for you" in session.dialog()
+        assert session.asked() == []
+        await session.press(answer)
+        decided = [] if first is None else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]
+        assert session.asked() == decided
+        if answer == "d":
+            run.write("pinned", models=[4])
+            await session.look()
+            happening = session.text("#happening")
+            assert "Pinned crate_04; the reduction to part A dropped; round 1 ended with 5 untried." in happening
+            assert "Nothing showed f" not in happening
+
+
 async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
     fake_moments.guided(run).hold()
     async with Attached(run) as session:

@@ -23,7 +23,7 @@ from ddenv.guiding.selections import (
     Veto,
     round_over,
 )
-from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
+from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of, waiting
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
 from ddenv.text import shortened
 
@@ -75,8 +75,8 @@ def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
 def _accept(now: Situation, pointed: Pointed) -> Command:
     """Accept what waits, or else what is under the cursor."""
     state, row = now.state, pointed.row
-    if state.round is not None and state.waiting_candidate is not None:
-        return Accept(state.round.number, state.waiting_candidate)
+    if state.round is not None and (waits := waiting(state)):
+        return Accept(state.round.number, waits.index)
     # While the cursor follows the run, its row may change before the key is pressed.
     if row is None or (pointed.follows and not isinstance(row, Trial) and not state.paused):
         raise UserError("there is nothing to accept")
@@ -99,10 +99,10 @@ def nearest_other(state: RunState, row: Row) -> Test | None:
 
 
 def _reject(now: Situation, _: Pointed) -> Command:
-    state = now.state
-    if state.round is None or state.waiting_candidate is None:
+    waits = waiting(now.state)
+    if now.state.round is None or waits is None:
         raise UserError("there is nothing to reject")
-    return Reject(state.round.number, state.waiting_candidate)
+    return Reject(now.state.round.number, waits.index)
 
 
 def _veto(now: Situation, pointed: Pointed) -> Command:

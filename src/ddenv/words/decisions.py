@@ -85,7 +85,7 @@ def arrival(state: RunState) -> str:
     last = state.decisions[-1] if state.decisions else None
     if here is None or last is None or last.tests != state.tests_done:
         return ""
-    if last.kind in ("go_back", "undo"):
+    if last.kind in ("go_back", "undo", "pin", "unpin"):
         return as_sentence(plain(last.words))
     if last.kind == "change":
         return as_sentence(f"{plain(last.words)}, from this round on")
