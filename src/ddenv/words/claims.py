@@ -10,17 +10,20 @@ from ddenv.evidence.claims import (
     FreshRuns,
     current,
     expected_fresh_runs,
+    failing_instead,
     fresh_runs_made,
     helping,
     is_minimal,
     never_left_out,
     so_far,
 )
+from ddenv.runfile.events import deed
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState, Trial
 from ddenv.runfile.supports import stack_with
 from ddenv.text import between, count, first_of, percent
+from ddenv.words.signs import metres
 
 MOST_NAMES, MOST_SEEDS = 3, 4
 
@@ -185,6 +188,12 @@ def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Clai
     return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
 
 
+def means(state: RunState, certificate: Certificate, claim: Claim) -> str:
+    """What the verdict of a claim means, and what happens without a needed model where the robot then fails otherwise."""
+    other = instead(state, certificate, claim)
+    return f"{meaning(claim, certificate)}; {other}" if other else meaning(claim, certificate)
+
+
 def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
     rate, bound = _whole_rate(certificate), claim.bound
@@ -277,6 +286,15 @@ def usual_runs(state: RunState, now: Certificate) -> str:
 def made_of_usual(state: RunState, now: Certificate) -> str:
     """How far a certificate is: "23 of about 30 to 150 runs"."""
     return f"{fresh_runs_made(state, now)} of about {usual_runs(state, now)}"
+
+
+def instead(state: RunState, certificate: Certificate, claim: Claim) -> str:
+    """What mostly happens without a needed model if it is another failure: "the robot got stuck 0.5 m from f's end in 7 of 10"."""
+    end = failing_instead(state, certificate, claim)
+    if end is None:
+        return ""
+    away = f" {metres(end.away)} from f's end" if metres(end.away) else ""
+    return f"the robot {deed(end.failure)}{away} in {end.runs} of {claim.runs}"
 
 
 def short(claim: Claim) -> str:

@@ -9,7 +9,7 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.evidence.claims import FreshRuns, fresh_runs, fresh_runs_made, in_the_making
+from ddenv.evidence.claims import FreshRuns, failing_instead, fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
@@ -288,4 +288,7 @@ def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
 def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
     if one.claim is None:
         return _running(snapshot, one.running)
-    return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
+    other, certificate = "", snapshot.state.certificate
+    if certificate is not None and (end := failing_instead(snapshot.state, certificate, one.claim)):
+        other = f", {end.failure}{f' {metres(end.away)} off' if metres(end.away) else ''} {end.runs}x"
+    return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}{other}"
