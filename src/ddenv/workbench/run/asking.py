@@ -124,6 +124,8 @@ class Asking:
     def ask(self, command: Command | StartEngine | Isolate, *, sure: bool = False) -> None:
         """Sends a command, after its question unless the user is `sure`, or shows why it is not possible."""
         now = self.situation
+        # What waited is decided on, although the engine has not obeyed yet.
+        sure = sure or now.pending in ("accept", "reject")
         if why := refusal(command, now):
             self.refuse(why)
         elif isinstance(command, StartEngine):
