@@ -11,6 +11,7 @@ from textual.widgets import Input, Select
 from ddenv.guiding import course
 from ddenv.guiding.commands import question
 from ddenv.guiding.offers import Pointed, offer
+from ddenv.guiding.selections import Adopt
 from ddenv.guiding.situation import Situation
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import commands
@@ -149,7 +150,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         run.finish(test, "similar", 0.1, failure="stuck")
         run.judge_trial(trial, "similar", [test])
         await session.look()
-        assert session.said() == "try 4 shows f with 3 models: a on its row adopts it"
+        assert session.said() == "try 4 shows f with 3 models: a adopts it"
         run.write("unpinned", models=[0])
         await session.look()
         table = session.screen.query_one(Candidates)
@@ -181,7 +182,7 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert "breaks off" in question(course.Change({"iterations": 9}), state)
 
 
-async def test_notices_wait_until_a_dialog_is_closed(run):
+async def test_a_notice_waits_until_a_dialog_is_closed_and_goes_at_the_next_key(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run, (80, 24), notices=True) as session:
         await session.press("q")
@@ -191,11 +192,11 @@ async def test_notices_wait_until_a_dialog_is_closed(run):
         await session.pilot.pause()
         assert session.said() == "" and not session.app.screen.query("Toast")
         await session.press("escape")
-        # The latest ones are enough: the log has all.
-        assert session.said() == "notice 2\nnotice 3\nnotice 4"
-        await eventually(lambda: len(session.screen.query("Toast")) == 3)
-        await session.press("q")
-        assert not any(toast.is_on_screen for toast in session.app.screen.query("Toast"))
+        # The latest one is enough: the log has all.
+        assert session.said() == "notice 4"
+        await eventually(lambda: len(session.screen.query("Toast")) == 1)
+        await session.press("down")
+        await eventually(lambda: not session.screen.query("Toast"))
 
 
 async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
@@ -318,6 +319,8 @@ def test_a_in_the_footer_says_what_it_would_take(run):
     now = Situation(run.state)
     words = [offer("accept", now, Pointed(row)).words for row in now.state.trials]
     assert words == ["", "count as f", "adopt"]
+    # From anywhere it adopts the last try that shows f.
+    assert offer("accept", now, Pointed()).command == Adopt(3)
 
 
 async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):

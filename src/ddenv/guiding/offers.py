@@ -25,6 +25,7 @@ from ddenv.guiding.selections import (
 )
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of, waiting
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
+from ddenv.runfile.tested import adoptable
 from ddenv.text import shortened
 
 
@@ -73,22 +74,26 @@ def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
 
 
 def _accept(now: Situation, pointed: Pointed) -> Command:
-    """Accept what waits, or else what is under the cursor."""
+    """Accept what waits, or else what is under the cursor, or else the last try that shows f."""
     state, row = now.state, pointed.row
     if state.round is not None and (waits := waiting(state)):
         return Accept(state.round.number, waits.index)
     # While the cursor follows the run, its row may change before the key is pressed.
-    if row is None or (pointed.follows and not isinstance(row, Trial) and not state.paused):
+    if row is not None and pointed.follows and not isinstance(row, Trial) and not state.paused:
+        row = None
+    if isinstance(row, Trial) and row.verdict == "similar":
+        return Adopt(row.number)
+    other = None if row is None or row.verdict == "similar" else nearest_other(state, row)
+    if other is not None:
+        return AcceptOther(other.id)
+    if last := adoptable(state):
+        return Adopt(last.number)
+    if row is None:
         raise UserError("there is nothing to accept")
     if row.verdict == "similar":
-        if isinstance(row, Trial):
-            return Adopt(row.number)
         raise UserError(f"{row.label} is accepted already")
-    test = nearest_other(state, row)
-    if test is None:
-        why = f"is {row.verdict}" if row.verdict else "is not judged yet"
-        raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
-    return AcceptOther(test.id)
+    why = f"is {row.verdict}" if row.verdict else "is not judged yet"
+    raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
 
 
 def nearest_other(state: RunState, row: Row) -> Test | None:

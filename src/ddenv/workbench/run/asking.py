@@ -241,6 +241,6 @@ class Asking:
 
 def _judged(trial: Trial, watch: bool) -> str:
     if trial.verdict == "similar":
-        return f"{shows_f(trial)}{'' if watch else ': a on its row adopts it'}"
+        return f"{shows_f(trial)}{'' if watch else ': a adopts it'}"
     known = ", known from before" if trial.known and trial.known == len(trial.tests) else ""
     return f"{trial.label} does not show f in {count(len(trial.tests), 'test')}{known}"
