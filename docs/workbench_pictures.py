@@ -315,7 +315,7 @@ async def look_back(pilot: Pilot[int]) -> None:
     """An earlier round, the list of rounds, a test of that round, and the signs."""
     await press(pilot, "less_than_sign", "less_than_sign", "comma", "comma")
     await take(pilot, "past")
-    for name, key in (("rounds", "b"), ("facts", "i"), ("signs", "k")):
+    for name, key in (("rounds", "b"), ("facts", "F"), ("signs", "k")):
         await press(pilot, key)
         await take(pilot, name)
         await press(pilot, "escape")

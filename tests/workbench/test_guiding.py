@@ -336,6 +336,21 @@ async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch)
         assert len(started) == 1
 
 
+@pytest.mark.parametrize("size", [(120, 36), (80, 24)], ids=["120x36", "80x24"])
+async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(
+    run, monkeypatch, size
+):
+    started = starts(monkeypatch)
+    fake_moments.finished(run)
+    async with Attached(run, size) as session:
+        for key in ("1", "2"):
+            await session.press(key)
+            words = [key.words for key in session.screen.query_one(KeyFooter).entries]
+            assert words[:6] == ["why", "world that passes", "export", "play", "quit", "help"]
+        await session.press("i")
+        assert [options for *_, options in started] == [{"accept_mode": "automatic", "isolate": 0}]
+
+
 async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, monkeypatch):
     started = starts(monkeypatch)
     fake_moments.guided(run).hold()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, helping
 from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
+from ddenv.guiding.course import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop, Undo
 from ddenv.guiding.selections import (
     NONE_HELPS,
     Accept,
@@ -45,12 +45,12 @@ class Offer:
     `words` are for the footer, "" if the action's usual ones fit. `why_not` is why it is not possible now, or "".
     """
 
-    command: Command | StartEngine | None = None
+    command: Command | StartEngine | Isolate | None = None
     words: str = ""
     why_not: str = ""
 
 
-Meaning = Callable[[Situation, Pointed], Command | StartEngine | None]
+Meaning = Callable[[Situation, Pointed], Command | StartEngine | Isolate | None]
 
 
 def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
@@ -147,6 +147,10 @@ def _leave_out(now: Situation, _: Pointed) -> Command:
     return LeaveOut(numbers_of(now.state, helps[:1])[0])
 
 
+def _isolate(now: Situation, _: Pointed) -> Command | Isolate:
+    return Stop() if now.engine != "absent" and now.state.isolating is not None else Isolate()
+
+
 def _any(state: RunState, models: Collection[str]) -> bool:
     """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that cannot be selected."""
     elements = frozenset(state.elements)
@@ -170,6 +174,7 @@ _FOOTER: dict[type, str] = {
     Veto: "veto",
     Unveto: "take back",
     Undo: "undo",
+    Stop: "stop",
 }
 
 # By the names of the run screen's actions. Its other actions change nothing in the run.
@@ -187,6 +192,7 @@ ACTIONS: dict[str, Meaning] = {
     "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
     "leave_out": _leave_out,
     "undo": lambda now, pointed: Undo(),
+    "isolate": _isolate,
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,
 }
