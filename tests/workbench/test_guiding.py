@@ -96,7 +96,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
     fake_moments.waiting(run).hold()
     pin = ("pin", {"models": [4]})
     async with Attached(run) as session:
-        await session.press("p", *"04", "enter")
+        await session.press("p", "slash", *"04", "enter")
         assert "The reduction to part A (11 → 4 models) waits for you" in session.dialog()
         assert session.asked() == []
         await session.press(answer)
@@ -116,10 +116,14 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         await session.press("p")
         dialog = session.app.screen
         assert isinstance(dialog, ChooseModels)
-        await session.press(*"04", "enter")
+        world = session.screen.query_one(WorldMap)
+        await session.press("down", "down")
+        # The model under the cursor is marked on the map.
+        assert world.aims and world.model_at_cursor == "crate_02"
+        await session.press("slash", *"04", "enter")
+        assert not world.aims
         assert session.asked() == [("pin", {"models": [4]})]
         assert "crate_04 is pinned, and always stays. This round ends with" in session.said()
-        world = session.screen.query_one(WorldMap)
         await session.press("1")
         world.go_to("crate_00")
         # On the map it is the same list, with what is pointed at.
@@ -137,9 +141,9 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         assert "try 4: 2 models, only crate_00, crate_04" in session.said()
         world.select(())
         await session.press("2", "w")
-        await session.press("tab", "down", "tab", "enter")
+        await session.press("space", "down", "space", "enter")
         assert session.asked() == [("try", {"models": [2, 3, 4]})]
-        await session.press("w", *"nothing", "enter")
+        await session.press("w", "slash", *"nothing", "enter")
         assert isinstance(session.app.screen, ChooseModels)
         assert "no name contains this" in session.dialog()
         await session.press("escape")
@@ -327,7 +331,7 @@ async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch)
     started = starts(monkeypatch)
     fake_moments.finished(run)
     async with Attached(run) as session:
-        await session.press("p", *"00", "enter")
+        await session.press("p", "slash", *"00", "enter")
         assert (
             "crate_00 is pinned, and always stays. A new search begins from 2 models; an engine starts"
             in session.said()

@@ -107,6 +107,7 @@ class Workbench(App[int]):
         Binding(
             "ctrl+t", "change_theme", "theme", False, id="app.theme", tooltip="choose the colours for this session"
         ),
+        Binding("n", "names", "names", False, id="app.names", tooltip="show or hide the models' names on the map"),
         Binding(
             "f12", "screenshot", "screenshot", False, id="app.screenshot", tooltip="save a picture of the screen (SVG)"
         ),
@@ -268,6 +269,13 @@ class Workbench(App[int]):
         from ddenv.workbench.help.shortcuts import Help, groups
 
         self.push_screen(Help(groups(self.screen)))
+
+    def action_names(self) -> None:
+        """Shows or hides the names on all maps of the screen."""
+        from ddenv.workbench.map.world_map import WorldMap
+
+        for world in self.screen.query(WorldMap):
+            world.toggle_layer("names")
 
     def action_runs(self) -> None:
         """The list of all runs, above the screen that asks for it."""

@@ -26,6 +26,7 @@ from ddenv.workbench.map.picture import (
     crosshair,
     follow,
     foremost,
+    names,
     picture,
     riders,
     robots,
@@ -111,7 +112,10 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
         both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
         lines = [Line(way.points, color, dash) for way, color, dash in both][::-1]
     how, marks = looks(prints, _who(shown), palette), tuple(_marks(shown, palette))
-    return picture(_seen(prints, view), how, removed="removed" in layers, lines=lines, marks=marks)
+    still = picture(_seen(prints, view), how, removed="removed" in layers, lines=lines, marks=marks)
+    if "names" in layers:
+        names(still, prints, shown.failure or shown.start)
+    return still
 
 
 def _who(shown: Shown) -> Kept:

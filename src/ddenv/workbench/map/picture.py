@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.color import Color
@@ -17,12 +18,18 @@ from ddenv.map.colors import readable
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, owners, spans
 from ddenv.runfile.store import Live
+from ddenv.text import plain, shortened
 from ddenv.workbench.map.map_colors import REMOVED, Palette
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts
 from ddenv.workbench.map.place import Point, Way
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.pose import heading
 
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
+
+# Maximum width of a model's name, in cells.
+NAME = 20
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 
 
@@ -118,6 +125,31 @@ def picture(
         canvas.put(cell, mark.text, readable(mark.ground), mark.ground)
         written[cell] = True
     return Picture(view, how, canvas, grid, gone, dotted, written, cells)
+
+
+def names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> None:
+    """Writes the names of kept models beside their signs: the nearest to the place `near` first, then the largest; none overlap."""
+    canvas, written, view = drawn.canvas, drawn.written, drawn.view
+    kept = np.flatnonzero(drawn.how.kinds != REMOVED).tolist()
+    away = {index: round(prints[index].distance(near), 1) if near else 0.0 for index in kept}
+    for index in sorted(kept, key=lambda index: (away[index], -prints[index].area)):
+        at = drawn.cells.get(index) or view.cell(*prints[index].center)
+        if at is None:
+            continue
+        text, sign = (
+            shortened(plain(prints[index].name), NAME),
+            len(drawn.how.labels[index]) if index in drawn.cells else 0,
+        )
+        begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
+        for down, right in begins:
+            row, column = at[0] + down, at[1] + right
+            if not (0 <= row < view.rows and 0 <= column <= view.columns - len(text)):
+                continue
+            # With a free cell on each side names stay apart.
+            if not written[row, max(0, column - (right != sign + 1)) : column + len(text) + 1].any():
+                canvas.put((row, column), text)
+                written[row, column : column + len(text)] = True
+                break
 
 
 def follow(trails: Mapping[int, list[Point]], snapshot: Snapshot) -> dict[int, list[Point]]:

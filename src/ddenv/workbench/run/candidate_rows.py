@@ -281,14 +281,17 @@ def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
         "ended": signs(dict(one.outcomes)),
         "f": percent(one.shown / one.runs) if one.runs and not one.is_chosen else "",
         "shown": one.shows_at_least,
-        "verdict": _claim(snapshot, one),
+        **_claim(snapshot, one),
     }
 
 
-def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
+def _claim(snapshot: Snapshot, one: FreshRuns) -> Words:
+    """The verdict of a claim, and how the robot fails without a needed model."""
     if one.claim is None:
-        return _running(snapshot, one.running)
-    other, certificate = "", snapshot.state.certificate
-    if certificate is not None and (end := failing_instead(snapshot.state, certificate, one.claim)):
-        other = f", {end.failure}{f' {metres(end.away)} off' if metres(end.away) else ''} {end.runs}x"
-    return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}{other}"
+        return {"verdict": _running(snapshot, one.running)}
+    words, certificate = f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}", snapshot.state.certificate
+    end = None if certificate is None else failing_instead(snapshot.state, certificate, one.claim)
+    if end is None:
+        return {"verdict": words}
+    away = f" {metres(end.away)} away" if metres(end.away) else ""
+    return {"verdict": f"{words}; {end.failure}{away}", IN_SHORT: f"{words}; {end.failure}"}
