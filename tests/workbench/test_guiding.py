@@ -350,7 +350,7 @@ async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_
         for key in ("1", "2"):
             await session.press(key)
             words = [key.words for key in session.screen.query_one(KeyFooter).entries]
-            assert words[:6] == ["why", "world that passes", "export", "play", "quit", "help"]
+            assert words[:4] == ["why", "world that passes", "export", "play"] and words[-2:] == ["quit", "help"]
         await session.press("i")
         assert [options for *_, options in started] == [{"accept_mode": "automatic", "isolate": 0}]
 

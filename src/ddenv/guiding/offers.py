@@ -64,7 +64,8 @@ def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
     if command is None:
         return Offer()
     why_not = refusal(command, now)
-    return Offer(why_not=why_not) if why_not else Offer(command, _FOOTER.get(type(command), ""))
+    again = isinstance(command, StartEngine) and now.state.engines
+    return Offer(why_not=why_not) if why_not else Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
 
 
 def _pause(now: Situation, _: Pointed) -> Command | StartEngine:

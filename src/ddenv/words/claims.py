@@ -65,8 +65,17 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
         _at_most(certificate),
     )
-    often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
-    return f"no {one} can be removed: {kept(certificate)}; without {without} {often}{but}"
+    often = rate(most) if bound is None else f"{_seldom(removals)} (at most {percent(bound)} as often)"
+    return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
+
+
+def _seldom(removals: Sequence[Claim]) -> str:
+    """How often f showed at most without any one model: "f in none of 12 fresh runs each"."""
+    most = max(removals, key=lambda claim: (claim.shown / max(1, claim.runs), claim.high))
+    each = " each" if len(removals) > 1 else ""
+    if most.shown:
+        return f"f in {'at most ' if each else ''}{most.shown} of {count(most.runs, 'fresh run')}"
+    return f"f in none of {count(most.runs, 'fresh run')}{each if len({claim.runs for claim in removals}) == 1 else ''}"
 
 
 def _exactly(certificate: Certificate) -> str:

@@ -130,7 +130,8 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     reached = sum(test.outcome == "pass" for test in tests)
     failed = sum(test.outcome == "failed" for test in tests)
     first = (
-        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
+        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. The failure that "
+        "most of them end in is f: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."

@@ -38,7 +38,9 @@ FIRST = (
 ENDED = _ids("why isolate export play quit help leave_out history change pin without only undo find scene runs")
 # While an earlier moment is shown, while the map has the focus, and on a screen that only watches.
 BROWSING = _ids("back on round_before next_round rounds facts follow help quit play signs")
-ON_MAP = _ids("help map.pick map.next closer farther fit find layers pin without only signs pause quit")
+ON_MAP = _ids(
+    "help quit pause accept reject leave_out map.pick map.next step pin without only undo history export why find layers fit"
+)
 LOOKING = _ids("history rounds facts play why export find copy layers signs help quit")
 # What the pointer shows over the parts that take no keys, by their ids.
 TOOLTIPS = {
