@@ -57,7 +57,7 @@ async def test_a_search_by_keys_that_finds_a_minimal_set(at_the_step, size):
         await pilot.press("w")
         await pilot.pause()
         assert len(screen.attempt.held) == 6 and "f again without bench, plant" in said(pilot)
-        assert "without bench, plant" in said(pilot, "try-table") and "6 of 8 models held" in said(pilot, "try-header")
+        assert "without bench, plant" in said(pilot, "try-table") and "6 of 8 models kept" in said(pilot, "try-header")
         await without(pilot, "sign")
         assert "another failure" in said(pilot) and len(screen.attempt.held) == 6
         screen.query_one(WorldMap).select(["sign", "crate"])

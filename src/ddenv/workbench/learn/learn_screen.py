@@ -22,6 +22,8 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Snapshot
 
 SMALLEST = (64, 20)
+# With so many models at most, maps have their names from the start.
+NAMED = 12
 
 
 class LearnScreen(Screen[ScreenResultType]):
@@ -53,6 +55,8 @@ class LearnScreen(Screen[ScreenResultType]):
         def show(place: Place, notice: str) -> None:
             for each in maps:
                 each.set_place(place, notice)
+                if len(place.elements) <= NAMED and "names" not in each.shown_layers:
+                    each.toggle_layer("names")
 
         read_world(self, run, show)
 

@@ -127,9 +127,30 @@ class LessonScreen(LearnScreen[bool]):
         self.query_one(LessonPane).show(page)
         self.query_one("#lesson-header", Static).update(self._heading())
         footer, due = self.query_one(KeyFooter), course.due and not course.is_open
-        footer.say("lesson.activity", course.activity or "")
+        asked = page.question is not None and page.chosen is None
+        can = {
+            "lesson.activity": course.activity or "",
+            "lesson.skip": "skip" if asked or course.due else "",
+            "lesson.hint": "hint" if asked and page.question is not None and page.question.hint else "",
+            "lesson.back": "step back" if course.step else "",
+            "lesson.predict": "" if course.must_answer else "predict",
+        }
+        plain = not self._algorithm_is_due()
+        self.set_class(plain, "-plain")
+        # The keys of the run come with the algorithm.
+        of_run = {"run_back": "run back", "run_on": "run on", "next_decision": "verdict", "next_reduction": "reduction"}
+        can |= {f"lesson.{key}": "" if plain else words for key, words in (of_run | {"variables": "variables"}).items()}
+        can["lesson.predict"] = "" if plain else can["lesson.predict"]
+        for id, words in can.items():
+            footer.say(id, words)
         footer.say("lesson.on", f"{course.activity}" if due else "next lesson" if self._at_next else "go on")
         self._keep_score()
+
+    def _algorithm_is_due(self) -> bool:
+        """Whether a step up to this one speaks of the pane *Algorithm*; where none does, it is shown from the start."""
+        steps = () if self._opened is None else self._opened.lesson.steps
+        said = [number for number, step in enumerate(steps) if "*Algorithm*" in step.text]
+        return not said or self.course.step >= said[0]
 
     @property
     def _at_next(self) -> bool:
@@ -198,7 +219,11 @@ class LessonScreen(LearnScreen[bool]):
         elif self.course.go_on():
             self._moved()
         elif self.course.page.question is not None and self.course.page.chosen is None:
-            self.say("choose an answer by its letter, or skip the question with s")
+            place = self.query_one(LessonPane).cursor
+            if place is None:
+                self.say("choose an answer by its letter or with ↑ ↓, or skip the question with s")
+            else:
+                self.action_answer(place)
         elif self._opened is None:
             self.action_move("moment", 1)
         else:

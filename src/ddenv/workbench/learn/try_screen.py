@@ -24,7 +24,7 @@ from ddenv.workbench.shared.poll import Snapshot
 
 LONGEST_NAME = 16
 SAID = {
-    "similar": "f again without {out}: you hold {held} now.",
+    "similar": "f again without {out}: you keep {held} now.",
     "other": "another failure. That is not f, so nothing goes.",
     "pass": "the goal was reached: something that f needs was missing.",
 }
@@ -35,17 +35,18 @@ class TryScreen(LearnScreen[None]):
 
     AUTO_FOCUS = "WorldMap"
     NAME = "try"
-    SHOWN = "map.pick map.next without only back done again help close"
-    FIRST = "help close without done map.pick only map.next back again"
+    SHOWN = "map.pick map.next without only back done again on help close"
+    FIRST = "help close on without done map.pick only map.next back again"
     BINDINGS: ClassVar = keys(
         "try",
         ("mark", "space", "mark", "mark", "mark or unmark the model under the crosshair"),
-        ("without", "w", "test(False)", "test without", "test what is held without the marked models"),
+        ("without", "w", "test(False)", "test without", "test what is kept without the marked models"),
         ("only", "o", "test(True)", "test only", "test the marked models alone"),
-        ("back", "u", "back", "undo", "undo: hold again what the last reduction took away"),
+        ("back", "u", "back", "undo", "undo: keep again what the last reduction took away"),
         ("done", "m", "done", "minimal", "say that no single model can go: the verdict"),
         ("again", "n", "again", "new search", "begin again; the first result counts"),
         HELP,
+        ("on", "enter", "on", "back to the lesson", "back to the lesson, once the search is over"),
         ("close", "escape,q", "close", "leave", "back to the lesson; it is kept", "esc"),
     )
 
@@ -78,7 +79,7 @@ class TryScreen(LearnScreen[None]):
         attempt = self.attempt
         self._map.show(snapshot_of(self._base, attempt.held), None)
         header = Text(" Do it yourself", "bold", no_wrap=True)
-        header.append(f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} held", "not bold")
+        header.append(f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} kept", "not bold")
         header.append(f" · {attempt.tests_left} of {count(attempt.budget, 'test')} left", "not bold")
         self.query_one("#try-header", Static).update(header)
         tests = self.query_one("#try-tests", VerticalScroll)
@@ -94,6 +95,9 @@ class TryScreen(LearnScreen[None]):
             )
             tests.scroll_end(animate=False)
         self._say_where()
+        # With the focus the map would take enter, which goes back to the lesson at the end.
+        self.set_focus(None if attempt.ended else self._map)
+        self.refresh_bindings()
 
     def _say_where(self) -> None:
         """What happened last, and the models that are held, with the marked ones."""
@@ -110,14 +114,14 @@ class TryScreen(LearnScreen[None]):
 
     def _models(self) -> tuple[Text, Text]:
         marked = self._map.selection
-        models = Text("Held: ")
+        models = Text("Kept: ")
         for name in self.attempt.held:
             sign = "*" if name in marked else ""
             word = Text(f"{sign}{shortened(plain(name), LONGEST_NAME)}", "bold reverse" if sign else "bold")
             word.apply_meta({"@click": f"screen.mark_one({self.attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
         if not self.attempt.tests_left:
-            return models, Text("No test is left. m: the verdict on what you hold.", "dim")
+            return models, Text("No test is left. m: the verdict on what you keep.", "dim")
         if not marked:
             return models, Text("Mark models with enter or a click. When no single one can go, press m.", "dim")
         left = len(self.attempt.held) - len(marked)
@@ -131,6 +135,16 @@ class TryScreen(LearnScreen[None]):
         self.call_after_refresh(self._show)
 
     # What is done.
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "on":
+            return self.attempt.ended
+        if action == "again":
+            return bool(self.attempt.moves)
+        return not (self.attempt.ended and action in ("mark", "test", "back", "done"))
+
+    def action_on(self) -> None:
+        self.action_close()
 
     def action_mark(self) -> None:
         self._map.action_pick()
@@ -149,18 +163,13 @@ class TryScreen(LearnScreen[None]):
         self._do(self.attempt.back)
 
     def action_done(self) -> None:
-        if self.attempt.ended:
-            self.say("this search is over: n begins a new one")
-        elif not self._asked:
+        if not self._asked:
             self._asked = True
             self._say_where()
         else:
             self._do(self.attempt.end)
 
     def action_again(self) -> None:
-        if not self.attempt.moves:
-            self.say("nothing was tested yet")
-            return
         self.attempt = Attempt(self.attempt.oracle, self.attempt.budget)
         self._do(lambda: None)
 
@@ -177,7 +186,7 @@ class TryScreen(LearnScreen[None]):
         self._show()
 
 
-NO_TESTS = "None yet. Each one runs the robot with some of the models that you hold."
+NO_TESTS = "None yet. Each one runs the robot with some of the models that you keep."
 
 
 def _row(number: int, tried: Tried) -> Text:
@@ -191,7 +200,7 @@ def _row(number: int, tried: Tried) -> Text:
 
 def _last(attempt: Attempt) -> Text:
     if not attempt.tried:
-        return Text("You hold the whole world, and it shows f. Which models does f need?")
+        return Text("You keep the whole world, and it shows f. Which models does f need?")
     last = attempt.tried[-1]
     out = ", ".join(shortened(plain(name), LONGEST_NAME) for name in last.out)
     said = SAID[last.outcome].format(out=out, held=count(len(attempt.held), "model"))
