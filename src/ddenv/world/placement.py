@@ -30,6 +30,8 @@ from ddenv.world.scenario import Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
+# The steps in which a free place is looked for, and how far, m.
+STEP, FAR = 0.1, 2.0
 
 
 def spawn_pose(spawn: Spawn) -> Pose:
@@ -38,23 +40,54 @@ def spawn_pose(spawn: Spawn) -> Pose:
 
 
 def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
-    """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground."""
+    """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground; it names a free place nearby."""
+    if (found := _obstacle(world.models, robot, spawn)) is None:
+        return
+    model, depth, shape = found
+    # The hull of a hollow mesh fills space that looks free.
+    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
+    place = free_spawn(world, robot, spawn, depth)
+    free = "move the spawn"
+    if place is not None:
+        free = f"free nearby: --spawn={place.x:g},{place.y:g},{place.z:g},{place.yaw:g}"
+    where = f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
+    raise UserError(f"{where}: the robot stands inside {what} '{model.name}' by {depth:.2f} m; {free}")
+
+
+def _obstacle(models: Sequence[Model], robot: Model, spawn: Spawn) -> tuple[Model, float, Shape] | None:
+    """The first model that the robot at `spawn` is inside of, how deep, m, and the shape; None if its place is free.
+
+    Raises UserError for a robot without collision shapes.
+    """
     place = spawn_pose(spawn) @ robot.pose.inverse()
     box = bounds(robot.collisions, place)
     if box is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
     bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
-    where = f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
-    for model in world.models:
+    for model in models:
         near = [one for one in model.collisions if _meet(box, filled_bounds(one))]
         depths = [(_depth(body, one), one.shape) for one in near for body in bodies]
-        depth, shape = max(depths, key=lambda each: each[0], default=(0.0, None))
-        if depth > TOLERANCE:
-            # The hull of a hollow mesh fills space that looks free.
-            what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
-            raise UserError(
-                f"{where}: the robot stands inside {what} '{model.name}' by {depth:.2f} m; move the spawn or raise its z"
-            )
+        if depths and (deepest := max(depths, key=lambda each: each[0]))[0] > TOLERANCE:
+            return model, *deepest
+    return None
+
+
+def free_spawn(world: World, robot: Model, spawn: Spawn, depth: float = 0.0) -> Spawn | None:
+    """The nearest free place around `spawn`, on a grid of `STEP`, or `depth`, m, above it; None within `FAR` of it."""
+    sides = [number * STEP for number in range(-round(FAR / STEP), round(FAR / STEP) + 1)]
+    moves = [(x, y, 0.0) for x in sides for y in sides] + [(0.0, 0.0, depth + 0.01)]
+    near = [model for model in world.models if _within(model, spawn, 2 * FAR + depth)]
+    for move in sorted(moves, key=lambda move: math.hypot(*move)):
+        x, y, z = (round(value + by, 2) for value, by in zip((spawn.x, spawn.y, spawn.z), move, strict=True))
+        place = spawn.model_copy(update={"x": x, "y": y, "z": z})
+        if _obstacle(near, robot, place) is None:
+            return place
+    return None
+
+
+def _within(model: Model, spawn: Spawn, reach: float) -> bool:
+    here = np.array([spawn.x, spawn.y, spawn.z])
+    return any(_meet((here - reach, here + reach), filled_bounds(one)) for one in model.collisions)
 
 
 def _meet(one: Bounds, other: Bounds) -> bool:
