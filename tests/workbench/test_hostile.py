@@ -19,6 +19,7 @@ from rich.cells import cell_len
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.reading import plain
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile, recorded
 from ddenv.runs.tests_left import remaining
@@ -33,7 +34,6 @@ from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
 from ddenv.workbench.setup.files import WorldTree, complain_about
 from ddenv.workbench.setup.save_scenario import scenario_path
-from ddenv.workbench.shared.poll import Snapshot
 from tests.tiers import slow
 
 NAMES = [

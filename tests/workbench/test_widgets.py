@@ -11,13 +11,13 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import about, duration, percent, plain, truncated
 from ddenv.words.signs import brief, metres
 from ddenv.workbench.map.map_colors import mixed
+from ddenv.workbench.map.map_drawing import strip
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
-from ddenv.workbench.map.picture import strip
 from ddenv.workbench.runs.recent_runs import RunsFolder
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.processes import last_line
 from ddenv.world.sdf.read import parse_world
 

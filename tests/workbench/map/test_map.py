@@ -14,12 +14,13 @@ from textual.events import MouseScrollUp
 from ddenv.environment import Environment
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.subject import read_parts
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 
 
 class Screen(App):

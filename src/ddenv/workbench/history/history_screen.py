@@ -19,6 +19,7 @@ from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile import branches
 from ddenv.runfile.progress import Decision, Node
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen
@@ -30,7 +31,6 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 

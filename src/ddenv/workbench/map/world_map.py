@@ -16,12 +16,12 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.widget import Widget
 
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_words import describe, legend
 from ddenv.workbench.map.place import Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
-from ddenv.workbench.shared.poll import Snapshot
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from ddenv.map.paint import Canvas
     from ddenv.map.raster import View
     from ddenv.runfile.state import Candidate, Trial
-    from ddenv.workbench.map.map_drawing import MapDrawing
-    from ddenv.workbench.map.picture import Picture
+    from ddenv.workbench.map.map_drawing import MapDrawing, Picture
 
 # One step of the wheel zooms by this factor.
 WHEEL = 1.25
@@ -381,7 +380,7 @@ class WorldMap(Widget, can_focus=True):
         if self._canvas is None or y >= self._canvas.chars.shape[0]:
             return Strip.blank(width, self.rich_style)
         if y not in self._strips:
-            from ddenv.workbench.map.picture import strip
+            from ddenv.workbench.map.map_drawing import strip
 
             self._strips[y] = strip(self._canvas, y)
         return self._strips[y]

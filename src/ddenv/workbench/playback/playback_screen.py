@@ -29,8 +29,7 @@ from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
-from ddenv.workbench.map.place import MovedPrints, Place, Point
-from ddenv.workbench.map.read_world import read_world
+from ddenv.workbench.map.place import MovedPrints, Place, Point, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
