@@ -53,10 +53,10 @@ def test_a_file_may_say_nothing(config, text):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("them: ddenv", "'them' is not known here; did you mean 'theme'?"),
+        ("them: ddenv", "'them' is not known here (did you mean theme?)"),
         ("theme: ddenv-ligt", "did you mean 'ddenv-light'?"),
         ("theme: 7", "theme: expected a name"),
-        ("keys: {run.puse: p}", "no action 'run.puse'; did you mean 'run.pause'?"),
+        ("keys: {run.puse: p}", "no action 'run.puse' (did you mean run.pause?)"),
         ("keys: {run.pause: foo}", "run.pause: there is no key 'foo'"),
         ("keys: {run.pause: ctrl+i}", "terminals send the same for ctrl+i and tab"),
         ("keys: {run.pause: [p]}", "run.pause: expected a key"),

@@ -16,9 +16,10 @@ from textual.dom import DOMNode
 from textual.screen import Screen
 
 from ddenv.errors import UserError
+from ddenv.schemas import nearest
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.help.key_names import shown_key, textual_keys, written
-from ddenv.workbench.terminal.themes import DARK, nearest, theme_called, theme_names
+from ddenv.workbench.terminal.themes import DARK, theme_called, theme_names
 
 KNOWN = ("theme", "notify", "keys")
 # The head of the example.
@@ -63,7 +64,9 @@ def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
     known = actions()
     for id in keymap:
         if id not in known:
-            raise UserError(f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them")
+            raise UserError(
+                f"{where}: keys: there is no action '{id}'{nearest(id, list(known))}; 'ddenv config' lists them"
+            )
     for owner in _owners():
         _check_clashes(owner, keymap, where)
     return keymap

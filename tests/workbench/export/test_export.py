@@ -96,7 +96,7 @@ async def test_a_scenario_goes_with_a_world(run, folder):
 async def test_what_is_wrong_is_said_in_the_dialog(run, folder):
     wrong = (
         ("folder", "/no/such/folder", "/no/such/folder/crates-1.minimal.sdf: cannot be written"),
-        ("folder", "~nobody-here/x", "unknown user"),
+        ("folder", "~nobody-here/x", "~nobody-here/x/crates-1.minimal.sdf: cannot be written"),
         ("world-name", f"{'n' * 300}.sdf", "cannot be written"),
         ("world-name", "", "world (SDF): give a name that ends in .sdf"),
         ("world-name", "a\x00.sdf", "give a name that ends in .sdf"),

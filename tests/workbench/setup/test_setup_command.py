@@ -9,7 +9,7 @@ import yaml
 from ddenv.cli.command_line import app as command_line
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.start_run import command, source_of
+from ddenv.workbench.setup.start_run import command_words
 from tests.workbench.setup.setup_session import Opened
 
 
@@ -65,7 +65,7 @@ def test_every_setting_has_an_option(scenarios, asked_by):
     own = load_scenario(scenarios / "crates.yaml")
     assert set(OTHER) == {field.id for field in form.ALL if field.key}
     asked = form.asked_of(own, OTHER, "timeseg/random", "ddmin")
-    words = command("crates", own, asked, standard=own, jobs=3, reading={}, name="it's <mine>")
+    words = command_words(scenarios / "crates.yaml", own, asked, jobs=3, reading={}, name="it's <mine>")
     assert words[:3] == ["ddenv", "run", "crates"]
     scenario, path = asked_by(shlex.split(shlex.join(words)))
     assert scenario == asked
@@ -82,7 +82,7 @@ def test_a_limit_can_be_taken_back(scenarios, asked_by, typed):
     own = load_scenario(scenarios / "crates.yaml")
     asked = form.asked_of(own, form.texts_of(own) | {"budget": typed}, "timeseg/random", "ddmin")
     assert asked.reduction.budget is None
-    scenario, _ = asked_by(command("crates", own, asked, standard=own, jobs=4, reading={}))
+    scenario, _ = asked_by(command_words(scenarios / "crates.yaml", own, asked, jobs=4, reading={}))
     assert scenario == asked
 
 
@@ -135,5 +135,8 @@ async def test_what_is_wrong_has_no_command_to_copy(scenarios):
 
 
 def test_other_files_are_named_whole(scenarios, tmp_path):
-    assert source_of(scenarios / "crates.yaml", scenarios) == "crates"
-    assert source_of(tmp_path / "crates.yaml", scenarios) == str(tmp_path / "crates.yaml")
+    from ddenv.world.load import load_scenario
+
+    own = load_scenario(scenarios / "crates.yaml")
+    words = command_words(tmp_path / "crates.yaml", own, own, jobs=4, reading={})
+    assert words == ["ddenv", "run", str(tmp_path / "crates.yaml")]

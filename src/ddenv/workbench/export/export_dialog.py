@@ -20,6 +20,7 @@ from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
+from ddenv.world.access import without_tilde
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
@@ -125,7 +126,7 @@ class ExportScreen(ModalScreen[None]):
 
     def _wanted(self) -> Wanted:
         """Raises UserError for names that cannot be used."""
-        folder = _home(Path(self._value("folder") or "."))
+        folder = without_tilde(self._value("folder") or ".")
         wanted = {id: self._path(folder, id, title, endings) for id, title, endings in KINDS if self._ticked(id)}
         if not wanted:
             raise UserError("nothing is chosen: tick what to write (space)")
@@ -138,7 +139,7 @@ class ExportScreen(ModalScreen[None]):
         name = self._value(f"{id}-name")
         if not name or not f"{folder}{name}".isprintable():
             raise UserError(f"{title}: give a name that ends in {endings[0]}")
-        path = folder / _home(Path(name))
+        path = folder / without_tilde(name)
         if path.suffix.lower() not in endings:
             raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
         return path
@@ -187,14 +188,6 @@ def suggested(run: Path) -> tuple[str, str, str]:
     """Names for world, scenario and report of a run."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
     return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html"
-
-
-def _home(path: Path) -> Path:
-    """`path` with `~` expanded. Raises UserError for an unknown user."""
-    try:
-        return path.expanduser()
-    except RuntimeError:
-        raise UserError(f"{path}: unknown user") from None
 
 
 def _here() -> Path:

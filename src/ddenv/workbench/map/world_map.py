@@ -13,6 +13,7 @@ from textual import events
 from textual.binding import Binding
 from textual.geometry import Region
 from textual.message import Message
+from textual.reactive import var
 from textual.strip import Strip
 from textual.widget import Widget
 
@@ -39,6 +40,8 @@ WHEEL = 1.25
 class WorldMap(Widget, can_focus=True):
     """Top-down map. It takes a `Place`, then snapshots. While `picking`, enter and clicks choose places, not models."""
 
+    # Whether enter and clicks choose places.
+    picking = var(False)
     HELP = "click: select or unselect a model   wheel: zoom   drag: move the map"
     BINDINGS: ClassVar = [
         Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
@@ -85,7 +88,6 @@ class WorldMap(Widget, can_focus=True):
         self._canvas: Canvas | None = None
         self._strips: dict[int, Strip] = {}
         self._due = False
-        self._picking = False
         # Where the mouse button went down on the map, and whether the mouse has moved since.
         self._grabbed: tuple[int, int] | None = None
         self._dragged = False
@@ -125,20 +127,13 @@ class WorldMap(Widget, can_focus=True):
     def shown_layers(self) -> frozenset[str]:
         return self.shown.layers
 
-    @property
-    def picking(self) -> bool:
-        """Whether enter and clicks choose places."""
-        return self._picking
-
-    @picking.setter
-    def picking(self, picking: bool) -> None:
-        self._picking = picking
+    def watch_picking(self) -> None:
         self.draw()
 
     @property
     def aims(self) -> bool:
         """Whether the crosshair is shown."""
-        return self.has_focus or self._picking
+        return self.has_focus or self.picking
 
     def set_place(self, place: Place, notice: str = "") -> None:
         """Shows another world, or `notice` if there is none."""
@@ -243,7 +238,7 @@ class WorldMap(Widget, can_focus=True):
     def action_pick(self) -> None:
         """While picking, chooses the place under the crosshair; otherwise selects its model."""
         name, state, port = self.model_at_cursor, self.snapshot.state, self.viewport
-        if self._picking and port.view is not None:
+        if self.picking and port.view is not None:
             self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
         elif name is None or not state.elements or self.shown.ways:
             return
@@ -397,7 +392,7 @@ class WorldMap(Widget, can_focus=True):
             self._subtitle_shown = self.parent.border_subtitle = subtitle
 
     def _subtitle(self, model: str | None, view: View) -> Text:
-        if self._picking:
+        if self.picking:
             x, y = view.point(self.viewport.cursor)
             return Text(f"x {x:.2f}, y {y:.2f} m")
         if model is not None:

@@ -22,34 +22,33 @@ from ddenv.workbench.shared.processes import Engine
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-PLACES = {
-    "spawn": ("robot.spawn.x", "robot.spawn.y", "robot.spawn.z", "robot.spawn.yaw"),
-    "goal": ("goal.x", "goal.y"),
-}
 JOBS_FILE = "jobs.json"
 NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
-def command(
-    source: str,
-    own: Scenario | None,
+def command_words(
+    source: Path,
+    own: Scenario,
     asked: Scenario,
     *,
-    standard: Scenario,
+    bare: bool = False,
     jobs: int,
     reading: Mapping[str, Sequence[Any]],
     name: str = "",
 ) -> list[str]:
-    """The words of the command, to be joined by `shlex.join`.
+    """The words of the command that runs `asked` as Start does, to be joined by `shlex.join`.
 
-    `source` is a scenario's name or file, or a world; `own` is the scenario in it, None for a world, which starts with `standard`.
-    `reading` are the options for reading worlds, `name` is the run's name if it is not the next free one.
+    `own` is the scenario in the file `source`, or the defaults for a `bare` world. `reading` are the options for reading worlds,
+    `name` is the run's name if it is not the next free one.
     """
-    before, after = (own or standard).model_dump(mode="json"), asked.model_dump(mode="json")
-    words = ["ddenv", "run", source]
-    for place, keys in PLACES.items():
-        numbers = [read_key(after, key) for key in keys]
-        if own is None or numbers != [read_key(before, key) for key in keys]:
+    from ddenv.world.load import SCENARIOS
+
+    before, after = own.model_dump(mode="json"), asked.model_dump(mode="json")
+    bundled = source.parent == SCENARIOS and source.suffix == ".yaml"
+    words = ["ddenv", "run", source.stem if bundled else _path(source)]
+    for place, fields in (("spawn", form.SPAWN), ("goal", form.GOAL)):
+        numbers = [read_key(after, field.key) for field in fields]
+        if bare or numbers != [read_key(before, field.key) for field in fields]:
             words.append(f"--{place}={','.join(map(number_text, numbers))}")
     changed = [one for one in OPTIONS if read(after, one) != read(before, one)]
     # As printed sets the others.
@@ -67,13 +66,6 @@ def command(
     return [*words, "--output", _path(Path(name))] if len(Path(name).parts) > 1 else [*words, "--name", name]
 
 
-def source_of(path: Path, bundled: Path) -> str:
-    """A file as an argument of `ddenv run`: the name of a bundled scenario, or the whole path."""
-    if path.parent == bundled and path.suffix == ".yaml":
-        return path.stem
-    return _path(path)
-
-
 def _path(path: Path) -> str:
     return str(path.absolute())
 
@@ -87,14 +79,6 @@ class NewRun:
     jobs: int
     accept_mode: str
     path: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Saved:
-    """A scenario that was saved in a file."""
-
-    path: Path
-    scenario: Scenario
 
 
 def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
@@ -132,21 +116,6 @@ def usual_jobs() -> int:
     """The number of jobs of the last run that was started here, or of this machine's cores."""
     found = read_state(JOBS_FILE)
     return found if type(found) is int and JOBS.allows(found) else processor.usable_cores()
-
-
-def command_words(
-    choice: Choice, saved: Saved | None, scenario: Scenario, *, jobs: int, reading: Mapping[str, Any], name: str
-) -> list[str]:
-    """The command that does the same as Start; empty if the scenario has no file."""
-    from ddenv.world.load import SCENARIOS
-
-    if not choice.run:
-        path, base, standard = choice.path, choice.scenario, choice.settings
-    elif saved is not None:
-        path, base, standard = saved.path, saved.scenario, saved.scenario
-    else:
-        return []
-    return command(source_of(path, SCENARIOS), base, scenario, standard=standard, jobs=jobs, reading=reading, name=name)
 
 
 def run_file(scenario_name: str, name: str) -> Path:
