@@ -54,7 +54,7 @@ def test_a_file_may_say_nothing(config, text):
     ("text", "told"),
     [
         ("them: ddenv", "'them' is not known here (did you mean theme?)"),
-        ("theme: ddenv-ligt", "did you mean 'ddenv-light'?"),
+        ("theme: ddenv-ligt", "did you mean ddenv-light?"),
         ("theme: 7", "theme: expected a name"),
         ("keys: {run.puse: p}", "no action 'run.puse' (did you mean run.pause?)"),
         ("keys: {run.pause: foo}", "run.pause: there is no key 'foo'"),

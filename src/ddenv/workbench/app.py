@@ -23,6 +23,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
+from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
@@ -94,24 +95,17 @@ class Workbench(App[int]):
     ENABLE_COMMAND_PALETTE = True
     COMMANDS: ClassVar[set[type[Provider] | Callable[[], type[Provider]]]] = {_commands}
     BINDINGS: ClassVar = [
-        Binding(
-            "ctrl+q", "leave", "quit", False, priority=True, id="app.leave", tooltip="quit; an engine keeps running"
-        ),
-        Binding("ctrl+z", "suspend_process", "suspend", False, id="app.suspend", tooltip="suspend; fg brings it back"),
-        Binding(
-            "ctrl+p",
-            "command_palette",
-            "commands",
-            False,
+        *keys(
+            "app",
+            ("leave", "ctrl+q", "leave", "quit", "quit; an engine keeps running"),
+            ("suspend", "ctrl+z", "suspend_process", "suspend", "suspend; fg brings it back"),
+            ("commands", "ctrl+p", "command_palette", "commands", "find any command, theme or model by name"),
             priority=True,
-            id="app.commands",
-            tooltip="find any command, theme or model by name",
         ),
-        Binding(
-            "ctrl+t", "change_theme", "theme", False, id="app.theme", tooltip="choose the colours for this session"
-        ),
-        Binding(
-            "f12", "screenshot", "screenshot", False, id="app.screenshot", tooltip="save a picture of the screen (SVG)"
+        *keys(
+            "app",
+            ("theme", "ctrl+t", "change_theme", "theme", "choose the colours for this session"),
+            ("screenshot", "f12", "screenshot", "screenshot", "save a picture of the screen (SVG)"),
         ),
     ]
 

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 from textual import on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
@@ -50,7 +49,7 @@ class ExportScreen(ModalScreen[None]):
     CSS_PATH = "export.tcss"
     AUTO_FOCUS = "#export-write"
     BINDINGS: ClassVar = [
-        Binding("ctrl+s", "write", "write", id="export.write", tooltip="write the chosen files", priority=True),
+        *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
         *keys(
             "export",
             ("close", "escape", "dismiss", "close", "close this dialog"),

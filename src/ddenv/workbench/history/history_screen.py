@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from textwrap import wrap
 from typing import ClassVar, Literal
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen, Screen
 from textual.widgets import DataTable, Static
@@ -18,7 +15,7 @@ from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile import branches
-from ddenv.runfile.progress import Decision, Node
+from ddenv.runfile.progress import Node
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.text import count, first_of, plain, shortened
@@ -30,7 +27,7 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
+from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_lines
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 
@@ -43,8 +40,6 @@ ROOM = 90
 TREE = 15
 MARK = "marked"
 GO = "go on from this environment: the run pauses there (branch)"
-# Where the words of a decision begin, after its time.
-INDENT = 10
 
 
 class Tree(DataTable[Text]):
@@ -63,7 +58,7 @@ class History(Screen[int | None]):
     CSS_PATH: ClassVar = ["history.tcss"]
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
     BINDINGS: ClassVar = [
-        Binding("enter", "go", "go on from here", id="history.go", tooltip=GO, priority=True),
+        *keys("history", ("go", "enter", "go", "go on from here", GO), priority=True),
         *keys(
             "history",
             ("mark", "m", "mark", "mark", "mark this environment, to compare another with it"),
@@ -208,13 +203,6 @@ class History(Screen[int | None]):
 
     def _refuse(self, why: str) -> None:
         self.notify(why, severity="warning", timeout=4, markup=False)
-
-
-def decision_lines(decision: Decision, width: int) -> list[Text]:
-    """A decision with its time of day, in lines that fit."""
-    first, *rest = wrap(plain(decision.words), max(width - INDENT, 12)) or [""]
-    lines = [decision_line(replace(decision, words=first), width)]
-    return lines + [Text(" " * INDENT + line) for line in rest]
 
 
 def _side(name: str) -> Literal["left", "right"]:
