@@ -17,6 +17,7 @@ from ddenv.words.signs import brief, metres
 from ddenv.workbench.map.map_colors import mixed
 from ddenv.workbench.map.map_drawing import strip
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
+from ddenv.workbench.map.place import Shown
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.shared.processes import last_line
 from ddenv.world.sdf.read import parse_world
@@ -74,8 +75,8 @@ def looks_of(run, candidate=None):
     state = fold(run.file.events())
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     chosen = state.round.candidates[candidate] if candidate is not None else None
-    how = looks(prints, kept(state, chosen), mixed((0, 0, 0), (255, 255, 255)))
-    return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.labels, strict=True)}
+    how = looks(prints, kept(Shown(snapshot=Snapshot(state), candidate=chosen)), mixed((0, 0, 0), (255, 255, 255)))
+    return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.signs.texts, strict=True)}
 
 
 def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run):
@@ -105,7 +106,8 @@ def test_without_colours_the_cells_still_differ(run):
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     view = View(0, 0, 0.25, 64, 18)
     canvas = Canvas(view.rows, view.columns, (0, 0, 0))
-    how = looks(prints, kept(state, state.round.candidates[1]), mixed((0, 0, 0), (255, 255, 255)))
+    who = kept(Shown(snapshot=Snapshot(state), candidate=state.round.candidates[1]))
+    how = looks(prints, who, mixed((0, 0, 0), (255, 255, 255)))
     fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
     signs = {chr(char) for char in canvas.chars.flat}
     assert {"█", "▓", "▒", " "} <= signs

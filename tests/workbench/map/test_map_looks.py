@@ -105,7 +105,7 @@ def test_pinned_and_selected_models_have_signs_of_their_own():
     prints = squares(3)
     who = who_of(prints, {"m0": 0, "m2": 1}, pinned=frozenset({"m1"}), selected=frozenset({"m2"}))
     _, how = drawn(prints, who, PALETTES["own"])
-    assert list(how.labels) == ["A", "+", "*B"]
+    assert list(how.signs.texts) == ["A", "+", "*B"]
     assert how.kinds.tolist() == [KEPT, PINNED, SELECTED]
     assert how.signs.sure.tolist() == [False, True, True]
 
@@ -113,11 +113,11 @@ def test_pinned_and_selected_models_have_signs_of_their_own():
 def test_numbers_of_the_order_of_sensing_follow_the_letters():
     prints = squares(3)
     _, how = drawn(prints, who_of(prints, {"m0": 0, "m1": 0, "m2": 1}, sensed={"m2": 1, "m0": 12}), PALETTES["dark"])
-    assert list(how.labels) == ["A12", "A", "B1"]
+    assert list(how.signs.texts) == ["A12", "A", "B1"]
 
 
 def test_what_drops_is_marked_even_where_space_is_short():
     prints = squares(3)
     how = looks(prints, who_of(prints, dropped=frozenset({"m1"})), PALETTES["dark"])
-    assert [text.startswith("↓") for text in how.labels] == [False, True, False]
+    assert [text.startswith("↓") for text in how.signs.texts] == [False, True, False]
     assert how.signs.sure.tolist() == [False, True, False]

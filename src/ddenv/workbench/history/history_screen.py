@@ -64,7 +64,7 @@ class History(Screen[int | None]):
             ("mark", "m", "mark", "mark", "mark this environment, to compare another with it"),
             ("compare", "c", "compare", "compare", "compare the marked environment with this one"),
             HELP,
-            ("close", "escape,h,q", "close", "close", "back to the run", "esc"),
+            ("close", "escape,h,q", "dismiss(None)", "close", "back to the run", "esc"),
         ),
     ]
 
@@ -197,9 +197,6 @@ class History(Screen[int | None]):
         else:
             first = self._tree[self._marked]
             self.app.push_screen(Compare(first, node, self._look_at().state, self._place))
-
-    def action_close(self) -> None:
-        self.dismiss(None)
 
     def _refuse(self, why: str) -> None:
         self.notify(why, severity="warning", timeout=4, markup=False)

@@ -14,7 +14,6 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from ddenv.evidence.took_part import in_last
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.colors import readable
 from ddenv.map.paint import Canvas
@@ -22,8 +21,8 @@ from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.workbench.map.map_colors import REMOVED, Palette
-from ddenv.workbench.map.map_words import PARTING, sensed_order
-from ddenv.workbench.map.model_looks import Kept, fill, ghosts, kept, looks
+from ddenv.workbench.map.map_words import PARTING
+from ddenv.workbench.map.model_looks import fill, ghosts, kept, looks
 from ddenv.workbench.map.place import MovedPrints, Point, Shown
 from ddenv.world.pose import heading, pose_of
 
@@ -167,7 +166,7 @@ def _riders(shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
 
 def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     """All that does not change while robots drive. Letters cover paths, and marks cover letters."""
-    how = looks(shown.place.prints, _who(shown), palette)
+    how = looks(shown.place.prints, kept(shown), palette)
     filled, centers = _lying(shown.place.prints, view)
     canvas = Canvas(view.rows, view.columns, palette.back)
     grid = owners(filled, view, np.flatnonzero(how.kinds != REMOVED))
@@ -185,7 +184,7 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     }
     cells = place_signs(grid, centers, how.signs, marks)
     for index, (row, column) in cells.items():
-        text, tone = how.labels[index], how.looks[how.tones[index]]
+        text, tone = how.signs.texts[index], how.looks[how.tones[index]]
         canvas.put((row, column), text, back=tone.fill)
         written[row, column : column + len(text)] = True
     for cell, (sign, ground) in marks.items():
@@ -204,22 +203,6 @@ def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
     if "original" in layers and not shown.same_paths:
         lines.insert(0, (_path(snapshot.original), palette.original, DASH))
     return lines
-
-
-def _who(shown: Shown) -> Kept:
-    """Which models are in the environment, and how they stand out."""
-    place, state, layers = shown.place, shown.snapshot.state, shown.layers
-    who, met = kept(state, shown.candidate), in_last(state) if "took part" in layers else None
-    if not who.elements:
-        who = Kept(place.elements, place.elements)
-    return replace(
-        who,
-        parts=who.parts if "partitions" in layers else {},
-        pinned=who.pinned if "pinned" in layers else frozenset(),
-        selected=shown.selection,
-        sensed=sensed_order(state) if "sensed" in layers else {},
-        shown=who.shown if met is None else frozenset(met.names(state.elements)),
-    )
 
 
 def _path(rows: array[float] | None) -> np.ndarray:

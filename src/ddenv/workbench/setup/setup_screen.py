@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -29,10 +30,12 @@ from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
 from ddenv.workbench.setup.files import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
-from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, ask_trust, command_words, create, run_file
+from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.messages import ShowRun
+from ddenv.workbench.shared.processes import Engine
 from ddenv.workbench.widgets.panes import Panes
+from ddenv.workbench.widgets.question import once_trusted
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -333,35 +336,44 @@ class SetupScreen(Screen[None]):
         self._begin(only_baseline=True)
 
     def _begin(self, only_baseline: bool) -> None:
+        from ddenv.runs.trust import trust_own
+
         if self._busy:
             return
         texts = self.form.texts
         try:
-            scenario = self._scenario()
+            choice, scenario = self._chosen(), self._scenario()
             path = run_file(scenario.name, str(form.value(form.NAME, texts["name"])))
-            new = NewRun(self._chosen(), scenario, form.jobs(texts["jobs"]), texts["accept"], path)
+            jobs, mode = form.jobs(texts["jobs"]), texts["accept"]
         except UserError as error:
             self._complain(error)
             return
+
+        def answered(trusts: bool) -> None:
+            if trusts:
+                start = partial(
+                    create, choice, scenario, path, jobs=jobs, accept_mode=mode, only_baseline=only_baseline
+                )
+                self._create(path, start)
+            else:
+                self._complain(UserError("not started: it needs a program that you do not trust"))
+
         self.preview.remember_places()
         self._busy = True
         self.form.show_message("checking ...")
-        ask_trust(self.app, new, lambda yes: self._answered(yes, new, only_baseline))
-
-    def _answered(self, trusts: bool, new: NewRun, only_baseline: bool) -> None:
-        if trusts:
-            self._create(new, only_baseline)
-        else:
-            self._complain(UserError("not started: it needs a program that you do not trust"))
+        # A run file is never the user's own: somebody may have sent it.
+        if not choice.run:
+            trust_own(scenario, choice.path)
+        once_trusted(self.app, scenario, choice.path, answered)
 
     @work(thread=True, group="start", exclusive=True)
-    def _create(self, new: NewRun, only_baseline: bool) -> None:
+    def _create(self, path: Path, start: Callable[[], Engine]) -> None:
         try:
-            engine = create(new, only_baseline)
+            engine = start()
         except UserError as error:
             call_if_open(self, self._complain, error)
             return
-        call_if_open(self, self.post_message, ShowRun(new.path, engine=engine))
+        call_if_open(self, self.post_message, ShowRun(path, engine=engine))
 
     def _complain(self, error: UserError) -> None:
         """Shows an error, and marks its field."""

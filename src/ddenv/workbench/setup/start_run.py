@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from textual.app import App
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
@@ -70,44 +67,25 @@ def _path(path: Path) -> str:
     return str(path.absolute())
 
 
-@dataclass(frozen=True, slots=True)
-class NewRun:
-    """A run as described by the form: `scenario` for the `choice`, with `jobs` tests at a time, in the file `path`."""
-
-    choice: Choice
-    scenario: Scenario
-    jobs: int
-    accept_mode: str
-    path: Path
-
-
-def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
-    """Calls `then` with whether what the run starts is trusted. A run file is never the user's own: somebody may have sent it."""
-    from ddenv.runs.trust import trust_own
-    from ddenv.workbench.widgets.question import once_trusted
-
-    if not new.choice.run:
-        trust_own(new.scenario, new.choice.path)
-    once_trusted(app, new.scenario, new.choice.path, then)
-
-
-def create(new: NewRun, only_baseline: bool) -> Engine:
-    """Writes the run file and starts its engine. Raises UserError."""
+def create(
+    choice: Choice, scenario: Scenario, path: Path, *, jobs: int, accept_mode: str, only_baseline: bool
+) -> Engine:
+    """Writes the run file `path` and starts its engine, with `jobs` tests at a time. Raises UserError."""
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like, create_run
 
-    engine = Engine(new.path)
-    if new.choice.run:
-        create_like(new.choice.path, new.scenario, new.path)
+    engine = Engine(path)
+    if choice.run:
+        create_like(choice.path, scenario, path)
     else:
-        create_run(new.scenario, new.path)
-        remember(new.choice.path)
-    engine.start(new.jobs, new.accept_mode)
+        create_run(scenario, path)
+        remember(choice.path)
+    engine.start(jobs, accept_mode)
     # The usual number is not remembered: another machine has other cores.
-    write_state(JOBS_FILE, None if new.jobs == processor.usable_cores() else new.jobs)
+    write_state(JOBS_FILE, None if jobs == processor.usable_cores() else jobs)
     if only_baseline:
         # A step of one round ends after the baseline. The engine has started: it ignores older commands.
-        with RunFile(new.path) as run:
+        with RunFile(path) as run:
             run.send("step", unit="round")
     return engine
 
