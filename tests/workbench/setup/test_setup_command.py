@@ -113,7 +113,7 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
         await session.open(path)
         assert session.told("command") == ""
         assert "not ready: spawn x m: is missing" in session.told("cost")
-        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        session.place()
         await session.pilot.pause()
         words = shlex.split(session.told("command"))[1:]
         assert words[2] == str(path)
