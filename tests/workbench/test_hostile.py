@@ -26,7 +26,7 @@ from ddenv.runs.tests_left import remaining
 from ddenv.words.explain import explain
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import read_config
-from ddenv.workbench.export.export_dialog import suggested, write
+from ddenv.workbench.export import suggested, write
 from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.run_screen import RunScreen

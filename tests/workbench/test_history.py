@@ -11,7 +11,7 @@ from textual.widgets import DataTable
 from ddenv.runfile import branches
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import Node
-from ddenv.workbench.history.history_screen import Compare, History, compare
+from ddenv.workbench.history import Compare, History, compare
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question

@@ -8,7 +8,7 @@ import fake_moments
 import pytest
 
 from ddenv.guiding.offers import ACTIONS
-from ddenv.workbench.lines.line_mode import GUIDES, QUESTIONS, LineMode
+from ddenv.workbench.line_mode import GUIDES, QUESTIONS, LineMode
 from ddenv.workbench.run.run_keys import GUIDING
 
 

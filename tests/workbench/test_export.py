@@ -7,7 +7,7 @@ import pytest
 from textual.app import App
 from textual.widgets import Button, Checkbox, Input, Static
 
-from ddenv.workbench.export.export_dialog import ExportScreen
+from ddenv.workbench.export import ExportScreen
 
 NAMES = ("crates-1.html", "crates-1.minimal.robot.sdf", "crates-1.minimal.sdf", "crates-1.minimal.yaml")
 
