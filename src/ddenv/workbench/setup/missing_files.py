@@ -161,12 +161,11 @@ class MissingList(OptionList):
         ("without", "w", "without", "without", "leave this one out"),
     )
 
+    @dataclass
     class Chosen(Message):
         """The user chose remedies, by URI; "" takes one back."""
 
-        def __init__(self, remedies: dict[str, str]) -> None:
-            super().__init__()
-            self.remedies = remedies
+        remedies: dict[str, str]
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)

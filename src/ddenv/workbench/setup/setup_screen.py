@@ -171,10 +171,6 @@ class SetupScreen(Screen[None]):
         elif not files.option_count:
             self.preview.show_nothing("there are no bundled scenarios; ctrl+o opens a file")
 
-    @on(FileList.Looked)
-    def _looked_at(self, event: FileList.Looked) -> None:
-        self._choose(event.path)
-
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
         """A world without a start is asked for it first."""
@@ -200,12 +196,13 @@ class SetupScreen(Screen[None]):
 
     # The choice.
 
-    def _choose(self, path: Path) -> None:
+    @on(FileList.Looked)
+    def _choose(self, event: FileList.Looked) -> None:
         self.preview.remember_places()
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
         self.form.show_message("")
-        self.preview.read(path, opened=path == self._opened_now)
+        self.preview.read(event.path, opened=event.path == self._opened_now)
         self._show_outcome()
 
     @on(Preview.Read)
