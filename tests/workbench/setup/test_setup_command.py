@@ -4,13 +4,20 @@ import shlex
 
 import fake_run
 import pytest
-import yaml
 
 from ddenv.cli.command_line import app as command_line
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.start_run import command_words
-from tests.workbench.setup.setup_session import Opened
+from ddenv.world.load import load_scenario
+from tests.workbench.setup.setup_session import Opened, write_scenario
+
+
+@pytest.fixture
+def own(scenarios):
+    """The bundled scenario, with a limit."""
+    write_scenario(scenarios, reduction=fake_run.scenario()["reduction"] | {"budget": 50})
+    return load_scenario(scenarios / "crates.yaml")
 
 
 @pytest.fixture
@@ -59,10 +66,7 @@ PLACES = {
 OTHER = PLACES | {one.name: another(one) for one in OPTIONS if one.shown in ("basic", "more")}
 
 
-def test_every_setting_has_an_option(scenarios, asked_by):
-    from ddenv.world.load import load_scenario
-
-    own = load_scenario(scenarios / "crates.yaml")
+def test_every_setting_has_an_option(scenarios, own, asked_by):
     assert set(OTHER) == {field.id for field in form.ALL if field.key}
     asked = form.asked_of(own, OTHER, "timeseg/random", "ddmin")
     words = command_words(scenarios / "crates.yaml", own, asked, jobs=3, reading={}, name="it's <mine>")
@@ -73,13 +77,7 @@ def test_every_setting_has_an_option(scenarios, asked_by):
 
 
 @pytest.mark.parametrize("typed", ["", " none"])
-def test_a_limit_can_be_taken_back(scenarios, asked_by, typed):
-    from ddenv.world.load import load_scenario
-
-    data = fake_run.scenario()
-    data["reduction"]["budget"] = 50
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(data))
-    own = load_scenario(scenarios / "crates.yaml")
+def test_a_limit_can_be_taken_back(scenarios, own, asked_by, typed):
     asked = form.asked_of(own, form.texts_of(own) | {"budget": typed}, "timeseg/random", "ddmin")
     assert asked.reduction.budget is None
     scenario, _ = asked_by(command_words(scenarios / "crates.yaml", own, asked, jobs=4, reading={}))
@@ -134,9 +132,6 @@ async def test_what_is_wrong_has_no_command_to_copy(scenarios):
         assert session.app.focused.id == "timeout"
 
 
-def test_other_files_are_named_whole(scenarios, tmp_path):
-    from ddenv.world.load import load_scenario
-
-    own = load_scenario(scenarios / "crates.yaml")
+def test_other_files_are_named_whole(own, tmp_path):
     words = command_words(tmp_path / "crates.yaml", own, own, jobs=4, reading={})
     assert words == ["ddenv", "run", str(tmp_path / "crates.yaml")]
