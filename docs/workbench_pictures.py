@@ -77,6 +77,7 @@ PICTURES = {
     "run-light": Picture("RunScreen", "The run screen in the light theme"),
     "run-ansi": Picture("RunScreen", "The run screen in sixteen colours"),
     "waiting": Picture("RunScreen", "A reduction waits to be accepted"),
+    "reduction-waits": Picture("ReductionWaits", "What becomes of a reduction that waits"),
     "watch": Picture("RunScreen", "Watching a run"),
     "log": Picture("RunScreen", "The log"),
     "trial": Picture("RunScreen", "A selection by hand shows f, and waits to be adopted"),
@@ -229,7 +230,9 @@ async def begin(pilot: Pilot[int], run: Path) -> None:
     await take_dialogs(pilot)
     async with opened(run, TINY) as other:
         await take(other, "tiny")
-    await press(pilot, "a")
+    await press(pilot, "p", "enter")
+    await take(pilot, "reduction-waits")
+    await press(pilot, "escape", "a")
     await take_live(pilot, "run", pilot)
     # The next screens take a moment to open.
     await pause(pilot, True)
@@ -312,7 +315,7 @@ async def look_back(pilot: Pilot[int]) -> None:
     """An earlier round, the list of rounds, a test of that round, and the signs."""
     await press(pilot, "less_than_sign", "less_than_sign", "comma", "comma")
     await take(pilot, "past")
-    for name, key in (("rounds", "b"), ("facts", "i"), ("signs", "k")):
+    for name, key in (("rounds", "b"), ("facts", "F"), ("signs", "k")):
         await press(pilot, key)
         await take(pilot, name)
         await press(pilot, "escape")

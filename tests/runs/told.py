@@ -22,12 +22,13 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import parting_sentence, reasons, sentence
 
 KINDS = {
-    "gets stuck elsewhere": "stuck",
-    "tips over elsewhere": "tipped over",
-    "falls elsewhere": "fell",
-    "takes another place for its goal": "lost",
-    "runs out of time elsewhere": "out of time",
+    "gets stuck": "stuck",
+    "tips over": "tipped over",
+    "falls": "fell",
+    "is lost": "lost",
+    "runs out of time": "out of time",
 }
+KIND = re.compile(r"(.+) ([\d.]+) m from f's end")
 WITHOUT = re.compile(r"Without (.+?)(?: and what rests on it \(\d+ models?\))? the robot (.+)\.$")
 MOST = re.compile(r" \((\d+) of (\d+) fresh runs?, [<>]?(\d+) % to [<>]?(\d+) %\)")
 PLACE = r"\((-?[\d.]+), (-?[\d.]+)\) m"
@@ -127,12 +128,17 @@ def _clause(rows: Rows, mine: list[dict[str, Any]], does: str, count: int) -> li
         right = len(seconds) == count and abs(median(seconds) - int(reached[1])) <= 0.5
         return [] if right else [f"the goal after {sorted(seconds)}"]
     kind, _, where = does.partition(", ")
-    ends = [one["end_pose"] for one in mine if one["outcome"] == "other" and one["failure"] == KINDS.get(kind)]
+    failed = KIND.fullmatch(kind)
+    word = KINDS.get(failed[1]) if failed else None
+    others = [one for one in mine if one["outcome"] == "other" and one["failure"] == word]
+    ends = [one["end_pose"] for one in others]
     place = ENDS.fullmatch(where)
-    if len(ends) != count or place is None:
+    if len(ends) != count or place is None or failed is None:
         return [f"{len(ends)} of '{does}'"]
     reach, x, y = float(place[2] or 0.5), float(place[3]), float(place[4])
     wrong = [f"ended at {end[:3]}" for end in ends if math.dist(end[:2], (x, y)) > reach + 0.01]
+    away = median(one["distance"] for one in others)
+    wrong += [f"{away:.2f} m from f's end"] if abs(away - float(failed[2])) > 0.06 else []
     above = median(end[2] for end in ends) - rows.height
     told = float(place[5] or 0) * (-1 if place[6] == "lower" else 1)
     return wrong + ([f"{above:.2f} m above f's end"] if abs(above - told) > (0.06 if place[5] else 0.25) else [])

@@ -6,7 +6,21 @@ from types import SimpleNamespace
 
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run.run_screen import RunScreen
+from tests.conftest import ROOT
 from tests.waiting import eventually
+
+SRC = ROOT / "src/ddenv"
+
+
+class Heard(Workbench):
+    """It remembers the notices that are no longer shown."""
+
+    CSS_PATH = str(SRC / "workbench/app.tcss")
+    past: tuple[str, ...] = ()
+
+    def clear_notifications(self):
+        self.past += tuple(notice.message for notice in self._notifications)
+        super().clear_notifications()
 
 
 class Session:
@@ -47,7 +61,7 @@ class Session:
         return new
 
     def notices(self):
-        return [notice.message for notice in self.app._notifications]
+        return [*self.app.past, *(notice.message for notice in self.app._notifications)]
 
     def said(self):
         """What was said since this was called last, as one text."""
@@ -70,7 +84,7 @@ class Attached:
         self.run, self.size, self.watch, self.notices = run, size, watch, notices
 
     async def __aenter__(self):
-        app = Workbench(self.run.path, watch=self.watch)
+        app = Heard(self.run.path, watch=self.watch)
         self._context = app.run_test(size=self.size, notifications=self.notices)
         pilot = await self._context.__aenter__()
         await app.workers.wait_for_complete()

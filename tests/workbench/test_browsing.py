@@ -107,7 +107,7 @@ async def test_b_lists_the_rounds_and_goes_to_the_end_of_one(run):
 async def test_i_shows_the_facts_of_a_test_of_a_round_that_is_over(run):
     fake_moments.finished(run)
     async with Attached(run) as session:
-        await session.press("less_than_sign", "less_than_sign", "i")
+        await session.press("less_than_sign", "less_than_sign", "F")
         dialog = session.app.screen
         assert isinstance(dialog, FactsDialog)
         words = session.dialog()

@@ -290,7 +290,7 @@ def test_tries_and_pins_are_named_beside_the_round(run):
     assert "try 3 (4 models) is being tested: first run." in words
     assert "Pinned, and so in every candidate: crate_00." in words
     run.judge_trial(3, "similar", [15])
-    assert told(run)[1].startswith("try 3 shows f with 4 models: a on its row adopts it.")
+    assert told(run)[1].startswith("try 3 shows f with 4 models: a adopts it.")
 
 
 def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run):

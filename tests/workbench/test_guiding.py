@@ -11,6 +11,7 @@ from textual.widgets import Input, Select
 from ddenv.guiding import course
 from ddenv.guiding.commands import question
 from ddenv.guiding.offers import Pointed, offer
+from ddenv.guiding.selections import Adopt
 from ddenv.guiding.situation import Situation
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import commands
@@ -86,16 +87,43 @@ async def test_a_and_x_decide_on_the_reduction_that_waits(run, key, kind):
         assert session.asked() == [(kind, {"round": 1, "candidate": 0})]
 
 
+@pytest.mark.parametrize(
+    ("answer", "first"),
+    [("a", ["accept"]), ("x", ["reject"]), ("d", []), ("escape", None)],
+    ids=["accept", "reject", "drop", "cancel"],
+)
+async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(run, answer, first):
+    fake_moments.waiting(run).hold()
+    pin = ("pin", {"models": [4]})
+    async with Attached(run) as session:
+        await session.press("p", "slash", *"04", "enter")
+        assert "The reduction to part A (11 → 4 models) waits for you" in session.dialog()
+        assert session.asked() == []
+        await session.press(answer)
+        decided = [] if first is None else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]
+        assert session.asked() == decided
+        if answer == "d":
+            run.write("pinned", models=[4])
+            await session.look()
+            happening = session.text("#happening")
+            assert "Pinned crate_04; the reduction to part A dropped; round 1 ended with 5 untried." in happening
+            assert "Nothing showed f" not in happening
+
+
 async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
     fake_moments.guided(run).hold()
     async with Attached(run) as session:
         await session.press("p")
         dialog = session.app.screen
         assert isinstance(dialog, ChooseModels)
-        await session.press(*"04", "enter")
+        world = session.screen.query_one(WorldMap)
+        await session.press("down", "down")
+        # The model under the cursor is marked on the map.
+        assert world.aims and world.model_at_cursor == "crate_02"
+        await session.press("slash", *"04", "enter")
+        assert not world.aims
         assert session.asked() == [("pin", {"models": [4]})]
         assert "crate_04 is pinned, and always stays. This round ends with" in session.said()
-        world = session.screen.query_one(WorldMap)
         await session.press("1")
         world.go_to("crate_00")
         # On the map it is the same list, with what is pointed at.
@@ -113,9 +141,9 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         assert "try 4: 2 models, only crate_00, crate_04" in session.said()
         world.select(())
         await session.press("2", "w")
-        await session.press("tab", "down", "tab", "enter")
+        await session.press("space", "down", "space", "enter")
         assert session.asked() == [("try", {"models": [2, 3, 4]})]
-        await session.press("w", *"nothing", "enter")
+        await session.press("w", "slash", *"nothing", "enter")
         assert isinstance(session.app.screen, ChooseModels)
         assert "no name contains this" in session.dialog()
         await session.press("escape")
@@ -126,7 +154,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         run.finish(test, "similar", 0.1, failure="stuck")
         run.judge_trial(trial, "similar", [test])
         await session.look()
-        assert session.said() == "try 4 shows f with 3 models: a on its row adopts it"
+        assert session.said() == "try 4 shows f with 3 models: a adopts it"
         run.write("unpinned", models=[0])
         await session.look()
         table = session.screen.query_one(Candidates)
@@ -158,7 +186,7 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert "breaks off" in question(course.Change({"iterations": 9}), state)
 
 
-async def test_notices_wait_until_a_dialog_is_closed(run):
+async def test_a_notice_waits_until_a_dialog_is_closed_and_goes_at_the_next_key(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run, (80, 24), notices=True) as session:
         await session.press("q")
@@ -168,11 +196,11 @@ async def test_notices_wait_until_a_dialog_is_closed(run):
         await session.pilot.pause()
         assert session.said() == "" and not session.app.screen.query("Toast")
         await session.press("escape")
-        # The latest ones are enough: the log has all.
-        assert session.said() == "notice 2\nnotice 3\nnotice 4"
-        await eventually(lambda: len(session.screen.query("Toast")) == 3)
-        await session.press("q")
-        assert not any(toast.is_on_screen for toast in session.app.screen.query("Toast"))
+        # The latest one is enough: the log has all.
+        assert session.said() == "notice 4"
+        await eventually(lambda: len(session.screen.query("Toast")) == 1)
+        await session.press("down")
+        await eventually(lambda: not session.screen.query("Toast"))
 
 
 async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
@@ -295,19 +323,36 @@ def test_a_in_the_footer_says_what_it_would_take(run):
     now = Situation(run.state)
     words = [offer("accept", now, Pointed(row)).words for row in now.state.trials]
     assert words == ["", "count as f", "adopt"]
+    # From anywhere it adopts the last try that shows f.
+    assert offer("accept", now, Pointed()).command == Adopt(3)
 
 
 async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):
     started = starts(monkeypatch)
     fake_moments.finished(run)
     async with Attached(run) as session:
-        await session.press("p", *"00", "enter")
+        await session.press("p", "slash", *"00", "enter")
         assert (
             "crate_00 is pinned, and always stays. A new search begins from 2 models; an engine starts"
             in session.said()
         )
         assert session.asked() == [("pin", {"models": [0]})]
         assert len(started) == 1
+
+
+@pytest.mark.parametrize("size", [(120, 36), (80, 24)], ids=["120x36", "80x24"])
+async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(
+    run, monkeypatch, size
+):
+    started = starts(monkeypatch)
+    fake_moments.finished(run)
+    async with Attached(run, size) as session:
+        for key in ("1", "2"):
+            await session.press(key)
+            words = [key.words for key in session.screen.query_one(KeyFooter).entries]
+            assert words[:4] == ["why", "world that passes", "export", "play"] and words[-2:] == ["quit", "help"]
+        await session.press("i")
+        assert [options for *_, options in started] == [{"accept_mode": "automatic", "isolate": 0}]
 
 
 async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, monkeypatch):

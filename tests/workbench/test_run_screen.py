@@ -234,7 +234,7 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypa
     async with Attached(run) as session:
         assert "engine is gone" in session.text("#status")
         assert "r resumes" in session.text("#happening")
-        assert session.screen.query_one(KeyFooter).entries[0].words == "start"
+        assert session.screen.query_one(KeyFooter).entries[0].words == "resume"
         await session.press("s")
         assert "space starts one" in session.said()
         await session.press("space")

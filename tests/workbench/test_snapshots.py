@@ -134,7 +134,7 @@ OPENED = {
     "runs": ["R"],
     "past": ["less_than_sign"],
     "rounds": ["b"],
-    "facts": ["i"],
+    "facts": ["F"],
     "signs": ["k"],
     "why-empty": ["W"],
     "playback": ["P", "right", "right"],

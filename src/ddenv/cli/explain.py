@@ -94,7 +94,7 @@ def isolate_command(
         found = nearest(file, state)
     if found is None:
         # The engine was stopped from elsewhere.
-        raise UserError(f"{path}: {state.reason}")
+        raise UserError(f"{path}: the search for a world that passes was stopped; go on with: ddenv isolate {path}")
     if as_json:
         print(json.dumps({"nearest": asdict(found)}))
     else:

@@ -9,11 +9,24 @@ from typing import Any
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.took_part import simulated
-from ddenv.runfile.progress import Claim, Node
+from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
-from ddenv.words.claims import drift, meaning, missing, promise, rate, seen, short, smaller_known, verdict_on, what_ran
+from ddenv.words.claims import (
+    drift,
+    instead,
+    meaning,
+    means,
+    missing,
+    promise,
+    rate,
+    seen,
+    short,
+    smaller_known,
+    verdict_on,
+    what_ran,
+)
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12
@@ -65,7 +78,7 @@ def certificate(state: RunState) -> dict[str, Any] | None:
         {
             "without": claim.without,
             "verdict": claim.verdict,
-            "means": meaning(claim, found),
+            "means": means(state, found, claim),
             "shown": claim.shown,
             "runs": claim.runs,
             "rate": claim.shown / claim.runs if claim.runs else None,
@@ -112,7 +125,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
-    more += f"; {state.ahead} made ahead of time for nothing" if state.ahead and state.status == "finished" else ""
+    more += f"; {state.ahead} run ahead, not needed" if state.ahead and state.status == "finished" else ""
     names = first_of(state.environment, MOST_NAMES)
     said = [
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
@@ -147,7 +160,7 @@ def _certificate_lines(state: RunState) -> list[str]:
         return [f"{rates[0]}; {missing(state)}", *_shown_so_far(state)]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
-    lines += [_removal(claim) for claim in removals[:MOST_NAMES]]
+    lines += [_removal(state, found, claim) for claim in removals[:MOST_NAMES]]
     if (more := len(removals) - MOST_NAMES) > 0:
         lines.append(f"  and {count(more, 'more model')}")
     if (whole := _whole_world(state)) is not None:
@@ -161,9 +174,10 @@ def _shown_so_far(state: RunState) -> list[str]:
     return [f"  {what_ran(one)}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}" for one in rows]
 
 
-def _removal(claim: Claim) -> str:
+def _removal(state: RunState, found: Certificate, claim: Claim) -> str:
+    other = instead(state, found, claim)
     often = f", at most {percent(claim.bound)} as often" if claim.bound is not None and claim.bound < 1.0 else ""
-    return f"  without {claim.without}: {rate(claim)}{often}: {short(claim)}"
+    return f"  without {claim.without}: {rate(claim)}{often}: {short(claim)}{f'; {other}' if other else ''}"
 
 
 def broken(state: RunState) -> list[str]:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, replace
+from statistics import median
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
 from ddenv.evidence.certificate import Terms, falls, keeps, often, settle
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
-from ddenv.runfile.fold_decisions import origin
+from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
 from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import BROKEN, OUTCOMES, RunState, Test
+from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
 from ddenv.text import percent
 
@@ -88,6 +90,49 @@ def current(state: RunState) -> Certificate | None:
     """The last finished certificate of the current environment, if there is one; a later one may not be finished."""
     here = (one for one in reversed(state.certificates) if one.node == state.node and not one.past)
     return next((one for one in here if one.claims), None)
+
+
+def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tuple[Test, ...]:
+    """The runs of a claim's environment that the certificate rests on (the chosen ones, if seeds were), but for those that broke.
+
+    Runs that were only made ahead of time are not among them.
+    """
+    if certificate.seeds:
+        chosen = exact_runs(state)
+        own = [test for test in rested_on(state) if test.run in chosen and test.phase != CERTIFY]
+    else:
+        fresh = (test for test in state.confirm_tests if state.rests_on >> test.id & 1)
+        own = [test for test in fresh if test.node == certificate.node and test.run >= certificate.first_run]
+    finished = (test for test in own if test.environment == claim.environment and test.is_finished)
+    return tuple({test.run: test for test in finished if test.outcome not in BROKEN}.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Instead:
+    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m (median)."""
+
+    failure: str
+    runs: int
+    away: float
+
+
+def failing_instead(state: RunState, certificate: Certificate, claim: Claim) -> Instead | None:
+    """What the robot does without a model that is needed, where it mostly fails otherwise and does not reach its goal."""
+    if claim.verdict != "needed" or claim.without is None:
+        return None
+    ends = Counter(
+        test.failure if test.outcome == "other" else test.outcome for test in runs_behind(state, certificate, claim)
+    )
+    del ends["similar"]
+    failure = max(ends, key=lambda end: ends[end], default="pass")
+    if failure == "pass":
+        return None
+    tests = (
+        test for test in runs_behind(state, certificate, claim) if test.outcome == "other" and test.failure == failure
+    )
+    return Instead(
+        failure, ends[failure], median([test.distance for test in tests if test.distance is not None] or [math.nan])
+    )
 
 
 def in_the_making(state: RunState) -> Certificate | None:

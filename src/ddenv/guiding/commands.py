@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
 from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
-from ddenv.guiding.situation import Situation
+from ddenv.guiding.situation import Situation, waiting
 from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
@@ -23,7 +23,7 @@ Command = CourseCommand | SelectionCommand
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, LeaveOut, AcceptOther, Undo, GoBack, Change)
-# After these a new search begins, and a certificate that is being made is broken off.
+# After these a new search begins: a certificate that is being made is broken off, a reduction that waits is dropped.
 ANEW = (Pin, Unpin, Adopt, AcceptOther, Undo, GoBack)
 
 
@@ -37,17 +37,30 @@ def starts_engine(command: Command, state: RunState) -> bool:
     return isinstance(command, GOES_ON) or (isinstance(command, Pin | Unpin) and state.status == "finished")
 
 
+def drops(command: Command, state: RunState) -> str:
+    """That the new search which a command begins would drop the reduction that waits, or ""."""
+    waits = waiting(state) if _begins_anew(command, state) else None
+    if waits is None:
+        return ""
+    sizes = f"{len(state.environment)} → {count(waits.size, 'model')}"
+    return f"The reduction to {waits.label} ({sizes}) waits for you; a new search would drop it."
+
+
+def _begins_anew(command: Command, state: RunState) -> bool:
+    return command.begins_anew(state) if isinstance(command, Change) else isinstance(command, ANEW)
+
+
 def question(command: Command, state: RunState) -> str:
-    """What is asked before a command is sent, or "": also where it breaks off a certificate."""
-    own, now = command.words(state).question, in_the_making(state)
-    begins_anew = command.begins_anew(state) if isinstance(command, Change) else isinstance(command, ANEW)
-    if now is None or not begins_anew:
+    """What is asked before a command is sent, or "": also where it breaks off a certificate, or drops a reduction that waits."""
+    own, now, lost = command.words(state).question, in_the_making(state), drops(command, state)
+    if now is not None and _begins_anew(command, state):
+        made = count(fresh_runs_made(state, now), "run")
+        lost = (
+            f"This breaks off certificate {now.number} after {made}, which then count for nothing. "
+            "A new search begins, and another certificate ends it."
+        )
+    if not lost:
         return own
-    made = count(fresh_runs_made(state, now), "run")
-    lost = (
-        f"This breaks off certificate {now.number} after {made}, which then count for nothing. "
-        "A new search begins, and another certificate ends it."
-    )
     return f"{own}\n\n{lost}" if own else f"{lost}\n\n{command.words(state).brief.capitalize()} all the same?"
 
 

@@ -111,7 +111,11 @@ class Isolate:
         if now.engine != "absent":
             return "an engine is at work on the run; let it end first"
         known = state.isolated is not None and state.isolating is None and not self.again
-        return "the nearest world that passes is known; 'ddenv isolate RUN --again' searches again" if known else ""
+        return (
+            "a nearest world that passes is known: W shows it; 'ddenv isolate RUN --again' searches again"
+            if known
+            else ""
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, helping
 from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import AcceptMode, Pause, Resume, StartEngine, Step, Undo
+from ddenv.guiding.course import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop, Undo
 from ddenv.guiding.selections import (
     NONE_HELPS,
     Accept,
@@ -23,8 +23,9 @@ from ddenv.guiding.selections import (
     Veto,
     round_over,
 )
-from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
+from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of, waiting
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
+from ddenv.runfile.tested import adoptable
 from ddenv.text import shortened
 
 
@@ -44,12 +45,12 @@ class Offer:
     `words` are for the footer, "" if the action's usual ones fit. `why_not` is why it is not possible now, or "".
     """
 
-    command: Command | StartEngine | None = None
+    command: Command | StartEngine | Isolate | None = None
     words: str = ""
     why_not: str = ""
 
 
-Meaning = Callable[[Situation, Pointed], Command | StartEngine | None]
+Meaning = Callable[[Situation, Pointed], Command | StartEngine | Isolate | None]
 
 
 def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
@@ -63,7 +64,8 @@ def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
     if command is None:
         return Offer()
     why_not = refusal(command, now)
-    return Offer(why_not=why_not) if why_not else Offer(command, _FOOTER.get(type(command), ""))
+    again = isinstance(command, StartEngine) and now.state.engines
+    return Offer(why_not=why_not) if why_not else Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
 
 
 def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
@@ -73,22 +75,26 @@ def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
 
 
 def _accept(now: Situation, pointed: Pointed) -> Command:
-    """Accept what waits, or else what is under the cursor."""
+    """Accept what waits, or else what is under the cursor, or else the last try that shows f."""
     state, row = now.state, pointed.row
-    if state.round is not None and state.waiting_candidate is not None:
-        return Accept(state.round.number, state.waiting_candidate)
+    if state.round is not None and (waits := waiting(state)):
+        return Accept(state.round.number, waits.index)
     # While the cursor follows the run, its row may change before the key is pressed.
-    if row is None or (pointed.follows and not isinstance(row, Trial) and not state.paused):
+    if row is not None and pointed.follows and not isinstance(row, Trial) and not state.paused:
+        row = None
+    if isinstance(row, Trial) and row.verdict == "similar":
+        return Adopt(row.number)
+    other = None if row is None or row.verdict == "similar" else nearest_other(state, row)
+    if other is not None:
+        return AcceptOther(other.id)
+    if last := adoptable(state):
+        return Adopt(last.number)
+    if row is None:
         raise UserError("there is nothing to accept")
     if row.verdict == "similar":
-        if isinstance(row, Trial):
-            return Adopt(row.number)
         raise UserError(f"{row.label} is accepted already")
-    test = nearest_other(state, row)
-    if test is None:
-        why = f"is {row.verdict}" if row.verdict else "is not judged yet"
-        raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
-    return AcceptOther(test.id)
+    why = f"is {row.verdict}" if row.verdict else "is not judged yet"
+    raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
 
 
 def nearest_other(state: RunState, row: Row) -> Test | None:
@@ -99,10 +105,10 @@ def nearest_other(state: RunState, row: Row) -> Test | None:
 
 
 def _reject(now: Situation, _: Pointed) -> Command:
-    state = now.state
-    if state.round is None or state.waiting_candidate is None:
+    waits = waiting(now.state)
+    if now.state.round is None or waits is None:
         raise UserError("there is nothing to reject")
-    return Reject(state.round.number, state.waiting_candidate)
+    return Reject(now.state.round.number, waits.index)
 
 
 def _veto(now: Situation, pointed: Pointed) -> Command:
@@ -142,6 +148,10 @@ def _leave_out(now: Situation, _: Pointed) -> Command:
     return LeaveOut(numbers_of(now.state, helps[:1])[0])
 
 
+def _isolate(now: Situation, _: Pointed) -> Command | Isolate:
+    return Stop() if now.engine != "absent" and now.state.isolating is not None else Isolate()
+
+
 def _any(state: RunState, models: Collection[str]) -> bool:
     """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that cannot be selected."""
     elements = frozenset(state.elements)
@@ -165,6 +175,7 @@ _FOOTER: dict[type, str] = {
     Veto: "veto",
     Unveto: "take back",
     Undo: "undo",
+    Stop: "stop",
 }
 
 # By the names of the run screen's actions. Its other actions change nothing in the run.
@@ -182,6 +193,7 @@ ACTIONS: dict[str, Meaning] = {
     "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
     "leave_out": _leave_out,
     "undo": lambda now, pointed: Undo(),
+    "isolate": _isolate,
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,
 }

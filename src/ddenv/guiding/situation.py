@@ -75,6 +75,15 @@ def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
     return tuple(sorted(number[name] for name in names))
 
 
+def waiting(state: RunState) -> Candidate | None:
+    """The candidate whose reduction waits for accept or reject."""
+    return (
+        None
+        if state.round is None or state.waiting_candidate is None
+        else state.round.candidates[state.waiting_candidate]
+    )
+
+
 def new_search(state: RunState, size: int | None = None) -> str:
     """What follows a decision that ends the search, as a sentence without a full stop.
 

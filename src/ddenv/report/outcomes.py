@@ -29,7 +29,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.baseline import failed_in, missed
-from ddenv.words.claims import drift, meaning, missing, promise, verdict_on
+from ddenv.words.claims import drift, means, missing, promise, verdict_on
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # The maximum number of models with a row each.
@@ -216,7 +216,7 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
     rows = fresh_runs(state)
     head = ("environment", "runs", "ended", "f shown", "95 % interval", "which means")
     table = Table(
-        head, tuple(_fresh_row(each, found) for each in rows[:MOST_ROWS]), frozenset({1, 3, 4}), frozenset({0})
+        head, tuple(_fresh_row(state, each, found) for each in rows[:MOST_ROWS]), frozenset({1, 3, 4}), frozenset({0})
     )
     words = (
         "These runs have seeds that the search did not use, and none of them ended early. Rates leave broken runs out."
@@ -226,8 +226,8 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
             "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
         )
     if state.certified:
-        means = promise(state, found)
-        words += f" {as_sentence(means)}"
+        promised = promise(state, found)
+        words += f" {as_sentence(promised)}"
     # Other certificates of the same environment: each stands for itself.
     others = [
         one for one in state.certificates if one.node == found.node and one.claims and one is not state.certificate
@@ -239,14 +239,14 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
     return [table, say(words), *earlier]
 
 
-def _fresh_row(each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
+def _fresh_row(state: RunState, each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
     ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
     has_rate = each.runs and not each.is_chosen
     shown = percent(each.shown / each.runs) if has_rate else "–"
     is_exact = each.claim is not None and each.claim.is_exact
     interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
-    means = each.shows if each.claim is None else meaning(each.claim, found)
-    return _name(each), thousands(each.runs), ended, shown, interval, means
+    words = each.shows if each.claim is None else means(state, found, each.claim)
+    return _name(each), thousands(each.runs), ended, shown, interval, words
 
 
 def _name(each: FreshRuns) -> Cell:

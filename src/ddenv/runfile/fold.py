@@ -131,6 +131,13 @@ def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
     }
 
 
+def _engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
+    """An isolation that is stopped leaves the reduction before it as it was."""
+    if state.isolating is not None:
+        return _ended(state, "finished", state.isolating.before, at)
+    return _ended(state, "stopped", event.reason, at)
+
+
 def _finished(state: RunState, event: e.Finished, at: float) -> Changes:
     size, here = len(state.environment), state.nodes[state.node]
     return {
@@ -370,7 +377,7 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     e.DiskSpace: lambda _, event, __: {"needs_room": 0 if event.enough else event.needed},
     e.ClockJumped: _clock_jumped,
     e.Finished: _finished,
-    e.EngineStopped: lambda state, event, at: _ended(state, "stopped", event.reason, at),
+    e.EngineStopped: _engine_stopped,
     e.EngineFailed: lambda state, event, at: _ended(state, "failed", event.reason, at),
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Supports: _supports,

@@ -34,12 +34,16 @@ def _named(state: RunState, models: Iterable[int]) -> tuple[str, ...]:
 
 
 def _cut_short(state: RunState) -> str:
-    """That the round ends with candidates that were not tried, or that the certificate is not finished."""
-    now = state.certificate
+    """What a new search ends: a certificate that is not finished, a reduction that waits, a round with untried candidates."""
+    now, current = state.certificate, state.round
     if now is not None and state.confirming and not now.claims:
         return f"; certificate {now.number} broken off"
-    untried = 0 if state.round is None else len(state.round.untried)
-    return f"; round {state.round.number} ended with {untried} untried" if state.round and untried else ""
+    if current is None:
+        return ""
+    waits = state.waiting_candidate
+    dropped = "" if waits is None else f"; the reduction to {current.candidates[waits].label} dropped"
+    untried = len(current.untried)
+    return dropped + (f"; round {current.number} ended with {untried} untried" if untried else "")
 
 
 def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:

@@ -41,6 +41,12 @@ def made_for(state: RunState, test: Test) -> Candidate | Trial | None:
     return current.candidates[test.candidate] if 0 <= test.candidate < len(current.candidates) else None
 
 
+def adoptable(state: RunState) -> Trial | None:
+    """The last try here that showed f and could become the environment."""
+    tries = (one for one in reversed(state.trials) if one.node == state.node)
+    return next((one for one in tries if one.verdict == "similar" and not one.adopted), None)
+
+
 def told(moment: Moment) -> Test | None:
     """The test whose end a moment tells: the one that ended in it, or the last one of a candidate that was judged."""
     state, event = moment.after, moment.recorded.event

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current
+from ddenv.evidence.claims import current, runs_behind
 from ddenv.evidence.rates import anytime_interval
-from ddenv.runfile.fold_decisions import exact_runs, rested_on
 from ddenv.runfile.progress import Certificate
-from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.text import count, percent
@@ -23,11 +22,11 @@ from ddenv.words.claims import uncertified, verdict_on
 F, GOAL = "similar", "pass"
 # What the robot does, by the `failure` of a run.
 DOES = {
-    "stuck": "gets stuck elsewhere",
-    "tipped over": "tips over elsewhere",
-    "fell": "falls elsewhere",
-    "lost": "takes another place for its goal",
-    "out of time": "runs out of time elsewhere",
+    "stuck": "gets stuck",
+    "tipped over": "tips over",
+    "fell": "falls",
+    "lost": "is lost",
+    "out of time": "runs out of time",
 }
 # Runs that end within this distance of one place end near it, m.
 NEAR = 0.5
@@ -41,7 +40,8 @@ APART = 0.1
 class End:
     """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
 
-    None of them ended farther than `reach`, m, from there, and they ended so far `above` f's end, m (median; negative: below it).
+    None of them ended farther than `reach`, m, from there. They ended so far `away` from f's end, and `above` it, m (medians;
+    negative: below it).
     `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
     """
 
@@ -51,6 +51,7 @@ class End:
     place: tuple[float, float]
     above: float = 0.0
     reach: float = 0.0
+    away: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,21 +94,10 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
     certificate = current(state)
     if certificate is None:
         raise UserError(uncertified(state, file.path))
-    # Those that only ran ahead of time are not among the runs of the claims.
-    if certificate.seeds:
-        exact = exact_runs(state)
-        own = [test for test in rested_on(state) if test.run in exact and test.phase != CERTIFY]
-    else:
-        fresh = (test for test in state.confirm_tests if state.rests_on >> test.id & 1)
-        own = [test for test in fresh if test.node == certificate.node and test.run >= certificate.first_run]
-    runs: dict[int, dict[int, Test]] = {}
-    for test in own:
-        if test.is_finished and test.outcome not in BROKEN:
-            runs.setdefault(test.environment, {})[test.run] = test
     end, *removals = certificate.claims
-    left = {run: test for run, test in runs.get(end.environment, {}).items() if test.outcome == F}
+    left = {test.run: test for test in runs_behind(state, certificate, end) if test.outcome == F}
     return tuple(
-        _reason(file, state, certificate, claim.without, list(runs.get(claim.environment, {}).values()), left)
+        _reason(file, state, certificate, claim.without, runs_behind(state, certificate, claim), left)
         for claim in removals
         if claim.without is not None
     )
@@ -149,7 +139,8 @@ def _end(kind: str, tests: Sequence[Test], height: float) -> End:
     x, y, z = (median(place[axis] for place in places) for axis in range(3))
     above = 0.0 if math.isnan(z - height) else z - height
     reach = max(math.dist((x, y), place[:2]) for place in places)
-    return End(kind, len(tests), median(test.simulated_seconds for test in tests), (x, y), above, reach)
+    away = median([test.distance for test in tests if test.distance is not None] or [math.nan])
+    return End(kind, len(tests), median(test.simulated_seconds for test in tests), (x, y), above, reach, away)
 
 
 def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]) -> tuple[Parting | None, str, str]:
@@ -207,7 +198,8 @@ def _does(end: End) -> str:
     level = "" if abs(end.above) < LEVEL else height
     # Rounded up: no run ends farther away than is said.
     near = "near" if end.reach <= NEAR else f"at most {math.ceil(10 * end.reach) / 10:.1f} m from"
-    return f"{DOES.get(end.kind, 'fails elsewhere')}, {near} {_point(end.place)}{level}"
+    away = "elsewhere" if math.isnan(end.away) else f"{end.away:.1f} m from f's end"
+    return f"{DOES.get(end.kind, 'fails')} {away}, {near} {_point(end.place)}{level}"
 
 
 def _point(place: tuple[float, float]) -> str:

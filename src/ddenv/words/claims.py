@@ -10,17 +10,20 @@ from ddenv.evidence.claims import (
     FreshRuns,
     current,
     expected_fresh_runs,
+    failing_instead,
     fresh_runs_made,
     helping,
     is_minimal,
     never_left_out,
     so_far,
 )
+from ddenv.runfile.events import deed
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState, Trial
 from ddenv.runfile.supports import stack_with
 from ddenv.text import between, count, first_of, percent
+from ddenv.words.signs import metres
 
 MOST_NAMES, MOST_SEEDS = 3, 4
 
@@ -62,8 +65,17 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
         _at_most(certificate),
     )
-    often = rate(most) if bound is None else f"f at most {percent(bound)} as often"
-    return f"no {one} can be removed: {kept(certificate)}; without {without} {often}{but}"
+    often = rate(most) if bound is None else f"{_seldom(removals)} (at most {percent(bound)} as often)"
+    return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
+
+
+def _seldom(removals: Sequence[Claim]) -> str:
+    """How often f showed at most without any one model: "f in none of 12 fresh runs each"."""
+    most = max(removals, key=lambda claim: (claim.shown / max(1, claim.runs), claim.high))
+    each = " each" if len(removals) > 1 else ""
+    if most.shown:
+        return f"f in {'at most ' if each else ''}{most.shown} of {count(most.runs, 'fresh run')}"
+    return f"f in none of {count(most.runs, 'fresh run')}{each if len({claim.runs for claim in removals}) == 1 else ''}"
 
 
 def _exactly(certificate: Certificate) -> str:
@@ -185,6 +197,12 @@ def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Clai
     return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
 
 
+def means(state: RunState, certificate: Certificate, claim: Claim) -> str:
+    """What the verdict of a claim means, and what happens without a needed model where the robot then fails otherwise."""
+    other = instead(state, certificate, claim)
+    return f"{meaning(claim, certificate)}; {other}" if other else meaning(claim, certificate)
+
+
 def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
     rate, bound = _whole_rate(certificate), claim.bound
@@ -277,6 +295,15 @@ def usual_runs(state: RunState, now: Certificate) -> str:
 def made_of_usual(state: RunState, now: Certificate) -> str:
     """How far a certificate is: "23 of about 30 to 150 runs"."""
     return f"{fresh_runs_made(state, now)} of about {usual_runs(state, now)}"
+
+
+def instead(state: RunState, certificate: Certificate, claim: Claim) -> str:
+    """What mostly happens without a needed model if it is another failure: "the robot got stuck 0.5 m from f's end in 7 of 10"."""
+    end = failing_instead(state, certificate, claim)
+    if end is None:
+        return ""
+    away = f" {metres(end.away)} from f's end" if metres(end.away) else ""
+    return f"the robot {deed(end.failure)}{away} in {end.runs} of {claim.runs}"
 
 
 def short(claim: Claim) -> str:

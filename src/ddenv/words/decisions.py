@@ -7,6 +7,7 @@ from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, Trial
+from ddenv.runfile.tested import adoptable
 from ddenv.text import as_sentence, count, first_of, plain, shortened
 from ddenv.words.claims import drift
 
@@ -33,9 +34,8 @@ _DECIDED = {
 
 def to_adopt(state: RunState) -> tuple[str, ...]:
     """The last try that showed f and could become the environment."""
-    adoptable = (one for one in reversed(state.trials) if one.verdict == "similar" and not one.adopted)
-    last = next((one for one in adoptable if one.node == state.node), None)
-    return () if last is None else (f"{shows_f(last)}: a on its row adopts it.",)
+    last = adoptable(state)
+    return () if last is None else (f"{shows_f(last)}: a adopts it.",)
 
 
 def shows_f(trial: Trial) -> str:
@@ -85,7 +85,7 @@ def arrival(state: RunState) -> str:
     last = state.decisions[-1] if state.decisions else None
     if here is None or last is None or last.tests != state.tests_done:
         return ""
-    if last.kind in ("go_back", "undo"):
+    if last.kind in ("go_back", "undo", "pin", "unpin"):
         return as_sentence(plain(last.words))
     if last.kind == "change":
         return as_sentence(f"{plain(last.words)}, from this round on")

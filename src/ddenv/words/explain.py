@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import current, helping
+from ddenv.evidence.claims import current, failing_instead, helping
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.run_settings import Settings, settings
@@ -13,7 +14,7 @@ from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.text import as_sentence, count, first_of, plain
 from ddenv.words.baseline import baseline_sentence
 from ddenv.words.certifying import certifying
-from ddenv.words.claims import ended, of_runs, promise
+from ddenv.words.claims import ended, instead, of_runs, promise
 from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
 from ddenv.words.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
 from ddenv.words.signs import metres
@@ -21,6 +22,10 @@ from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8
+# Maximum number of models whose runs without them a sentence each describes.
+NAMED_ENDS = 2
+# An end within so many epsilon of f's end may be the same failure to the user.
+NEAR = 3
 _SETTLING = (
     "Finding which models rest on which: the piles fall and settle once, without the robot. "
     "Then it is known what a removal would drop.",
@@ -125,7 +130,8 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     reached = sum(test.outcome == "pass" for test in tests)
     failed = sum(test.outcome == "failed" for test in tests)
     first = (
-        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
+        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. The failure that "
+        "most of them end in is f: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."
@@ -305,10 +311,30 @@ def _finished(state: RunState) -> Happening:
     return "returned", (
         f"Minimal: {kept} left. {_reason(state, '')}",
         f"Kept: {first_of([plain(name) for name in state.environment], NAMED)}.",
+        *_instead_of_f(state),
         *means,
         *stays,
         base,
     )
+
+
+def _instead_of_f(state: RunState) -> tuple[str, ...]:
+    """What the robot does without models that f needs, where it mostly fails in another way; and what counts that as f."""
+    if (certificate := current(state)) is None:
+        return ()
+    said = [
+        f"Without {plain(str(claim.without))} {words}."
+        for claim in certificate.claims
+        if (words := instead(state, certificate, claim))
+    ]
+    ends = (failing_instead(state, certificate, claim) for claim in certificate.claims)
+    nearest = min((end.away for end in ends if end is not None and math.isfinite(end.away)), default=math.inf)
+    epsilon = settings(state).epsilon
+    if nearest > NEAR * epsilon:
+        return tuple(said[:NAMED_ENDS])
+    wider = math.ceil(nearest * 10 + 1) / 10
+    same = f"If that is the same failure to you, a new run with epsilon {wider:g} m (now {epsilon:g} m) counts it as f."
+    return (*said[:NAMED_ENDS], same)
 
 
 def _reason(state: RunState, otherwise: str) -> str:

@@ -177,8 +177,8 @@ def beginning(options: Settings, models: int) -> str:
 def follows(options: Settings, last: Round) -> str:
     """What the last round means for the next one, or ""."""
     if last.winner is None:
-        # The user changed something in the middle of the round.
-        if not all(one.verdict for one in last.candidates):
+        # The user changed something in the middle of the round, perhaps while a reduction waited.
+        if any(one.verdict in ("", "similar") for one in last.candidates):
             return ""
         reason = "Nothing showed f in the last round"
         if options.algorithm not in SMALLER:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,8 +32,6 @@ BELL = "\x07"
 THRESHOLDS = (20_000, 20, 20)
 # The keys that move the focus, with Textual's actions for them.
 TABS = {"tab": "app.focus_next", "shift+tab": "app.focus_previous"}
-# So many notices wait for a dialog to close, the latest ones.
-HELD = 3
 
 
 def classes_at(screen: type[Screen[Any]], size: Size) -> str:
@@ -105,6 +102,7 @@ class Workbench(App[int]):
         *keys(
             "app",
             ("theme", "ctrl+t", "change_theme", "theme", "choose the colours for this session"),
+            ("names", "n", "names", "names", "show or hide the models' names on the map"),
             ("screenshot", "f12", "screenshot", "screenshot", "save a picture of the screen (SVG)"),
         ),
     ]
@@ -127,7 +125,7 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
-        self._held: deque[tuple[str, dict[str, Any]]] = deque(maxlen=HELD)
+        self._held: tuple[str, dict[str, Any]] | None = None
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
@@ -147,7 +145,11 @@ class Workbench(App[int]):
         return variables
 
     async def on_event(self, event: events.Event) -> None:
-        """As every app, but tab moves the focus before the next key is looked at: that would still go to the field before."""
+        """As every app, but a key ends the notice that is shown, and tab moves the focus before the next key is looked at: that
+        would still go to the field before.
+        """
+        if isinstance(event, events.Key) and not event.is_forwarded:
+            self.clear_notifications()
         if isinstance(event, events.Key) and event.key in TABS and self.app_focus and not self._is_bound(event.key):
             (self.screen.focus_next if event.key == "tab" else self.screen.focus_previous)()
         else:
@@ -179,7 +181,7 @@ class Workbench(App[int]):
         if not self.is_headless:
             self.call_after_refresh(_collect_from_now)
 
-    # Notices: they would hide the words and the buttons of a dialog, so they wait until it is closed.
+    # Notices: at most one is shown. It would hide the words and the buttons of a dialog, so it waits until that is closed.
 
     def notify(
         self,
@@ -193,8 +195,9 @@ class Workbench(App[int]):
         """As every app, but while a dialog is open a notice waits; its time begins when it is shown."""
         options: dict[str, Any] = {"title": title, "severity": severity, "timeout": timeout, "markup": markup}
         if self._asks:
-            self._held.append((message, options))
+            self._held = message, options
         else:
+            self.clear_notifications()
             super().notify(message, **options)
 
     @property
@@ -203,8 +206,8 @@ class Workbench(App[int]):
         return any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:])
 
     def _say_held(self) -> None:
-        while self._held and not self._asks:
-            message, options = self._held.popleft()
+        if self._held is not None and not self._asks:
+            (message, options), self._held = self._held, None
             super().notify(message, **options)
 
     def action_help_quit(self) -> None:
@@ -260,6 +263,13 @@ class Workbench(App[int]):
         from ddenv.workbench.help.shortcuts import Help, groups
 
         self.push_screen(Help(groups(self.screen)))
+
+    def action_names(self) -> None:
+        """Shows or hides the names on all maps of the screen."""
+        from ddenv.workbench.map.world_map import WorldMap
+
+        for world in self.screen.query(WorldMap):
+            world.toggle_layer("names")
 
     def action_runs(self) -> None:
         """The list of all runs, above the screen that asks for it."""

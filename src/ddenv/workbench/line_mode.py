@@ -14,7 +14,7 @@ from typing import TextIO
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs
 from ddenv.guiding.commands import Command, question, said, send, starts_engine
-from ddenv.guiding.course import StartEngine
+from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.snapshot import Snapshot
@@ -47,6 +47,7 @@ GUIDES = {
     "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
     "drop": ("leave_out", "H", "leave out the model that only helps, by the certificate"),
     "undo": ("undo", "u", "take back the last reduction"),
+    "isolate": ("isolate", "i", "find a nearest world that passes; again stops that"),
     "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),
     "resume": ("resume", "r", "start the engine again"),
 }
@@ -242,6 +243,8 @@ class LineMode:
             self._say(f"not possible: {offered.why_not}")
         elif isinstance(offered.command, StartEngine):
             self._start()
+        elif isinstance(offered.command, Isolate):
+            self._start(isolate=0)
         elif words := question(offered.command, self._poll.snapshot.state):
             self._asked = offered.command
             self._say(f"{words} Type yes to do it.")
@@ -259,10 +262,10 @@ class LineMode:
         if starts_engine(command, now.state) and now.engine == "absent":
             self._start()
 
-    def _start(self) -> None:
+    def _start(self, **options: int) -> None:
         state = self._poll.snapshot.state
         try:
-            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode)
+            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, **options)
         except UserError as error:
             self._say(str(error))
         else:

@@ -225,6 +225,18 @@ async def test_layers_are_shown_or_not(run, layer):
         assert layer in LAYERS
 
 
+async def test_names_stand_beside_their_models_and_do_not_overlap(run):
+    fake_moments.mid_round(run)
+    async with Shown(run, (120, 36)) as (_, world):
+        assert "crate" not in text_of(world)
+        world.toggle_layer("names")
+        left = world.snapshot.state.environment
+        named = [name for name in left if name in text_of(world)]
+        # The first ones are those near f; a name that is there is whole.
+        assert len(named) >= len(left) // 2
+        assert text_of(world).count("crate_") == len(named)
+
+
 def fake_sensed(state, test, sensed):
     met = Environment.of(state.elements.index(name) for name, _ in sensed)
     return replace(test, first_sensed=sensed, took_part=met)

@@ -137,7 +137,7 @@ async def test_o_offers_tests_with_the_same_seed_first(two_ways):
 
 async def test_arrows_go_to_other_tests_and_facts_play_theirs(two_ways):
     async with Attached(two_ways, size=(80, 24)) as session:
-        await session.press("2", "home", "i", "left", "p")
+        await session.press("2", "home", "F", "left", "p")
         screen = await settled(session)
         assert isinstance(screen, Playback)
         number = screen._tests[0].test.id

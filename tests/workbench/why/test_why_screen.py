@@ -207,7 +207,7 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, mon
     ("moment", "why"),
     [
         (fake_moments.mid_round, "its search is not over"),
-        (fake_moments.isolated, "the nearest world that passes is known"),
+        (fake_moments.isolated, "a nearest world that passes is known"),
     ],
 )
 async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, monkeypatch, moment, why):

@@ -95,7 +95,9 @@ class KeyFooter(Keys):
             if words and entry.width <= room:
                 found[id] = entry
                 room -= entry.width
-        return tuple(found[id] for id in instead or self._order if id in found)
+        # Help and the way out stand last.
+        order = sorted(instead, key=lambda id: id.endswith((".help", ".quit"))) or self._order
+        return tuple(found[id] for id in order if id in found)
 
     def render(self) -> Content:
         return Content.assemble(*(part for entry in self.entries for part in (self._drawn(entry), " ")))

@@ -20,9 +20,10 @@ from ddenv.map.paint import Canvas
 from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, fit, owners, pack, spans
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import COLUMNS, Live
+from ddenv.text import plain, shortened
 from ddenv.workbench.map.map_colors import REMOVED, Palette
 from ddenv.workbench.map.map_words import PARTING
-from ddenv.workbench.map.model_looks import fill, ghosts, kept, looks
+from ddenv.workbench.map.model_looks import Looks, fill, ghosts, kept, looks
 from ddenv.workbench.map.place import MovedPrints, Point, Shown
 from ddenv.world.pose import heading, pose_of
 
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
+# Maximum width of a model's name, in cells.
+NAME = 20
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 # A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
 _Line = tuple[np.ndarray, int, int]
@@ -55,13 +58,14 @@ def _lying(prints: tuple[Footprint, ...], view: View) -> tuple[Spans, np.ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A canvas for `view`, with the owner of each pixel: kept models in `grid`, removed ones in `gone`.
+    """A canvas for `view`, with the looks of the models and the owner of each pixel: kept models in `grid`, removed ones in `gone`.
 
     `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where each model's sign begins, if it
     has one.
     """
 
     view: View
+    how: Looks
     canvas: Canvas
     grid: np.ndarray
     gone: np.ndarray
@@ -190,7 +194,33 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     for cell, (sign, ground) in marks.items():
         canvas.put(cell, sign, readable(ground), ground)
         written[cell] = True
-    return Picture(view, canvas, grid, gone, dotted, written, cells)
+    still = Picture(view, how, canvas, grid, gone, dotted, written, cells)
+    if "names" in shown.layers:
+        _names(still, shown.place.prints, shown.failure or shown.start)
+    return still
+
+
+def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> None:
+    """Writes the names of kept models beside their signs: the nearest to the place `near` first, then the largest; none overlap."""
+    canvas, written, view = drawn.canvas, drawn.written, drawn.view
+    kept = np.flatnonzero(drawn.how.kinds != REMOVED).tolist()
+    away = {index: round(prints[index].distance(near), 1) if near else 0.0 for index in kept}
+    for index in sorted(kept, key=lambda index: (away[index], -prints[index].area)):
+        at = drawn.cells.get(index) or view.cell(*prints[index].center)
+        if at is None:
+            continue
+        text = shortened(plain(prints[index].name), NAME)
+        sign = len(drawn.how.signs.texts[index]) if index in drawn.cells else 0
+        begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
+        for down, right in begins:
+            row, column = at[0] + down, at[1] + right
+            if not (0 <= row < view.rows and 0 <= column <= view.columns - len(text)):
+                continue
+            # With a free cell on each side names stay apart.
+            if not written[row, max(0, column - (right != sign + 1)) : column + len(text) + 1].any():
+                canvas.put((row, column), text)
+                written[row, column : column + len(text)] = True
+                break
 
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:

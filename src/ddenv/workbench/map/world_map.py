@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
@@ -88,6 +89,8 @@ class WorldMap(Widget, can_focus=True):
         self._canvas: Canvas | None = None
         self._strips: dict[int, Strip] = {}
         self._due = False
+        # What the map showed before it marked a model.
+        self._unmarked: Viewport | None = None
         # Where the mouse button went down on the map, and whether the mouse has moved since.
         self._grabbed: tuple[int, int] | None = None
         self._dragged = False
@@ -133,7 +136,7 @@ class WorldMap(Widget, can_focus=True):
     @property
     def aims(self) -> bool:
         """Whether the crosshair is shown."""
-        return self.has_focus or self.picking
+        return self.has_focus or self.picking or self._unmarked is not None
 
     def set_place(self, place: Place, notice: str = "") -> None:
         """Shows another world, or `notice` if there is none."""
@@ -215,6 +218,15 @@ class WorldMap(Widget, can_focus=True):
         self._aim = (name, port.cursor, port.view)
         self.draw()
         return True
+
+    def mark(self, name: str | None) -> None:
+        """Shows the crosshair on a model also without the focus; with None the map is again as it was."""
+        if name is not None:
+            self._unmarked = self._unmarked or copy(self.viewport)
+            self.go_to(name)
+        elif self._unmarked is not None:
+            self.viewport, self._unmarked, self._aim = self._unmarked, None, None
+            self.draw()
 
     def select(self, names: Iterable[str]) -> None:
         """Selects these models instead."""

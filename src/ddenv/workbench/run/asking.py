@@ -14,8 +14,9 @@ from typing import Any
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.guiding.commands import Command, question, refusal, said, send, starts_engine
+from ddenv.guiding.commands import Command, drops, question, refusal, said, send, starts_engine
 from ddenv.guiding.course import Isolate, StartEngine
+from ddenv.guiding.selections import Accept, Reject
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Trial
@@ -123,18 +124,38 @@ class Asking:
     def ask(self, command: Command | StartEngine | Isolate, *, sure: bool = False) -> None:
         """Sends a command, after its question unless the user is `sure`, or shows why it is not possible."""
         now = self.situation
+        # What waited is decided on, although the engine has not obeyed yet.
+        sure = sure or now.pending in ("accept", "reject")
         if why := refusal(command, now):
             self.refuse(why)
         elif isinstance(command, StartEngine):
             self._once_trusted(self._start)
         elif isinstance(command, Isolate):
             self._once_trusted(lambda: self._start(isolate=0))
+        elif not sure and (dropped := drops(command, now.state)):
+            self._decide_first(command, dropped)
         elif sure or not (asked := question(command, now.state)):
             self.send(command)
         else:
             from ddenv.workbench.widgets.question import Question
 
             self._screen.app.push_screen(Question(asked), lambda yes: self.send(command) if yes else None)
+
+    def _decide_first(self, command: Command, dropped: str) -> None:
+        """Asks what becomes of the reduction that waits, before the new search that `command` begins."""
+        from ddenv.workbench.run.dialogs import ReductionWaits
+
+        state = self._poll.snapshot.state
+        assert state.round is not None and state.waiting_candidate is not None
+        reduction = state.round.number, state.waiting_candidate
+
+        def answered(answer: str | None) -> None:
+            if answer in ("accept", "reject"):
+                self.send(Accept(*reduction) if answer == "accept" else Reject(*reduction))
+            if answer in ("accept", "reject", "drop"):
+                self.send(command)
+
+        self._screen.app.push_screen(ReductionWaits(dropped), answered)
 
     def send(self, command: Command, then: Callable[[], None] | None = None) -> None:
         """Sends a command in the background; `then` is called once it is written.
@@ -220,6 +241,6 @@ class Asking:
 
 def _judged(trial: Trial, watch: bool) -> str:
     if trial.verdict == "similar":
-        return f"{shows_f(trial)}{'' if watch else ': a on its row adopts it'}"
+        return f"{shows_f(trial)}{'' if watch else ': a adopts it'}"
     known = ", known from before" if trial.known and trial.known == len(trial.tests) else ""
     return f"{trial.label} does not show f in {count(len(trial.tests), 'test')}{known}"

@@ -9,7 +9,7 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.evidence.claims import FreshRuns, fresh_runs, fresh_runs_made, in_the_making
+from ddenv.evidence.claims import FreshRuns, failing_instead, fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
@@ -281,11 +281,17 @@ def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
         "ended": signs(dict(one.outcomes)),
         "f": percent(one.shown / one.runs) if one.runs and not one.is_chosen else "",
         "shown": one.shows_at_least,
-        "verdict": _claim(snapshot, one),
+        **_claim(snapshot, one),
     }
 
 
-def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
+def _claim(snapshot: Snapshot, one: FreshRuns) -> Words:
+    """The verdict of a claim, and how the robot fails without a needed model."""
     if one.claim is None:
-        return _running(snapshot, one.running)
-    return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
+        return {"verdict": _running(snapshot, one.running)}
+    words, certificate = f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}", snapshot.state.certificate
+    end = None if certificate is None else failing_instead(snapshot.state, certificate, one.claim)
+    if end is None:
+        return {"verdict": words}
+    away = f" {metres(end.away)} away" if metres(end.away) else ""
+    return {"verdict": f"{words}; {end.failure}{away}", IN_SHORT: f"{words}; {end.failure}"}

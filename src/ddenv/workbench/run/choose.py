@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar
 
 from rich.text import Text
-from textual import on
+from textual import events, on
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.screen import ModalScreen
@@ -18,18 +18,20 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
 
 # Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
-LISTED, WIDTH = 100, 58
+LISTED, WIDTH = 100, 36
 
 
 class ChooseModels(ModalScreen[tuple[str, ...] | None]):
-    """Returns the chosen names, None if it was cancelled. Typing any part of a name filters the list."""
+    """Returns the chosen names, None if it was cancelled. Beside the list the map marks the model under the cursor."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
+        Binding("enter", "take", "take", False, priority=True, id="choose.take", tooltip="take the chosen ones"),
+        Binding("slash", "filter", "filter", id="choose.filter", tooltip="type any part of a name", key_display="/"),
         Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
         Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
-        Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
+        Binding("space,tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
     ]
 
     def __init__(
@@ -38,12 +40,16 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         names: Sequence[str],
         *,
         several: bool,
+        mark: Callable[[str | None], None],
         pinned: Iterable[str] = (),
         chosen: Iterable[str] = (),
     ) -> None:
-        """`title` says what they are for; `pinned` ones are marked with +; `chosen` ones come first."""
+        """`title` says what they are for; `pinned` ones are marked with +; `chosen` ones come first.
+
+        `mark` shows a model on the map, and none in the end.
+        """
         super().__init__()
-        self._title, self._several = title, several
+        self._title, self._several, self._mark = title, several, mark
         self._pinned = frozenset(pinned)
         self._chosen = set(chosen)
         self._names = tuple(sorted(names, key=lambda name: name not in self._chosen))
@@ -53,15 +59,27 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
-        keys = "tab or click chooses more   enter takes them" if self._several else "enter takes it"
-        with Framed(Text(self._title), f"{keys}   escape cancels"):
-            yield Input(placeholder="part of a name", id="filter", compact=True)
+        keys = "space tick   enter take   / filter   escape" if self._several else "enter take it   escape cancel"
+        with Framed("Models" if self._several else "Model", keys):
+            yield Static(self._title, id="purpose", markup=False)
+            yield Input(placeholder="/ and part of a name", id="filter", compact=True)
             yield OptionList(id="names", compact=True, markup=False)
             yield Static("", id="found", markup=False)
 
     def on_mount(self) -> None:
-        self.query_one(Input).focus()
+        self.query_one(OptionList if self._several else Input).focus()
         self._filter()
+
+    def action_filter(self) -> None:
+        self.query_one(Input).focus()
+
+    def on_key(self, event: events.Key) -> None:
+        """Any other character filters at once: enter would take a name that nobody meant."""
+        field = self.query_one(Input)
+        if event.is_printable and event.character not in (" ", "/") and not field.has_focus:
+            field.focus()
+            field.insert_text_at_cursor(event.character or "")
+            event.stop()
 
     @on(Input.Changed)
     def _filter(self) -> None:
@@ -113,26 +131,32 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
         self._show_found()
 
-    @on(Input.Submitted)
-    def _entered(self) -> None:
+    @on(OptionList.OptionHighlighted)
+    def _show_on_map(self, event: OptionList.OptionHighlighted) -> None:
+        self._mark(self._listed[event.option_index])
+
+    def action_take(self) -> None:
         """Takes the chosen names, or the one under the cursor."""
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._chosen:
-            self.dismiss(tuple(name for name in self._names if name in self._chosen))
+            self._close(tuple(name for name in self._names if name in self._chosen))
         elif place is not None:
-            self.dismiss((self._listed[place],))
+            self._close((self._listed[place],))
 
     @on(OptionList.OptionSelected)
     def _clicked(self, event: OptionList.OptionSelected) -> None:
         if self._several:
             self._toggle(event.option_index)
-            self.query_one(Input).focus()
         else:
-            self.dismiss((self._listed[event.option_index],))
+            self._close((self._listed[event.option_index],))
+
+    def _close(self, chosen: tuple[str, ...] | None) -> None:
+        self._mark(None)
+        self.dismiss(chosen)
 
     def action_cancel(self) -> None:
-        self.dismiss(None)
+        self._close(None)
 
 
 MEANINGS = {
@@ -144,6 +168,7 @@ MEANINGS = {
     "path": "the robot's path on the last similar run",
     "original": "the robot's path in f itself",
     "failure": "where the robot ended in f",
+    "names": "the models' names; n shows or hides them on every map",
 }
 
 

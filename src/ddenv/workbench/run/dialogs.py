@@ -53,31 +53,65 @@ class Method(ModalScreen[None]):
         return text.append(paragraph(kind, name))
 
 
-class Quit(ModalScreen[str]):
-    """Asks whether to stop the engine: returns "stop", "leave" or "cancel"."""
+class Choice(ModalScreen[str]):
+    """Returns the answer that was chosen, by its id."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
-        Binding("s", "answer('stop')", "stop the engine", id="quit.stop", tooltip="stop the engine and leave"),
-        Binding("l", "answer('leave')", "let it run on", id="quit.leave", tooltip="leave; the engine goes on"),
-        Binding("escape,c", "answer('cancel')", "cancel", id="quit.cancel", tooltip="stay here"),
-        Binding("left", "app.focus_previous", show=False, id="quit.previous", tooltip="previous button"),
-        Binding("right", "app.focus_next", show=False, id="quit.next", tooltip="next button"),
+        Binding("left", "app.focus_previous", show=False, id="choice.previous", tooltip="previous button"),
+        Binding("right", "app.focus_next", show=False, id="choice.next", tooltip="next button"),
     ]
 
+    def __init__(self, title: str, keys: str, text: str, buttons: Sequence[Button]) -> None:
+        """`text` may contain names from files, so it is never markup. The first button has the focus."""
+        super().__init__()
+        self._title, self._keys, self._text, self._buttons = title, keys, text, buttons
+
     def compose(self) -> ComposeResult:
-        with Framed("Quit", "l let it run on   s stop   c cancel"):
-            yield Static("The engine is a separate process; it can go on without this screen.", markup=False)
+        with Framed(self._title, self._keys):
+            yield Static(Text(self._text), markup=False)
             with Horizontal(classes="buttons"):
-                yield Button("Let it run on", id="leave", variant="primary")
-                yield Button("Stop the engine", id="stop", variant="warning")
-                yield Button("Cancel", id="cancel")
+                yield from self._buttons
 
     def on_button_pressed(self, event: Button.Pressed) -> None:
         self.dismiss(event.button.id or "cancel")
 
     def action_answer(self, answer: str) -> None:
         self.dismiss(answer)
+
+
+class Quit(Choice):
+    """Asks whether to stop the engine: returns "stop", "leave" or "cancel"."""
+
+    BINDINGS: ClassVar = [
+        Binding("s", "answer('stop')", "stop the engine", id="quit.stop", tooltip="stop the engine and leave"),
+        Binding("l", "answer('leave')", "let it run on", id="quit.leave", tooltip="leave; the engine goes on"),
+        Binding("escape,c", "answer('cancel')", "cancel", id="quit.cancel", tooltip="stay here"),
+    ]
+
+    def __init__(self) -> None:
+        leave = Button("Let it run on", id="leave", variant="primary")
+        buttons = (leave, Button("Stop the engine", id="stop", variant="warning"), Button("Cancel", id="cancel"))
+        words = "The engine is a separate process; it can go on without this screen."
+        super().__init__("Quit", "l let it run on   s stop   c cancel", words, buttons)
+
+
+class ReductionWaits(Choice):
+    """Asks what becomes of a reduction that waits: returns "accept", "reject", "drop" or "cancel"."""
+
+    BINDINGS: ClassVar = [
+        Binding("a", "answer('accept')", "accept", id="waits.accept", tooltip="make the reduction, then go on"),
+        Binding("x", "answer('reject')", "reject", id="waits.reject", tooltip="reject the reduction, then go on"),
+        Binding("d", "answer('drop')", "drop", id="waits.drop", tooltip="go on without deciding: it may come again"),
+        Binding("escape,c", "answer('cancel')", "cancel", id="waits.cancel", tooltip="change nothing"),
+    ]
+
+    def __init__(self, text: str) -> None:
+        accept = Button("Accept it", id="accept", variant="primary")
+        others = (
+            Button(words, id=id) for words, id in (("Reject it", "reject"), ("Drop it", "drop"), ("Cancel", "cancel"))
+        )
+        super().__init__("A reduction waits", "a accept   x reject   d drop   c cancel", text, (accept, *others))
 
 
 class SceneDialog(ModalScreen[None]):

@@ -105,7 +105,7 @@ class FactsDialog(ModalScreen[None]):
         Binding("right", "step(1)", "next test", id="facts.next", tooltip="the next test"),
         Binding("p,P", "play", "play", id="facts.play", tooltip="play this test back on the map"),
         Binding("c", "copy", "copy", id="facts.copy", tooltip="copy the command that makes it again (OSC 52)"),
-        Binding("escape,i,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
+        Binding("escape,F,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
     ]
 
     def __init__(self, position: Position, test: int, run: str, play: Callable[[int], str]) -> None:

@@ -51,7 +51,8 @@ class Opening:
         if not names:
             self._asking.refuse("there are no models to choose from")
             return
-        dialog = ChooseModels(title, names, several=several, pinned=self._poll.snapshot.state.pinned, chosen=chosen)
+        pinned = self._poll.snapshot.state.pinned
+        dialog = ChooseModels(title, names, several=several, mark=self._screen.world.mark, pinned=pinned, chosen=chosen)
         self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
 
     def find(self) -> None:

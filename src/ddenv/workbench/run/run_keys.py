@@ -26,7 +26,7 @@ def _ids(names: str) -> tuple[str, ...]:
 # The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
 MORE = _ids("signs facts play rounds find layers copy scene runs")
 SHOWN = (
-    *_ids("pause step accept reject veto pin without only leave_out undo history change export why"),
+    *_ids("pause step accept reject veto pin without only leave_out undo history change export why isolate"),
     *MORE,
     *_ids("help quit"),
 )
@@ -34,9 +34,13 @@ FIRST = (
     *_ids("help quit pause accept reject leave_out step veto pin without undo history export why change only"),
     *MORE,
 )
+# What comes next when the run has ended.
+ENDED = _ids("why isolate export play quit help leave_out history change pin without only undo find scene runs")
 # While an earlier moment is shown, while the map has the focus, and on a screen that only watches.
 BROWSING = _ids("back on round_before next_round rounds facts follow help quit play signs")
-ON_MAP = _ids("help map.pick map.next closer farther fit find layers pin without only signs pause quit")
+ON_MAP = _ids(
+    "help quit pause accept reject leave_out map.pick map.next step pin without only undo history export why find layers fit"
+)
 LOOKING = _ids("history rounds facts play why export find copy layers signs help quit")
 # What the pointer shows over the parts that take no keys, by their ids.
 TOOLTIPS = {
@@ -155,7 +159,13 @@ _KEYS = [
     _key("left_curly_bracket", "browse('reduction', -1)", "", "reduction_before", "to the reduction before", "{"),
     _key("right_curly_bracket", "browse('reduction', 1)", "", "next_reduction", "to the next reduction", "}"),
     _key("b", "open('rounds')", "rounds", "rounds", "the list of all rounds so far: go to the end of any"),
-    _key("i", "open('facts')", "facts", "facts", "the raw facts of a test, and the command that makes it again"),
+    _guide(
+        "i",
+        "isolate",
+        "world that passes",
+        "find a nearest world that passes, in which the robot reaches its goal; while that goes on: stop it",
+    ),
+    _key("F", "open('facts')", "facts", "facts", "the raw facts of a test, and the command that makes it again"),
     _key("P", "open('play')", "play", "play", "play a finished test of the row under the cursor back on the map"),
     _key("k", "open('signs')", "signs", "signs", "what the signs and letters on this screen mean"),
     _guide("r", "resume", "resume", "start the engine again"),

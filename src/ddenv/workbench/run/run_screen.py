@@ -33,7 +33,7 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
+from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.background import call_if_open
@@ -254,6 +254,8 @@ class RunScreen(Screen[None]):
         """The keys of what has the focus, if the footer shows them in place of the screen's."""
         if self.browsing.is_past:
             return BROWSING
+        if self.snapshot.state.status == "finished" and not self.poll.watch:
+            return ENDED
         return ON_MAP if self.world.has_focus else ()
 
     # Earlier moments of the run.
