@@ -26,20 +26,17 @@ SUFFIXES = (".yaml", ".yml")
 
 def scenario_path(text: str) -> Path:
     """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid name."""
-    from ddenv.world.access import without_tilde
+    from ddenv.world.access import is_folder, without_tilde
 
     text = text.strip()
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
     path = without_tilde(text)
     path = path if path.suffix.lower() in SUFFIXES else path.with_name(f"{path.name}.yaml")
-    try:
-        if path.is_dir():
-            raise UserError(f"{path}: is a folder; give the name of a file")
-        if not path.parent.is_dir():
-            raise UserError(f"{path}: there is no folder {path.parent}")
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
+    if is_folder(path):
+        raise UserError(f"{path}: is a folder; give the name of a file")
+    if not is_folder(path.parent):
+        raise UserError(f"{path}: there is no folder {path.parent}")
     return path
 
 
@@ -83,12 +80,14 @@ class SaveScenario(ModalScreen[Path | None]):
 
     @on(Input.Submitted)
     def _submitted(self, event: Input.Submitted) -> None:
+        from ddenv.world.access import is_file
+
         try:
             path = scenario_path(event.value)
         except UserError as error:
             self._show_error(str(error))
             return
-        if path.exists() and path != self._replace:
+        if is_file(path) and path != self._replace:
             self._replace = path
             self._show_error(f"{path} exists already: enter again replaces it, or type another name")
             return
