@@ -202,7 +202,6 @@ class Workbench(App[int]):
 
     @property
     def _asks(self) -> bool:
-        """Whether a dialog is open."""
         return any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:])
 
     def _say_held(self) -> None:

@@ -90,7 +90,6 @@ def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) 
 
 @cache
 def _owners() -> tuple[type[DOMNode], ...]:
-    """The app, and all screens and widgets with keys."""
     home = import_module("ddenv.workbench")
     names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.") if not module.ispkg]
     classes = (value for name in names for value in vars(import_module(name)).values())
@@ -158,7 +157,6 @@ def _load(path: Path) -> dict[Any, Any]:
 
 
 def _wanted(keys: Any, path: Path) -> dict[str, str]:
-    """The section `keys`, as text."""
     if keys is None:
         return {}
     if not isinstance(keys, dict):

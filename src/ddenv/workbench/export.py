@@ -178,7 +178,6 @@ class ExportScreen(ModalScreen[None]):
         self._report("\n".join(written), wrong)
 
     def _report(self, words: str, wrong: str = "") -> None:
-        """Shows what was done, and what went wrong."""
         self.query_one("#export-words", Static).update(words)
         self.query_one("#export-wrong", Static).update(wrong)
 

@@ -140,7 +140,6 @@ class History(Screen[int | None]):
         self.call_after_refresh(self._arrange)
 
     def _arrange(self) -> None:
-        """Fits the table to the size of the screen."""
         at = self.under_cursor
         if at is None:
             self._look()

@@ -73,7 +73,6 @@ def legend(shown: Shown, width: int) -> Text:
 
 
 def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
-    """The signs of a map of finished tests."""
     for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
         yield sign, way.name
     if shown.parting is not None:
@@ -119,7 +118,6 @@ def _size(each: Footprint) -> str:
 
 
 def _standing(state: RunState, name: str) -> str:
-    """Whether a model is kept, and in which part."""
     if not state.elements:
         return ""
     if name in state.pinned:

@@ -281,7 +281,6 @@ class WorldMap(Widget, can_focus=True):
 
     @property
     def _has_world(self) -> bool:
-        """Whether there is something to draw."""
         return not self.notice or bool(self.place.prints)
 
     def on_resize(self) -> None:

@@ -197,7 +197,6 @@ class Playback(Screen[None]):
         self._put()
 
     def _put(self) -> None:
-        """Shows the tests."""
         first, state = self._tests[0], self._position.end
         there = [one.models if one.models is not None else state.environment for one in self._tests]
         differ, either = frozenset(there[0]) ^ frozenset(there[-1]), frozenset(there[0]) | frozenset(there[-1])
@@ -243,7 +242,6 @@ class Playback(Screen[None]):
         self._show_legend()
 
     def _words(self) -> str:
-        """The instant in words."""
         playing = self.playing
         if not playing.length:
             return "no way is stored"

@@ -164,7 +164,6 @@ class RunsScreen(Screen[None]):
             self.set_timer(0.05, self._look)
 
     def _list(self) -> None:
-        """Shows the runs that pass the filter."""
         part = self.query_one("#filter", Input).value
         shown = sorted(named(self._runs, part), key=ORDERS[self._order])
         table = self.query_one(RunTable)

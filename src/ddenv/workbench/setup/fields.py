@@ -190,7 +190,6 @@ class OptionsForm(Vertical):
         return self._unopened | {id: str(field.value) for id, field in self._fields()}
 
     def _fields(self) -> Iterator[tuple[str, Input | Select[str]]]:
-        """The fields that are there, by id."""
         for field in self.query("Input, Select"):
             if isinstance(field, Input | Select) and field.id in FIELDS:
                 yield field.id, field
@@ -375,7 +374,6 @@ class OptionsForm(Vertical):
 
 
 def _widgets(fields: tuple[Field, ...], texts: Mapping[str, str] = {}) -> Iterator[Widget]:
-    """A label and a field for each, with its text."""
     for field in fields:
         yield Label(field.label, markup=False)
         if field.choices:

@@ -348,7 +348,6 @@ def _point(place: tuple[float, ...] | None) -> str:
 
 
 def _free_name(scenario_name: str) -> str:
-    """The name that the next run of a scenario gets."""
     from ddenv.runs.folder import free_run_path
 
     try:

@@ -287,7 +287,6 @@ class SetupScreen(Screen[None]):
             call_if_open(self, self.form.show_cost, cost)
 
     def _scenario(self) -> Scenario:
-        """The scenario that the form describes. Raises UserError."""
         choice, (pair, algorithm) = self._chosen(), self.form.method
         choice.check_remedies()
         return form.asked_of(choice.settings, self.form.texts, pair, algorithm)
@@ -373,7 +372,6 @@ class SetupScreen(Screen[None]):
         call_if_open(self, self.post_message, ShowRun(path, engine=engine))
 
     def _complain(self, error: UserError) -> None:
-        """Shows an error, and marks its field."""
         self._busy = False
         if form.field_of(error) not in (None, form.NAME.id):
             self._show_pane("settings")
@@ -419,7 +417,6 @@ class SetupScreen(Screen[None]):
         self._arrange()
 
     def _arrange(self) -> None:
-        """Shows all panes, or only one."""
         # Not by classes of the screen: these would compute all styles again.
         (width, height), pane = self.size, self._pane
         all = width >= ROOMY[0] and height >= ROOMY[1]
