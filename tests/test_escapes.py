@@ -16,7 +16,7 @@ from ddenv.text import printable
 from ddenv.words.news import headline
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import Config
-from ddenv.workbench.lines.line_mode import LineMode
+from ddenv.workbench.line_mode import LineMode
 from tests.command import in_process
 from tests.workbench import fake_moments, fake_run
 

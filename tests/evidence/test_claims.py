@@ -11,10 +11,10 @@ from ddenv.page.markdown import markdown
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.words.claims import promise, verdict_on
 from ddenv.words.explain import explain
 from ddenv.words.news import news
-from ddenv.workbench.shared.poll import Snapshot
 from tests.workbench import fake_run
 
 PINNED = "1 pinned model was never left out"

@@ -70,7 +70,7 @@ async def test_on_the_screens_before_a_run(scenarios, runs, opened):
     await what_keys_change_is_seen(Workbench(), USUAL, opened)
 
 
-async def test_selected_text_in_a_field(run):
+async def test_selected_text_in_a_field_and_by_the_mouse(run):
     fake_moments.guided(run).hold()
     app = Workbench(run.path)
     async with app.run_test(size=USUAL) as pilot:
@@ -82,14 +82,7 @@ async def test_selected_text_in_a_field(run):
         x, y, width, _ = field.content_region
         row = frame(app, False)[y][x : x + width]
         assert "".join(char for char, _, _, reverse, _ in row if reverse) == "ate"
-
-
-async def test_text_that_is_selected_with_the_mouse(run):
-    fake_moments.guided(run).hold()
-    app = Workbench(run.path)
-    async with app.run_test(size=USUAL) as pilot:
-        await settled(pilot)
-        await pilot.press("e")
+        await pilot.press("escape", "e")
         await pilot.pause()
         x, y, *_ = app.screen.query_one("Static").content_region
         await pilot.mouse_down(offset=(x, y))

@@ -7,10 +7,11 @@ import fake_run
 import pytest
 
 from ddenv.runfile.fold import fold
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.words.baseline import baseline_sentence
 from ddenv.words.explain import explain
 from ddenv.workbench.run.status import facts
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 from tests.shorthand import raw
 
 

@@ -19,13 +19,14 @@ from rich.cells import cell_len
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.reading import plain
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile, recorded
 from ddenv.runs.tests_left import remaining
 from ddenv.words.explain import explain
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import read_config
-from ddenv.workbench.export.export_dialog import suggested, write
+from ddenv.workbench.export import suggested, write
 from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.run_screen import RunScreen
@@ -33,7 +34,6 @@ from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
 from ddenv.workbench.setup.files import WorldTree, complain_about
 from ddenv.workbench.setup.save_scenario import scenario_path
-from ddenv.workbench.shared.poll import Snapshot
 from tests.tiers import slow
 
 NAMES = [

@@ -15,7 +15,7 @@ from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help
-from ddenv.workbench.history.history_screen import Compare, History
+from ddenv.workbench.history import Compare, History
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change

@@ -11,8 +11,8 @@ from ddenv import __version__
 from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.workbench.run.status import Header, Status, branch_of, facts, fitted, heading
-from ddenv.workbench.shared.poll import Snapshot
 
 
 def snapshot(run, engine="alive", **changes) -> Snapshot:

@@ -11,13 +11,14 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import about, duration, percent, plain, truncated
 from ddenv.words.signs import brief, metres
 from ddenv.workbench.map.map_colors import mixed
+from ddenv.workbench.map.map_drawing import strip
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
-from ddenv.workbench.map.picture import strip
+from ddenv.workbench.map.place import Shown
 from ddenv.workbench.runs.recent_runs import RunsFolder
-from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.processes import last_line
 from ddenv.world.sdf.read import parse_world
 
@@ -26,43 +27,22 @@ def snapshot(run, engine="alive") -> Snapshot:
     return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
 
 
-@pytest.mark.parametrize(("seconds", "words"), [(0, "0 s"), (59.4, "59 s"), (100, "1 min 40 s"), (7500, "2 h 05 min")])
-def test_durations(seconds, words):
-    assert duration(seconds) == words
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"), [(0.42, "0.4 s"), (9.96, "10 s"), (312, "312 s"), (1500, "25 min"), (40_000, "11 h")]
+WORDS = (
+    (duration, {0: "0 s", 59.4: "59 s", 100: "1 min 40 s", 7500: "2 h 05 min"}),
+    # In a table they are short.
+    (brief, {0.42: "0.4 s", 9.96: "10 s", 312: "312 s", 1500: "25 min", 40_000: "11 h"}),
+    # What is not known exactly is told roughly.
+    (lambda times: about(*times), {(4.2, 8.1, 22): "8 s (4 to 20)", (61, 122, 301): "2 min (1 to 5)"}),
+    (lambda times: about(*times), {(1, 1, 1): "1 s", (3000, 9000, 40_000): "2 h (1 to 10)", (0, 0, 0): "1 s"}),
+    # Percentages are never rounded to certainty.
+    (percent, {0: "0 %", 0.001: "<1 %", 0.5: "50 %", 0.999: ">99 %", 1: "100 %"}),
+    (metres, {None: "", "x": "", float("nan"): "", float("inf"): ""}),
 )
-def test_times_in_a_table_are_short(seconds, words):
-    assert brief(seconds) == words
-    assert len(words) <= 7
 
 
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        ((4.2, 8.1, 22), "8 s (4 to 20)"),
-        ((61, 122, 301), "2 min (1 to 5)"),
-        ((1, 1, 1), "1 s"),
-        ((3000, 9000, 40_000), "2 h (1 to 10)"),
-        ((0, 0, 0), "1 s"),
-    ],
-)
-def test_what_is_not_known_exactly_is_told_roughly(seconds, words):
-    assert about(*seconds) == words
-
-
-@pytest.mark.parametrize(
-    ("part", "words"), [(0, "0 %"), (0.001, "<1 %"), (0.5, "50 %"), (0.999, ">99 %"), (1, "100 %")]
-)
-def test_percentages_are_never_rounded_to_certainty(part, words):
-    assert percent(part) == words
-
-
-@pytest.mark.parametrize("value", [None, "x", float("nan"), float("inf")])
-def test_no_distance_is_no_text(value):
-    assert metres(value) == ""
+@pytest.mark.parametrize(("say", "told"), WORDS)
+def test_numbers_are_worded(say, told):
+    assert {number: say(number) for number in told} == told
 
 
 def test_names_cannot_steer_the_terminal():
@@ -74,30 +54,25 @@ def looks_of(run, candidate=None):
     state = fold(run.file.events())
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     chosen = state.round.candidates[candidate] if candidate is not None else None
-    how = looks(prints, kept(state, chosen), mixed((0, 0, 0), (255, 255, 255)))
-    return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.labels, strict=True)}
+    how = looks(prints, kept(Shown(snapshot=Snapshot(state), candidate=chosen)), mixed((0, 0, 0), (255, 255, 255)))
+    return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.signs.texts, strict=True)}
 
 
-def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run):
+def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run, runs):
     drawn = looks_of(fake_moments.mid_round(run))
     assert drawn["crate_00"] == (KEPT, "A")
     assert drawn["crate_05"] == (KEPT, "C")
     assert drawn["crate_10"] == (REMOVED, "")
     assert drawn["floor"] == (PROTECTED, "#")
-
-
-def test_what_a_candidate_leaves_out_gets_a_small_letter(run):
-    drawn = looks_of(fake_moments.mid_round(run), candidate=1)
+    # What a candidate leaves out gets a small letter.
+    drawn = looks_of(run, candidate=1)
     assert drawn["crate_00"] == (LEFT_OUT, "a")
     assert drawn["crate_02"] == (KEPT, "B")
-
-
-def test_a_large_element_is_a_floor(runs):
-    run = fake_run.FakeRun(runs / "x.ddenv", fake_run.scenario(protected=()))
-    run.created().baseline()
-    run.start_round(2)
-    assert looks_of(run)["floor"] == (FLOOR, "A")
-    run.close()
+    # A large element is a floor.
+    other = fake_run.FakeRun(runs / "x.ddenv", fake_run.scenario(protected=())).created().baseline()
+    other.start_round(2)
+    assert looks_of(other)["floor"] == (FLOOR, "A")
+    other.close()
 
 
 def test_without_colours_the_cells_still_differ(run):
@@ -105,7 +80,8 @@ def test_without_colours_the_cells_still_differ(run):
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     view = View(0, 0, 0.25, 64, 18)
     canvas = Canvas(view.rows, view.columns, (0, 0, 0))
-    how = looks(prints, kept(state, state.round.candidates[1]), mixed((0, 0, 0), (255, 255, 255)))
+    who = kept(Shown(snapshot=Snapshot(state), candidate=state.round.candidates[1]))
+    how = looks(prints, who, mixed((0, 0, 0), (255, 255, 255)))
     fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
     signs = {chr(char) for char in canvas.chars.flat}
     assert {"█", "▓", "▒", " "} <= signs
@@ -118,12 +94,9 @@ def test_only_changed_rows_are_drawn_again():
     assert after.changed_rows(before) == [2]
     assert after.changed_rows(None) == [0, 1, 2, 3]
     assert strip(after, 2).text == "   A      "
-
-
-def test_text_ends_at_the_edge_of_the_map():
-    canvas = Canvas(1, 4, (0, 0, 0))
-    canvas.put((0, 3), "AB")
-    assert strip(canvas, 0).text == "   A"
+    # Text ends at the edge of the map.
+    after.put((3, 9), "AB")
+    assert strip(after, 3).text == "         A"
 
 
 def test_recent_runs_say_how_they_stand(runs):

@@ -35,7 +35,7 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
             raise UserError("options for reading worlds: a run keeps its own")
         if not lines:
             return run_workbench(path, watch=watch)
-        from ddenv.workbench.lines.line_mode import LineMode, typed_lines
+        from ddenv.workbench.line_mode import LineMode, typed_lines
 
         # Interrupted as after quit, the engine goes on.
         LineMode(path, watch, sys.stdout).follow(typed_lines(sys.stdin))

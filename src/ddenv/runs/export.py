@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
@@ -54,15 +55,8 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     is_urdf = scenario.robot.model.suffix.lower() == ".urdf"
     model = scenario_file.with_suffix(".robot.urdf" if is_urdf else ".robot.sdf")
     write_file(model, robot)
-    data = scenario.model_dump(mode="json")
     folder = scenario_file.parent.resolve()
-    # The folder is only searched for the user's own programs.
-    if scenario.oracle is None and ":" not in scenario.controller.use:
-        del data["folder"]
-    else:
-        data["folder"] = _name(scenario.folder, folder)
-    if scenario.oracle is not None and scenario.oracle.folder is not None:
-        data["oracle"]["folder"] = _name(scenario.oracle.folder, folder)
+    data = keys_in(folder, scenario)
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
     data["whole"] = whole_of(world, scenario).model_dump(mode="json")
     data["protected"] = _renamed(scenario.protected, world, removed, minimal)
@@ -71,6 +65,21 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
     return Exported([sdf, model, scenario_file], needs)
+
+
+def keys_in(folder: Path, scenario: Scenario) -> dict[str, Any]:
+    """The keys of a file in `folder` with this scenario: what lies in there is named relative to it, so that it can be moved."""
+    data = scenario.model_dump(mode="json")
+    # The scenario's folder is only searched for the user's own programs.
+    if scenario.oracle is None and ":" not in scenario.controller.use:
+        del data["folder"]
+    else:
+        data["folder"] = _name(scenario.folder, folder)
+    if scenario.oracle is not None and scenario.oracle.folder is not None:
+        data["oracle"]["folder"] = _name(scenario.oracle.folder, folder)
+    data["world"], data["robot"]["model"] = _name(scenario.world, folder), _name(scenario.robot.model, folder)
+    data["reading"]["model_path"] = [_name(each, folder) for each in scenario.reading.model_path]
+    return data
 
 
 def _name(path: Path, folder: Path) -> str:

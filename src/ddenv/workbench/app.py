@@ -22,6 +22,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
+from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
@@ -91,25 +92,18 @@ class Workbench(App[int]):
     ENABLE_COMMAND_PALETTE = True
     COMMANDS: ClassVar[set[type[Provider] | Callable[[], type[Provider]]]] = {_commands}
     BINDINGS: ClassVar = [
-        Binding(
-            "ctrl+q", "leave", "quit", False, priority=True, id="app.leave", tooltip="quit; an engine keeps running"
-        ),
-        Binding("ctrl+z", "suspend_process", "suspend", False, id="app.suspend", tooltip="suspend; fg brings it back"),
-        Binding(
-            "ctrl+p",
-            "command_palette",
-            "commands",
-            False,
+        *keys(
+            "app",
+            ("leave", "ctrl+q", "leave", "quit", "quit; an engine keeps running"),
+            ("suspend", "ctrl+z", "suspend_process", "suspend", "suspend; fg brings it back"),
+            ("commands", "ctrl+p", "command_palette", "commands", "find any command, theme or model by name"),
             priority=True,
-            id="app.commands",
-            tooltip="find any command, theme or model by name",
         ),
-        Binding(
-            "ctrl+t", "change_theme", "theme", False, id="app.theme", tooltip="choose the colours for this session"
-        ),
-        Binding("n", "names", "names", False, id="app.names", tooltip="show or hide the models' names on the map"),
-        Binding(
-            "f12", "screenshot", "screenshot", False, id="app.screenshot", tooltip="save a picture of the screen (SVG)"
+        *keys(
+            "app",
+            ("theme", "ctrl+t", "change_theme", "theme", "choose the colours for this session"),
+            ("names", "n", "names", "names", "show or hide the models' names on the map"),
+            ("screenshot", "f12", "screenshot", "screenshot", "save a picture of the screen (SVG)"),
         ),
     ]
 
@@ -208,7 +202,6 @@ class Workbench(App[int]):
 
     @property
     def _asks(self) -> bool:
-        """Whether a dialog is open."""
         return any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:])
 
     def _say_held(self) -> None:

@@ -16,9 +16,10 @@ from textual.dom import DOMNode
 from textual.screen import Screen
 
 from ddenv.errors import UserError
+from ddenv.schemas import nearest
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.help.key_names import shown_key, textual_keys, written
-from ddenv.workbench.terminal.themes import DARK, nearest, theme_called, theme_names
+from ddenv.workbench.terminal.themes import DARK, theme_called, theme_names
 
 KNOWN = ("theme", "notify", "keys")
 # The head of the example.
@@ -37,12 +38,11 @@ keys:"""
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """An action with its `keys` (Textual's names); `owner` is the name of its screen or widget."""
+    """An action with its `keys` (Textual's names)."""
 
     id: str
     keys: tuple[str, ...]
     words: str
-    owner: str
 
 
 @cache
@@ -50,10 +50,11 @@ def actions() -> dict[str, Action]:
     """All actions by their ids, in the order of their screens."""
     found: dict[str, Action] = {}
     for owner in _owners():
-        for binding in _bindings(owner):
-            if binding.id and binding.id not in found:
-                words = binding.tooltip or binding.description
-                found[binding.id] = Action(binding.id, _keys_of(owner, binding.id), words, owner.__name__)
+        bindings = [binding for binding in _bindings(owner) if binding.id]
+        for id in dict.fromkeys(binding.id or "" for binding in bindings):
+            own = [binding for binding in bindings if binding.id == id]
+            keys = dict.fromkeys(single.key for single in Binding.make_bindings(own))
+            found.setdefault(id, Action(id, tuple(keys), own[0].tooltip or own[0].description))
     return found
 
 
@@ -63,7 +64,9 @@ def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
     known = actions()
     for id in keymap:
         if id not in known:
-            raise UserError(f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them")
+            raise UserError(
+                f"{where}: keys: there is no action '{id}'{nearest(id, list(known))}; 'ddenv config' lists them"
+            )
     for owner in _owners():
         _check_clashes(owner, keymap, where)
     return keymap
@@ -85,14 +88,8 @@ def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) 
                 )
 
 
-def _keys_of(owner: type[DOMNode], id: str) -> tuple[str, ...]:
-    bindings = (binding for binding in _bindings(owner) if binding.id == id)
-    return tuple(dict.fromkeys(single.key for binding in bindings for single in Binding.make_bindings([binding])))
-
-
 @cache
 def _owners() -> tuple[type[DOMNode], ...]:
-    """The app, and all screens and widgets with keys."""
     home = import_module("ddenv.workbench")
     names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.") if not module.ispkg]
     classes = (value for name in names for value in vars(import_module(name)).values())
@@ -149,25 +146,17 @@ def _load(path: Path) -> dict[Any, Any]:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: cannot be read: {getattr(error, 'strerror', '') or 'is not UTF-8 text'}") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        # An invalid date is a ValueError.
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
         line = f"line {mark.line + 1}: " if mark else ""
-        raise UserError(
-            f"{path}: {line}is no YAML: {getattr(error, 'problem', None) or 'it cannot be read'}; "
-            f"keys such as '?' go in quotes"
-        ) from None
-    except RecursionError:
-        raise UserError(f"{path}: is nested too deeply") from None
-    except ValueError as error:
-        # An invalid date.
-        raise UserError(f"{path}: is no YAML: {error}; put it in quotes") from None
+        raise UserError(f"{path}: {line}is no YAML: {problem}; keys such as '?' go in quotes") from None
     if data is not None and not isinstance(data, dict):
         raise UserError(f"{path}: expected lines such as 'theme: ddenv-light'; 'ddenv config --example' prints some")
     return data or {}
 
 
 def _wanted(keys: Any, path: Path) -> dict[str, str]:
-    """The section `keys`, as text."""
     if keys is None:
         return {}
     if not isinstance(keys, dict):

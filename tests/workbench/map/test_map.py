@@ -14,12 +14,13 @@ from textual.events import MouseScrollUp
 from ddenv.environment import Environment
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.subject import read_parts
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 
 
 class Screen(App):
@@ -96,6 +97,12 @@ async def test_brackets_go_through_the_models_that_are_kept(busy):
         assert world.model_at_cursor == "crate_01"
         assert pilot.app.pointed[-1] == "crate_01"
         assert "part A" in subtitle(world)
+        # The crosshair finds removed models on a floor.
+        world.go_to("crate_10")
+        await pilot.press("right")
+        assert world.model_at_cursor == "crate_10"
+        world.toggle_layer("removed")
+        assert world.model_at_cursor == "floor"
 
 
 async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(busy):
@@ -111,6 +118,13 @@ async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(b
         assert pilot.app.selections[-1] == {"crate_03"}
         world.select(())
         assert world.selection == frozenset()
+        # Removed models are selected no longer.
+        world.select(["crate_00", "crate_04"])
+        state = world.snapshot.state
+        left = tuple(name for name in state.environment if name != "crate_04")
+        world.show(Snapshot(state.changed(environment=left)), None)
+        await pilot.pause()
+        assert pilot.app.selections[-1] == world.selection == {"crate_00"}
 
 
 @pytest.mark.parametrize("name", ["floor", "crate_10"])
@@ -121,17 +135,6 @@ async def test_what_cannot_be_left_out_is_not_selected(busy, name):
         await pilot.pause()
         assert world.selection == frozenset()
         assert len(pilot.app._notifications) == 1
-
-
-async def test_removed_models_are_selected_no_longer(busy):
-    async with Shown(busy) as (pilot, world):
-        world.select(["crate_00", "crate_04"])
-        state = world.snapshot.state
-        left = tuple(name for name in state.environment if name != "crate_04")
-        world.show(Snapshot(state.changed(environment=left)), None)
-        await pilot.pause()
-        assert world.selection == {"crate_00"}
-        assert pilot.app.selections[-1] == {"crate_00"}
 
 
 async def test_the_crosshair_moves_by_cells_and_pans_at_the_border(busy):
@@ -149,15 +152,6 @@ async def test_the_crosshair_moves_by_cells_and_pans_at_the_border(busy):
         assert "┼" in text_of(world)
 
 
-async def test_the_crosshair_finds_removed_models_on_a_floor(busy):
-    async with Shown(busy) as (pilot, world):
-        world.go_to("crate_10")
-        await pilot.press("right")
-        assert world.model_at_cursor == "crate_10"
-        world.toggle_layer("removed")
-        assert world.model_at_cursor == "floor"
-
-
 async def test_a_model_outside_the_view_comes_into_it(busy):
     async with Shown(busy) as (pilot, world):
         world.zoom(8)
@@ -169,16 +163,7 @@ async def test_a_model_outside_the_view_comes_into_it(busy):
         assert not world.go_to("nothing")
 
 
-async def test_the_wheel_keeps_the_place_under_the_pointer(busy):
-    async with Shown(busy) as (pilot, world):
-        before = world.viewport.view.point((3, 10))
-        scroll = MouseScrollUp(world, 10, 3, 0, 0, 0, False, False, False, screen_x=11, screen_y=4)
-        world.post_message(scroll)
-        await pilot.pause()
-        assert world.viewport.view.point((3, 10)) == pytest.approx(before)
-
-
-async def test_a_click_selects_and_a_drag_pans(busy):
+async def test_a_click_selects_a_drag_pans_and_the_wheel_keeps_the_place_under_the_pointer(busy):
     async with Shown(busy) as (pilot, world):
         index = world._numbers["crate_01"]
         row, column = world.picture.cells[index]
@@ -191,6 +176,11 @@ async def test_a_click_selects_and_a_drag_pans(busy):
         assert world.selection == {"crate_01"}
         assert world.viewport.view.x == pytest.approx(view.x - 4 * view.scale)
         assert world.viewport.view.y == pytest.approx(view.y + 2 * 2 * view.scale)
+        before = world.viewport.view.point((3, 10))
+        world.post_message(MouseScrollUp(world, 10, 3, 0, 0, 0, False, False, False, screen_x=11, screen_y=4))
+        await pilot.pause()
+        assert world.viewport.view.scale < view.scale
+        assert world.viewport.view.point((3, 10)) == pytest.approx(before)
 
 
 async def test_a_place_is_picked_by_enter_or_click(busy):

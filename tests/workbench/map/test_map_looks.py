@@ -38,27 +38,20 @@ def who_of(prints, parts=None, **rest) -> Kept:
 
 
 @pytest.mark.parametrize("name", PALETTES)
-def test_parts_look_different_from_each_other_and_from_what_is_left_out(name):
+def test_parts_look_different_from_each_other_from_the_background_and_from_what_is_left_out(name):
     palette = PALETTES[name]
     tones = [palette.tone(KEPT, part) for part in range(len(HUES))]
     assert len({tone.fill for tone in tones}) == len(HUES)
     assert tones[0] != palette.tone(LEFT_OUT, 0) != palette.tone(SELECTED, 0) != palette.tone(PINNED, 0)
+    for part, tone in enumerate(tones):
+        fills = tone.fill, palette.tone(LEFT_OUT, part).fill
+        kept, out = (abs(luminance(fill) - luminance(packed(palette.ground))) for fill in fills)
+        assert kept > 1.5 * out > 15
 
 
 def test_kinds_of_models_differ_without_colours_too():
     glyphs = [PALETTES["dark"].tone(kind, 0).glyph for kind in (KEPT, LEFT_OUT, FLOOR, PROTECTED)]
     assert len(set(glyphs)) == 4
-
-
-@pytest.mark.parametrize("name", PALETTES)
-def test_kept_models_stand_out_from_the_background_and_from_what_is_left_out(name):
-    palette = PALETTES[name]
-    for part in range(len(HUES)):
-        kept, out = (
-            abs(luminance(palette.tone(kind, part).fill) - luminance(packed(palette.ground)))
-            for kind in (KEPT, LEFT_OUT)
-        )
-        assert kept > 1.5 * out > 15
 
 
 @pytest.mark.parametrize("name", PALETTES)
@@ -68,11 +61,8 @@ def test_neighbours_of_one_part_have_a_border(name):
     row = canvas.text(VIEW.rows // 2)
     borders = [column for column, char in enumerate(row) if char == "▉"]
     assert borders == [1, 3, 5]
-
-
-def test_neighbours_of_two_parts_need_none():
-    prints = squares(2)
-    canvas, _ = drawn(prints, who_of(prints, {"m0": 0, "m1": 1}), PALETTES["dark"])
+    # Those of two parts need none.
+    canvas, _ = drawn(prints[:2], who_of(prints, {"m0": 0, "m1": 1}), PALETTES[name])
     assert canvas.text(VIEW.rows // 2).strip() == "████"
 
 
@@ -101,23 +91,17 @@ def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
     assert set(canvas.back[on_floor].tolist()) == {how.looks[how.tones[0]].fill}
 
 
-def test_pinned_and_selected_models_have_signs_of_their_own():
+SIGNS = (
+    ({"parts": {"m0": 0, "m2": 1}, "pinned": frozenset({"m1"}), "selected": frozenset({"m2"})}, ["A", "+", "*B"]),
+    # Numbers of the order of sensing follow the letters.
+    ({"parts": {"m0": 0, "m1": 0, "m2": 1}, "sensed": {"m2": 1, "m0": 12}}, ["A12", "A", "B1"]),
+    ({"dropped": frozenset({"m1"})}, ["", "↓", ""]),
+)
+
+
+@pytest.mark.parametrize(("who", "signs"), SIGNS)
+def test_signs_stand_even_where_space_is_short(who, signs):
     prints = squares(3)
-    who = who_of(prints, {"m0": 0, "m2": 1}, pinned=frozenset({"m1"}), selected=frozenset({"m2"}))
-    _, how = drawn(prints, who, PALETTES["own"])
-    assert list(how.labels) == ["A", "+", "*B"]
-    assert how.kinds.tolist() == [KEPT, PINNED, SELECTED]
-    assert how.signs.sure.tolist() == [False, True, True]
-
-
-def test_numbers_of_the_order_of_sensing_follow_the_letters():
-    prints = squares(3)
-    _, how = drawn(prints, who_of(prints, {"m0": 0, "m1": 0, "m2": 1}, sensed={"m2": 1, "m0": 12}), PALETTES["dark"])
-    assert list(how.labels) == ["A12", "A", "B1"]
-
-
-def test_what_drops_is_marked_even_where_space_is_short():
-    prints = squares(3)
-    how = looks(prints, who_of(prints, dropped=frozenset({"m1"})), PALETTES["dark"])
-    assert [text.startswith("↓") for text in how.labels] == [False, True, False]
-    assert how.signs.sure.tolist() == [False, True, False]
+    how = looks(prints, who_of(prints, **who), PALETTES["own"])
+    assert list(how.signs.texts) == signs
+    assert how.signs.sure.tolist() == [sign[:1] in tuple("+*↓") for sign in signs]

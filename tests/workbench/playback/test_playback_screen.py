@@ -68,6 +68,10 @@ async def test_the_row_under_the_cursor_is_played_and_the_robot_moves(two_ways):
         assert robots(screen) == before
         await session.press("escape")
         assert isinstance(session.app.screen, RunScreen)
+        # A certificate's row without a model is played over its partner.
+        await session.press("down", "P")
+        first, second = (one.test for one in (await settled(session))._tests)
+        assert (first.without, second.without, first.seed) == (None, "crate_00", second.seed)
 
 
 async def test_time_goes_on_by_the_clock_at_the_chosen_speed_and_stops_at_the_end(two_ways, monkeypatch):
@@ -129,14 +133,6 @@ async def test_o_offers_tests_with_the_same_seed_first(two_ways):
         assert len(screen._tests) == 2
         await session.press("o", "home", "enter")
         assert len(screen._tests) == 1
-
-
-async def test_a_certificates_row_without_a_model_is_played_over_its_partner(two_ways):
-    async with Attached(two_ways) as session:
-        await session.press("2", "home", "down", "P")
-        screen = await settled(session)
-        first, second = (one.test for one in screen._tests)
-        assert (first.without, second.without, first.seed) == (None, "crate_00", second.seed)
 
 
 async def test_arrows_go_to_other_tests_and_facts_play_theirs(two_ways):
@@ -221,7 +217,7 @@ async def test_a_test_that_runs_is_refused(run):
         assert isinstance(session.app.screen, RunScreen)
 
 
-def test_frames_are_where_the_run_file_has_rows():
+def test_frames_are_where_the_run_file_has_rows_and_speeds_have_ends():
     playing = Playing(1.05)
     times = []
     for by in (1, 1, 1, -1, 20):
@@ -233,10 +229,6 @@ def test_frames_are_where_the_run_file_has_rows():
     playing.go(0.55)
     playing.frames(-1)
     assert playing.time == pytest.approx(0.5)
-
-
-def test_speeds_have_ends():
-    playing = Playing(10.0)
     assert [playing.faster(1) for _ in range(3)] == [True, True, False]
     assert playing.speed == SPEEDS[-1]
     playing = Playing(0.0)

@@ -79,7 +79,7 @@ class Listed:
         return [notice.message for notice in self.app._notifications]
 
 
-async def test_every_run_says_how_it_stands(several):
+async def test_every_run_says_how_it_stands(several, runs):
     async with Listed(several, (200, 60)) as listed:
         states = {name: row[1:4] for name, row in listed.rows().items()}
         assert states == {
@@ -93,6 +93,13 @@ async def test_every_run_says_how_it_stands(several):
         assert "is not a ddenv run file" in listed.about()
         await listed.choose("done")
         assert "2 of 11 models left" in listed.about() and "crate_00" in listed.about()
+        # The list follows what happens, and the cursor stays.
+        several.test(1, "pass")
+        fake_run.FakeRun(runs / "another.ddenv").close()
+        await listed.look()
+        assert listed.rows()["crates-1"][3] == "11"
+        assert "another" in listed.rows()
+        assert listed.table.chosen.path.stem == "done"
 
 
 async def test_at_80_columns_the_run_under_the_cursor_is_whole_below_the_list(several, runs):
@@ -105,18 +112,6 @@ async def test_at_80_columns_the_run_under_the_cursor_is_whole_below_the_list(se
 
 
 @pytest.mark.screens
-async def test_the_list_follows_what_happens(several, runs):
-    async with Listed(several) as listed:
-        await listed.choose("new")
-        several.test(1, "pass")
-        fake_run.FakeRun(runs / "another.ddenv").close()
-        await listed.look()
-        assert listed.rows()["crates-1"][3] == "11"
-        assert "another" in listed.rows()
-        assert listed.table.chosen.path.stem == "new"
-
-
-@pytest.mark.screens
 @pytest.mark.parametrize("size", [(64, 12), (20, 5)], ids=str)
 async def test_small_terminals_show_what_there_is_room_for(several, size):
     async with Listed(several, size) as listed:
@@ -125,7 +120,7 @@ async def test_small_terminals_show_what_there_is_room_for(several, size):
             assert all(len(row) >= 5 for row in listed.rows().values())
 
 
-async def test_enter_opens_a_run_and_w_watches_it(several):
+async def test_enter_opens_a_run_w_watches_it_and_n_makes_one_like_it(several, scenarios):
     async with Listed(several) as listed:
         await listed.choose("done")
         await listed.press("enter")
@@ -136,11 +131,8 @@ async def test_enter_opens_a_run_and_w_watches_it(several):
         await listed.choose("crates-1")
         await listed.press("w")
         assert listed.app.screen.run.stem == "crates-1"
-
-
-@pytest.mark.screens
-async def test_n_opens_the_setup_screen_with_its_settings(several, scenarios):
-    async with Listed(several) as listed:
+        listed.app.action_runs()
+        await listed.look()
         await listed.choose("done")
         await listed.press("n")
         assert isinstance(listed.app.screen, SetupScreen)
@@ -227,12 +219,8 @@ async def test_two_runs_are_compared(several, runs):
     assert said["in both"][0] == "2: crate_00, crate_01"
     assert said["only in this one"] == ["none", "3: crate_02, crate_03, crate_04"]
     assert said["reduction.iterations"] == ["3", "7"]
-
-
-def test_settings_that_one_run_lacks_differ():
-    assert list(differences({"a": {"b": 1}, "name": "x"}, {"a": {"b": 1, "c": [2]}, "name": "y"})) == [
-        ("a.c", "none", "[2]")
-    ]
+    one, other = {"a": {"b": 1}, "name": "x"}, {"a": {"b": 1, "c": [2]}, "name": "y"}
+    assert list(differences(one, other)) == [("a.c", "none", "[2]")]
 
 
 @pytest.mark.parametrize("how", ["typed", "completed", "pasted", "quoted", "url"])
@@ -298,7 +286,5 @@ def test_only_files_that_changed_are_read_again(several, runs, monkeypatch):
     opened = []
     monkeypatch.setattr("ddenv.workbench.runs.recent_runs.Observed", lambda path: opened.append(path))
     assert folder.look() == first and opened == []
-
-
-def test_a_look_without_time_tells_the_names(several, runs):
+    # A look without time tells the names.
     assert {run.status for run in RunsFolder(runs).look(patience=-1.0)} == {""}

@@ -2,6 +2,8 @@
 
 from contextlib import suppress
 
+import fake_run
+import yaml
 from textual.widgets import Select, Static
 from textual.worker import WorkerCancelled
 
@@ -13,6 +15,11 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import Explained
 from ddenv.workbench.setup.setup_screen import SetupScreen
+
+
+def write_scenario(scenarios, **keys):
+    """The bundled scenario, with these keys instead of its own."""
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | keys))
 
 
 class Session:
@@ -73,6 +80,15 @@ class Session:
     def notice(self):
         """What stands in the place of the map."""
         return self.screen.query_one(WorldMap).notice
+
+    def place(self, **others):
+        """A start and a goal in an empty place."""
+        places = {"spawn_x": "-6", "spawn_y": "0", "spawn_z": "0.16", "spawn_yaw": "0", "goal_x": "6", "goal_y": "0"}
+        self.fill(**places | others)
+
+    def refused(self):
+        """What the dialog says is wrong."""
+        return self.app.screen.query_one("#wrong", Static).render().plain
 
     async def open(self, path):
         """As the dialog would."""

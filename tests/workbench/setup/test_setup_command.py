@@ -4,13 +4,20 @@ import shlex
 
 import fake_run
 import pytest
-import yaml
 
 from ddenv.cli.command_line import app as command_line
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.start_run import command, source_of
-from tests.workbench.setup.setup_session import Opened
+from ddenv.workbench.setup.start_run import command_words
+from ddenv.world.load import load_scenario
+from tests.workbench.setup.setup_session import Opened, write_scenario
+
+
+@pytest.fixture
+def own(scenarios):
+    """The bundled scenario, with a limit."""
+    write_scenario(scenarios, reduction=fake_run.scenario()["reduction"] | {"budget": 50})
+    return load_scenario(scenarios / "crates.yaml")
 
 
 @pytest.fixture
@@ -59,13 +66,10 @@ PLACES = {
 OTHER = PLACES | {one.name: another(one) for one in OPTIONS if one.shown in ("basic", "more")}
 
 
-def test_every_setting_has_an_option(scenarios, asked_by):
-    from ddenv.world.load import load_scenario
-
-    own = load_scenario(scenarios / "crates.yaml")
+def test_every_setting_has_an_option(scenarios, own, asked_by):
     assert set(OTHER) == {field.id for field in form.ALL if field.key}
     asked = form.asked_of(own, OTHER, "timeseg/random", "ddmin")
-    words = command("crates", own, asked, standard=own, jobs=3, reading={}, name="it's <mine>")
+    words = command_words(scenarios / "crates.yaml", own, asked, jobs=3, reading={}, name="it's <mine>")
     assert words[:3] == ["ddenv", "run", "crates"]
     scenario, path = asked_by(shlex.split(shlex.join(words)))
     assert scenario == asked
@@ -73,16 +77,10 @@ def test_every_setting_has_an_option(scenarios, asked_by):
 
 
 @pytest.mark.parametrize("typed", ["", " none"])
-def test_a_limit_can_be_taken_back(scenarios, asked_by, typed):
-    from ddenv.world.load import load_scenario
-
-    data = fake_run.scenario()
-    data["reduction"]["budget"] = 50
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(data))
-    own = load_scenario(scenarios / "crates.yaml")
+def test_a_limit_can_be_taken_back(scenarios, own, asked_by, typed):
     asked = form.asked_of(own, form.texts_of(own) | {"budget": typed}, "timeseg/random", "ddmin")
     assert asked.reduction.budget is None
-    scenario, _ = asked_by(command("crates", own, asked, standard=own, jobs=4, reading={}))
+    scenario, _ = asked_by(command_words(scenarios / "crates.yaml", own, asked, jobs=4, reading={}))
     assert scenario == asked
 
 
@@ -113,7 +111,7 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
         await session.open(path)
         assert session.told("command") == ""
         assert "not ready: spawn x m: is missing" in session.told("cost")
-        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        session.place()
         await session.pilot.pause()
         words = shlex.split(session.told("command"))[1:]
         assert words[2] == str(path)
@@ -134,6 +132,6 @@ async def test_what_is_wrong_has_no_command_to_copy(scenarios):
         assert session.app.focused.id == "timeout"
 
 
-def test_other_files_are_named_whole(scenarios, tmp_path):
-    assert source_of(scenarios / "crates.yaml", scenarios) == "crates"
-    assert source_of(tmp_path / "crates.yaml", scenarios) == str(tmp_path / "crates.yaml")
+def test_other_files_are_named_whole(own, tmp_path):
+    words = command_words(tmp_path / "crates.yaml", own, own, jobs=4, reading={})
+    assert words == ["ddenv", "run", str(tmp_path / "crates.yaml")]

@@ -1,7 +1,6 @@
 """What a reduction is said to cost, and where the seconds come from."""
 
 import fake_run
-import pytest
 
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.costs import Past, past_of, whole_cost
@@ -17,8 +16,9 @@ def scenario(**reduction):
     return Scenario.model_validate(data)
 
 
-def test_choices_are_those_of_the_scenario():
+def test_every_field_has_a_meaning_and_the_choices_of_the_scenario():
     for field in form.ALL:
+        assert field.meaning.endswith(".") and field.meaning[0].isupper()
         if not field.key or not field.choices or field.kind is bool:
             continue
         section, key = field.key.split(".")
@@ -54,19 +54,10 @@ def test_more_iterations_and_more_models_cost_more():
 
     assert tests(43, accept_rate="first", iterations=0) < tests(43, accept_rate="first", iterations=8)
     assert tests(10, slice=False) < tests(300, slice=False) < tests(5000, slice=False)
-
-
-def test_with_slices_the_size_of_the_world_matters_little():
+    # With slices the size of the world matters little.
     assert whole_cost(scenario(), 43, 2, Past()) == whole_cost(scenario(), 5000, 2, Past())
     theirs = scenario().model_copy(update={"oracle": object()})
     assert whole_cost(theirs, 5000, 2, Past()) == whole_cost(scenario(slice=False), 5000, 2, Past())
-
-
-@pytest.mark.parametrize("field", form.ALL, ids=lambda field: field.id)
-def test_every_field_has_a_meaning(field):
-    words = field.meaning
-    assert words.endswith(".")
-    assert words[0].isupper()
 
 
 def test_costs_follow_what_is_typed(monkeypatch):

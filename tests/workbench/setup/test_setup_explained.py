@@ -8,13 +8,12 @@ from textual.widgets import Select, Static
 from ddenv.schemas import explanation
 from ddenv.words.methods import KINDS
 from ddenv.workbench.setup.fields import Explained
-from tests.workbench.setup.setup_session import Opened
+from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
 @pytest.mark.screens
 async def test_a_description_that_does_not_fit_says_so(scenarios):
-    own = fake_run.scenario() | {"description": "far " * 60 + "end"}
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    write_scenario(scenarios, description="far " * 60 + "end")
     for size, whole in (((80, 24), False), ((200, 60), True)):
         async with Opened(size) as session:
             told = session.screen.query_one("#about", Static).render().plain

@@ -2,14 +2,13 @@
 
 import fake_run
 import pytest
-import yaml
 from textual import events
 from textual.widgets import Input
 
 from ddenv.runfile.store import RunFile
 from tests.tiers import slow
 from tests.waiting import eventually
-from tests.workbench.setup.setup_session import Opened
+from tests.workbench.setup.setup_session import Opened, write_scenario
 
 GROUND_ONLY = '<sdf version="1.9"><world name="w">{}</world></sdf>'
 STRANGE = "[bold]x[/] \x1b[31m\u202eסוף" + "m" * 300
@@ -36,8 +35,7 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
     ids=["none", "one"],
 )
 async def test_worlds_with_little_in_them(scenarios, runs, started, models, told):
-    own = fake_run.scenario(protected=())
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    write_scenario(scenarios, protected=())
     (scenarios / "crates.sdf").write_text(GROUND_ONLY.format(fake_run.GROUND + models))
     async with Opened() as session:
         assert session.told("about").startswith(told)
@@ -60,8 +58,7 @@ async def test_a_folder_that_cannot_be_written_is_told_in_one_line(scenarios, tm
 
 
 async def test_strange_names_are_shown_as_text_and_steer_nothing(scenarios, runs, started):
-    own = fake_run.scenario(name="[red]" + "ß" * 70) | {"description": STRANGE}
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    write_scenario(scenarios, name="[red]" + "ß" * 70, description=STRANGE)
     (scenarios / "crates.sdf").write_bytes(fake_run.world_text([STRANGE.replace("\x1b", "").strip("[]"), "b"]))
     async with Opened((80, 24)) as session:
         assert "[bold]x[/] �[31m" in session.screen.preview.choice.about
@@ -75,11 +72,12 @@ NAMES = (
     ("a\0b", "is not a valid file name"),
     (".hidden", "is not a valid file name"),
     ("no/such", ""),
+    ("crates-1", "exists already"),
 )
 
 
 @pytest.mark.screens
-async def test_names_that_cannot_be_files_are_told(scenarios, started):
+async def test_names_that_cannot_be_files_are_told(scenarios, run, started):
     async with Opened() as session:
         for name, words in NAMES:
             # A NUL can be pasted, though not typed.
@@ -112,3 +110,42 @@ async def test_what_is_typed_right_after_tab_goes_to_the_next_field(scenarios):
             session.app.post_message(events.Key(key, character))
         await session.settle()
         assert [session.value(id) for id in ("epsilon", "jobs", "spawn_x")] == [before, "3", "-1"]
+
+
+NUMBERS = {"spawn_x": "-0.56", "spawn_y": "6.75", "spawn_yaw": "-1.571", "goal_x": "-12.05", "goal_y": "-104.5"}
+
+
+def shown(session, id):
+    """What stands in a field."""
+    return session.screen.query_one(f"#{id}").render_line(0).text.rstrip()
+
+
+@pytest.mark.screens
+@pytest.mark.parametrize(
+    "size", slow(pytest.mark.screens, [(64, 18), (80, 24), (110, 32), (120, 36), (170, 50)], but=[(120, 36)]), ids=str
+)
+async def test_numbers_begin_with_their_sign(scenarios, size):
+    own = fake_run.scenario()
+    own["robot"]["spawn"] |= {"x": -0.56, "y": 6.75, "yaw": -1.571}
+    own["goal"] = {"x": -12.05, "y": -104.5}
+    write_scenario(scenarios, **own)
+    async with Opened(size) as session:
+        await session.press("f4")
+        assert {id: shown(session, id) for id in NUMBERS} == NUMBERS
+        for id in NUMBERS:
+            session.screen.query_one(f"#{id}").focus()
+            await session.pilot.pause()
+            assert shown(session, id) == NUMBERS[id]
+
+
+async def test_a_number_that_does_not_fit_says_so_and_is_replaced_by_typing(scenarios):
+    async with Opened() as session:
+        await session.press("f4")
+        session.fill(spawn_x="-0.78539816339")
+        await session.pilot.pause()
+        assert shown(session, "spawn_x").startswith("-0.78") and shown(session, "spawn_x").endswith("…")
+        session.screen.query_one("#spawn_x").focus()
+        await session.pilot.pause()
+        assert shown(session, "spawn_x").startswith("-0.78")
+        await session.press("minus", "7")
+        assert session.value("spawn_x") == "-7"

@@ -2,15 +2,12 @@
 
 import fake_run
 import pytest
-import yaml
 
-from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.setup import form
 from ddenv.workbench.setup.files import remember
-from ddenv.workbench.setup.preview import places_of, remember_places
 from tests.tiers import slow
-from tests.workbench.setup.setup_session import Opened
+from tests.waiting import eventually
+from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
 class Places:
@@ -72,51 +69,39 @@ async def test_the_robot_is_put_on_what_stands_there(scenarios):
     crates = fake_run.world_text().decode()
     shelf = fake_run.box("shelf", 0, 3, size=(2, 1, 0.9))
     (scenarios / "crates.sdf").write_text(crates.replace("</world>", f"{shelf}</world>"))
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    write_scenario(scenarios, **own)
     async with Opened() as session:
         places = Places(session)
         for place, z in (((0, 3), "1.13"), ((20, 20), "0.23"), ((-6, 0), "0.25")):
             await session.press("s")
             await places.pick(*place)
             assert session.value("spawn_z") == z
+    # Where there is no ground at all the height stays.
+    (scenarios / "crates.sdf").write_text(crates.replace(fake_run.GROUND, ""))
+    async with Opened() as session:
+        await session.press("s")
+        await Places(session).pick(50, 50)
+        assert (session.value("spawn_x"), session.value("spawn_z")) == ("50", "0.25")
 
 
-@pytest.mark.screens
-async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path):
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (80, 24)], but=[(80, 24)]), ids=str)
+async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
-    async with Opened() as session:
+    async with Opened(size) as session:
         await session.open(path)
         places = Places(session)
         assert places.numbers() == [""] * 6
         assert places.map.picking
+        assert session.app.focused is places.map and places.map.size.height > 5
+        before = places.map.viewport.cursor
+        await session.press("up")
+        assert places.map.viewport.cursor != before
         for place, words in (((-6, 0), "the heading"), ((0, 0), "the goal"), ((6, 1), "start (-6.00, 0.00) m")):
             await places.pick(*place)
             assert words in places.says()
         assert float(session.value("spawn_z")) == pytest.approx(0.167, abs=0.005)
         assert session.told("command").startswith("$ ddenv run")
-
-
-@pytest.mark.screens
-async def test_a_place_without_ground_keeps_the_height(scenarios):
-    text = fake_run.world_text().decode().replace(fake_run.GROUND, "")
-    (scenarios / "crates.sdf").write_text(text)
-    async with Opened() as session:
-        await session.press("s")
-        await Places(session).pick(50, 50)
-        assert session.value("spawn_z") == "0.2"
-        assert session.value("spawn_x") == "50"
-
-
-@pytest.mark.screens
-async def test_keys_for_the_map_are_letters_in_a_field(scenarios):
-    async with Opened() as session:
-        field = session.screen.query_one("#name")
-        field.focus()
-        field.value = ""
-        await session.press("s", "g", "h", "0", "minus")
-        assert field.value == "sgh0-"
-        assert session.screen.preview.picked_next == ""
 
 
 async def test_the_crosshair_and_the_mouse_pick(scenarios):
@@ -140,21 +125,6 @@ async def test_the_crosshair_and_the_mouse_pick(scenarios):
         assert places.numbers() == before
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (80, 24)], but=[(80, 24)]), ids=str)
-async def test_the_focus_is_where_a_new_world_asks(scenarios, tmp_path, size):
-    path = tmp_path / "bare.sdf"
-    path.write_bytes((scenarios / "crates.sdf").read_bytes())
-    async with Opened(size) as session:
-        await session.open(path)
-        places = Places(session)
-        assert session.app.focused is places.map and places.map.size.height > 5
-        before = places.map.viewport.cursor
-        await session.press("up")
-        assert places.map.viewport.cursor != before
-        await session.press("enter")
-        assert "the heading" in places.says()
-
-
 async def test_looking_at_a_world_in_the_list_asks_nothing_before_enter(scenarios, tmp_path):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
@@ -175,7 +145,7 @@ async def test_start_and_goal_are_remembered_for_each_world(scenarios, tmp_path)
         path.write_bytes((scenarios / "crates.sdf").read_bytes())
         async with Opened() as session:
             await session.open(path)
-            session.fill(spawn_x="-6", spawn_y=str(number), spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+            session.place(spawn_y=str(number))
             await session.open(scenarios / "crates.yaml")
     for number, path in enumerate(worlds):
         async with Opened() as session:
@@ -185,9 +155,45 @@ async def test_start_and_goal_are_remembered_for_each_world(scenarios, tmp_path)
             assert session.told("command").startswith("$ ddenv run")
 
 
-@pytest.mark.parametrize("content", ["[]", "{", '{"PATH": {"spawn_x": "1e300"}}', '{"PATH": 3}'])
-def test_damaged_places_are_passed_over(tmp_path, content):
-    path = tmp_path / "one.sdf"
-    remember_places(path, dict.fromkeys([field.id for field in form.PLACES], "1"))
-    state_file("places.json").write_text(content.replace("PATH", str(path)))
-    assert places_of(path) is None
+LOOSE = fake_run.box("loose", 0, 0).replace("<static>true</static>", "")
+
+
+def world(*models):
+    return f'<sdf version="1.9"><world name="w">{fake_run.GROUND}{"".join(models)}</world></sdf>'
+
+
+async def says(session, words):
+    line = session.screen.query_one("#start-notes")
+    await eventually(lambda: line.display == bool(words) and (not words or line.render().plain == words))
+    return line
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 36)])
+async def test_a_robot_in_the_air_is_told_until_its_start_is_lower(scenarios, size):
+    data = fake_run.scenario()
+    data["robot"]["spawn"]["z"] = 1.0
+    write_scenario(scenarios, **data)
+    async with Opened(size) as session:
+        what = "the robot starts 0.88 m above the surface below it and drops"
+        line = await says(session, f"▲ lower the spawn's z: {what}")
+        assert line.tooltip.plain == f"{what}; lower the spawn's z."
+        await session.press("f3")
+        # Where the map is alone, the note is whole.
+        assert line.region.height == (2 if size[0] == 80 else 1) and session.screen.query_one("#map").region.height > 10
+        session.fill(spawn_z="0.2")
+        await says(session, "")
+
+
+async def test_models_inside_each_other_are_told_of_a_world_without_a_start(scenarios):
+    (scenarios / "inside.sdf").write_text(world(LOOSE, fake_run.box("wall", 0.5, 0)))
+    async with Opened() as session:
+        await session.open(scenarios / "inside.sdf")
+        why = "loose starts 0.30 m inside wall: they push each other apart"
+        await says(session, f"▲ move one model, or make both static: {why}")
+        session.fill(spawn_x="4", spawn_y="0", spawn_z="2", spawn_yaw="0")
+        line = await says(
+            session, "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it and drops"
+        )
+        assert why in line.tooltip.plain
+        await session.open(scenarios / "crates.yaml")
+        await says(session, "")

@@ -3,7 +3,6 @@
 import fake_moments
 import fake_run
 import pytest
-import yaml
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.schemas import names
@@ -12,58 +11,37 @@ from ddenv.workbench.help.shortcuts import Help
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.run_screen import RunScreen
 from tests.tiers import slow
-from tests.workbench.setup.setup_session import Opened
+from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
     async with Opened() as session:
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
         assert "11 models. A robot drives" in session.screen.query_one("#about", Static).render().plain
-        assert [session.value(id) for id in ("iterations", "timeout", "epsilon", "seed", "jobs")] == [
-            "3",
-            "45",
-            "0.33",
-            "0",
-            "4",
-        ]
+        settings = {"iterations": "3", "timeout": "45", "epsilon": "0.33", "seed": "0", "jobs": "4"}
+        assert {id: session.value(id) for id in settings} == settings
         assert session.value("name") == "crates-1"
         assert session.method() == ["ddenv", "model2model", "failure-proximal"]
 
 
 async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started):
+    write_scenario(scenarios, reduction={"early_stop": False})
     async with Opened() as session:
-        session.fill(iterations="5", seed="7", jobs="3")
-        session.screen.query_one("#accept", Select).value = "ask"
+        await session.press("f9")
+        session.fill(iterations="5", seed="7", jobs="3", accept="ask")
+        session.fill(**dict(zip(KINDS, ("splitting", "timeseg", "timestep"), strict=True)))
         await session.press("f5")
         assert started == [("crates-1.ddenv", 3, {"accept_mode": "ask"})]
         assert isinstance(session.app.screen, RunScreen)
         assert (runs / "crates-1.ddenv").is_file()
-        scenario = session.made()
-        assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)
+        reduction = session.made().reduction
+        assert (reduction.iterations, reduction.seed) == (5, 7)
+        assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
+        # What the form does not have comes from the scenario.
+        assert not reduction.early_stop
     # The number of jobs is no part of a scenario: the next form begins with it.
     async with Opened() as session:
         assert session.value("jobs") == "3"
-
-
-@pytest.mark.screens
-async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios, started):
-    async with Opened() as session:
-        for kind, name in zip(KINDS, ("splitting", "timeseg", "timestep"), strict=True):
-            session.screen.query_one(f"#{kind}", Select).value = name
-        await session.press("ctrl+s")
-        assert len(started) == 1
-        reduction = session.made().reduction
-        assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
-
-
-@pytest.mark.screens
-async def test_what_the_form_does_not_have_comes_from_the_scenario(scenarios, started):
-    own = fake_run.scenario() | {"reduction": {"early_stop": False}}
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
-    async with Opened() as session:
-        await session.press("f9")
-        await session.press("ctrl+s")
-        assert not session.made().reduction.early_stop
 
 
 @pytest.mark.screens
@@ -110,7 +88,7 @@ async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenari
     fake_moments.finished(fake_run.FakeRun(runs / "crates-world-1.ddenv")).close()
     fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
     long = "A robot drives through crates and gets stuck on one of them. " * 4
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | {"description": long}))
+    write_scenario(scenarios, description=long)
     async with Opened((80, 24)) as session:
         title = session.screen.query_one("#title", Static)
         assert len(title.render().plain) < title.size.width
@@ -156,15 +134,6 @@ async def test_an_open_list_shows_all_its_names(scenarios):
         region = session.app.focused.region
         assert region.height == len(names("prioritization"))
         assert session.screen.region.contains_region(region)
-
-
-@pytest.mark.screens
-async def test_the_start_button_starts(scenarios, started):
-    async with Opened((80, 24)) as session:
-        session.screen.query_one("#start", Button).press()
-        await session.pilot.pause()
-        await session.settle()
-        assert len(started) == 1
 
 
 WRONG = (
@@ -227,17 +196,10 @@ async def test_a_robot_inside_a_model_is_an_error_of_the_whole_spawn(scenarios, 
         session.fill(spawn_z="0.2")
         await session.pilot.pause()
         assert session.wrong() == ""
-        await session.press("ctrl+s")
+        session.screen.query_one("#start", Button).press()
+        await session.pilot.pause()
+        await session.settle()
         assert len(started) == 1
-
-
-@pytest.mark.screens
-async def test_a_taken_name_is_refused(scenarios, run, started):
-    async with Opened() as session:
-        session.fill(name="crates-1")
-        await session.press("ctrl+s")
-        assert "exists already" in session.wrong()
-        assert session.app.focused.id == "name"
 
 
 @pytest.mark.screens
@@ -267,11 +229,16 @@ async def test_a_world_that_cannot_be_read_leaves_nothing_of_the_one_before(scen
 @pytest.mark.screens
 async def test_recent_runs_are_listed_and_opened(scenarios, runs):
     fake_moments.finished(fake_run.FakeRun(runs / "old.ddenv")).close()
+    (runs / "bad.ddenv").write_text("no run")
     async with Opened() as session:
         options = session.screen.query_one("#run-list", OptionList)
-        assert options.option_count == 1
+        assert {option.id for option in options.options} == {str(path) for path in runs.glob("*.ddenv")}
         options.focus()
-        await session.pilot.press("down", "enter")
+        options.highlighted = options.get_option_index(str(runs / "bad.ddenv"))
+        await session.press("enter")
+        assert any("is not a ddenv run file" in notice.message for notice in session.app._notifications)
+        options.highlighted = options.get_option_index(str(runs / "old.ddenv"))
+        await session.pilot.press("enter")
         await session.pilot.pause()
         assert isinstance(session.app.screen, RunScreen)
         assert session.app.screen.run == runs / "old.ddenv"
@@ -279,35 +246,14 @@ async def test_recent_runs_are_listed_and_opened(scenarios, runs):
 
 
 @pytest.mark.screens
-async def test_a_damaged_run_is_not_opened(scenarios, runs):
-    (runs / "bad.ddenv").write_text("no run")
-    async with Opened() as session:
-        session.screen.query_one("#run-list").focus()
-        await session.press("down", "enter")
-        assert any("is not a ddenv run file" in notice.message for notice in session.app._notifications)
-
-
-@pytest.mark.screens
-async def test_help_and_quit(scenarios):
-    async with Opened() as session:
-        await session.press("f1")
-        assert isinstance(session.app.screen, Help)
-        await session.press("escape", "q")
-        assert session.app._exit
-
-
-@pytest.mark.screens
-async def test_letters_can_be_typed_into_fields(scenarios):
+async def test_letters_are_typed_into_fields_and_help_and_quit_elsewhere(scenarios):
     async with Opened() as session:
         field = session.screen.query_one("#name", Input)
         field.focus()
         field.value = ""
-        await session.press("q", "question_mark")
-        assert field.value == "q?"
-
-
-@pytest.mark.screens
-async def test_too_small(scenarios):
-    async with Opened((40, 10)) as session:
-        assert session.screen.query_one("#small").display
-        assert session.told("small") == "ddenv needs 64 x 18; this terminal has 40 x 10"
+        await session.press("q", "question_mark", "s", "g", "h", "0", "minus")
+        assert field.value == "q?sgh0-" and session.screen.preview.picked_next == ""
+        await session.press("f1")
+        assert isinstance(session.app.screen, Help)
+        await session.press("escape", "f2", "q")
+        assert session.app._exit

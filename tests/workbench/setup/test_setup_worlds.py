@@ -1,21 +1,33 @@
 """The setup screen opens worlds without a scenario."""
 
-import fake_run
+import json
+from functools import partial
+from pathlib import Path
+
 import pytest
-import yaml
 from textual.widgets import Input, OptionList, Static
 
+from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.setup.files import OpenFile
-from tests.workbench.setup.setup_session import Opened
+from ddenv.workbench.setup import form
+from ddenv.workbench.setup.files import KEPT, RECENT, FileList, OpenFile, recent_files, remember
+from ddenv.workbench.setup.missing_files import REMEDIES, remembered
+from ddenv.workbench.setup.preview import PLACES, places_of, remember_places
+from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
 async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
+    (scenarios / "notes.txt").write_text("x")
     async with Opened() as session:
         await session.press("ctrl+o")
         assert isinstance(session.app.screen, OpenFile)
+        shown = session.app.screen.query_one("#tree").filter_paths(scenarios.iterdir())
+        assert {path.name for path in shown} == {"crates.yaml", "crates.sdf", "robot.sdf"}
+        await session.pilot.press("escape")
+        assert session.app.screen is session.screen
+        await session.press("ctrl+o")
         await session.pilot.press(*"nowhere.sdf", "enter")
-        assert "no such file" in session.app.screen.query_one("#wrong", Static).render().plain
+        assert "no such file" in session.refused()
         session.app.screen.query_one("#path", Input).value = str(scenarios / "crates.sdf")
         await session.pilot.press("enter")
         await session.pilot.pause()
@@ -24,7 +36,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert "12 models" in session.screen.query_one("#about", Static).render().plain
         await session.press("ctrl+s")
         assert "spawn x m: is missing" in session.wrong()
-        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        session.place()
         await session.pilot.pause()
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
         session.fill(goal_x="inf")
@@ -45,7 +57,7 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         "failure": {"timeout": 12, "epsilon": 0.25},
         "reduction": {"iterations": 9, "baseline_runs": 5, "seed": 4, "pair": "timeseg/random", "algorithm": "ddmin"},
     }
-    (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | own))
+    write_scenario(scenarios, **own)
     fields = ("timeout", "epsilon", "iterations", "baseline_runs", "seed")
     async with Opened() as session:
         assert [session.value(id) for id in fields] == ["12", "0.25", "9", "5", "4"]
@@ -71,23 +83,10 @@ async def test_typed_places_are_marked_in_the_next_world_too(scenarios, tmp_path
     other.write_bytes((scenarios / "crates.sdf").read_bytes())
     async with Opened() as session:
         await session.open(scenarios / "crates.sdf")
-        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        session.place()
         await session.pilot.pause()
         await session.open(other)
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
-
-
-@pytest.mark.screens
-async def test_the_file_dialog_can_be_cancelled_and_filters(scenarios, tmp_path, monkeypatch):
-    monkeypatch.chdir(scenarios)
-    (scenarios / "notes.txt").write_text("x")
-    async with Opened() as session:
-        await session.press("ctrl+o")
-        tree = session.app.screen.query_one("#tree")
-        shown = {path.name for path in tree.filter_paths(scenarios.iterdir())}
-        assert shown == {"crates.yaml", "crates.sdf", "robot.sdf"}
-        await session.pilot.press("escape")
-        assert session.app.screen is session.screen
 
 
 @pytest.mark.screens
@@ -95,3 +94,86 @@ async def test_without_scenarios_the_map_names_the_key_that_opens_a_file(tmp_pat
     monkeypatch.setattr("ddenv.world.load.SCENARIOS", tmp_path / "none")
     async with Opened() as session:
         assert "ctrl+o" in session.screen.query_one(WorldMap).notice
+
+
+@pytest.fixture
+def files(tmp_path):
+    made = [tmp_path / f"world-{number}.sdf" for number in range(KEPT + 3)]
+    for path in made:
+        path.touch()
+    return made
+
+
+def test_the_newest_come_first_once_and_not_without_end(files):
+    for path in (*files, files[0]):
+        remember(path)
+    found = recent_files()
+    assert found[:2] == [files[0], files[-1]]
+    assert len(found) == len(set(found)) == KEPT
+    files[-1].unlink()
+    assert recent_files() == [files[0], *found[2:]]
+
+
+PLACE = Path("/one.sdf")
+
+
+@pytest.mark.parametrize("content", ["", "no list", "{", '{"a": 1}', "[1, null, {}]", "[" * 50_000, '["\\u0000"]'])
+def test_what_is_damaged_is_passed_over(content, files):
+    for name, read, empty in (
+        (RECENT, recent_files, []),
+        (REMEDIES, remembered, {}),
+        (PLACES, partial(places_of, PLACE), None),
+    ):
+        state_file(name).write_text(content)
+        assert read() == empty
+    remember(files[0])
+    assert recent_files() == [files[0]]
+
+
+def test_what_is_damaged_in_a_remedy_or_a_place_is_passed_over():
+    state_file(REMEDIES).write_text('{"a": 1, "b": "tube:1", "c": "/no/where"}')
+    assert remembered() == {}
+    for damaged in (3, {"spawn_x": "1e300"}):
+        remember_places(PLACE, dict.fromkeys([field.id for field in form.PLACES], "1"))
+        assert places_of(PLACE)
+        state_file(PLACES).write_text(json.dumps({str(PLACE): damaged}))
+        assert places_of(PLACE) is None
+
+
+def test_where_nothing_can_be_written_nothing_is_remembered(files, monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("DDENV_HOME", str(tmp_path / "file" / "below"))
+    remember(files[0])
+    assert recent_files() == []
+
+
+def labels(session):
+    files = session.screen.query_one(FileList)
+    return [str(files.get_option_at_index(index).prompt) for index in range(files.option_count)]
+
+
+@pytest.mark.screens
+async def test_an_opened_world_is_offered_the_next_time(scenarios, tmp_path):
+    folder = tmp_path / "fields"
+    folder.mkdir()
+    path = folder / "[red]wild[.sdf"
+    path.write_bytes((scenarios / "crates.sdf").read_bytes())
+    async with Opened() as session:
+        assert labels(session) == ["crates"]
+        await session.open(path)
+        assert labels(session) == ["crates", "[red]wild[.sdf  fields"]
+    async with Opened() as session:
+        assert labels(session) == ["crates", "[red]wild[.sdf  fields"]
+        await session.press("end")
+        assert session.screen.preview.choice.path == path
+
+
+@pytest.mark.screens
+async def test_what_cannot_be_read_and_what_is_bundled_is_not_remembered(scenarios, tmp_path):
+    broken = tmp_path / "broken.sdf"
+    broken.write_text("<sdf")
+    async with Opened() as session:
+        await session.open(broken)
+        await session.open(scenarios / "crates.yaml")
+        assert session.screen.preview.choice.name == "crates"
+    assert not state_file(RECENT).exists()

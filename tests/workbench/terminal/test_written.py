@@ -52,6 +52,9 @@ def test_only_cells_that_changed_are_sent():
     assert sent(written, layout([("models: 12", PLAIN)], [("rounds: 3", PLAIN)])) == ""
     change = sent(written, layout([("models: 13", PLAIN)], [("rounds: 3", PLAIN)]))
     assert re.sub(r"\x1b\[[0-9;]*m", "", change) == "\x1b[1;10H3"
+    # A piece with wide characters is sent as a whole.
+    sent(written, layout([("世界 12", PLAIN)]))
+    assert "世界 13" in sent(written, layout([("世界 13", PLAIN)]))
     written.forget()
     assert "models: 13" in sent(written, layout([("models: 13", PLAIN)], [("rounds: 3", PLAIN)]))
 
@@ -66,12 +69,6 @@ def test_what_is_sent_in_parts_looks_as_if_all_was_sent():
     steps = [sent(written, frame) for frame in frames]
     for number, frame in enumerate(frames, start=1):
         assert shown(*steps[:number]) == shown(sent(Written(), frame))
-
-
-def test_a_piece_with_wide_characters_is_sent_as_a_whole():
-    written = Written()
-    sent(written, layout([("世界 12", PLAIN)]))
-    assert "世界 13" in sent(written, layout([("世界 13", PLAIN)]))
 
 
 def test_a_part_of_the_screen_changes_only_that():
@@ -97,7 +94,7 @@ class Stranger(ChopsUpdate):
     """An update of a kind that only a later release of Textual has."""
 
 
-def test_textual_draws_what_is_of_an_unknown_kind():
+def test_textual_draws_what_is_of_an_unknown_kind_or_made_in_another_way():
     written, known = Written(), layout([("left right", PLAIN)])
     sent(written, known)
     stranger = Stranger([{0: Strip([Segment("night", PLAIN)])}], [(0, 0, 5)], [[5]])
@@ -105,11 +102,6 @@ def test_textual_draws_what_is_of_an_unknown_kind():
     assert written.fewer(None) is None
     # What it wrote is not known: all is sent again.
     assert "left right" in sent(written, known)
-
-
-def test_textual_draws_what_is_made_in_another_way():
-    written, known = Written(), layout([("left right", PLAIN)])
-    sent(written, known)
     update = ChopsUpdate([{0: Strip([Segment("night", PLAIN)])}], [(0, 0, 5)], [[5]])
     fewer = written.fewer(update)
     update.spans = [(0, 0, 5, "something new")]

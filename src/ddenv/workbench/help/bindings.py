@@ -7,15 +7,17 @@ from textual.binding import Binding, BindingType
 HELP = ("help", "question_mark,f1", "app.help", "help", "show every key", "?")
 
 
-def keys(screen: str, *rows: tuple[str, ...]) -> list[BindingType]:
+def keys(screen: str, *rows: tuple[str, ...], priority: bool = False) -> list[BindingType]:
     """The bindings of a screen or a pane, whose names in the file of keys begin with `screen`.
 
     A row has the name, the keys, the action, its word in the footer, what the help says, and maybe how the footer writes the key.
+    With `priority` they come before those of what has the focus.
     """
-    return [
-        Binding(each, action, word, id=f"{screen}.{name}", tooltip=words, key_display=display[0] if display else None)
-        for name, each, action, word, words, *display in rows
-    ]
+    found: list[BindingType] = []
+    for name, each, action, word, words, *display in rows:
+        shown = display[0] if display else None
+        found.append(Binding(each, action, word, True, shown, priority=priority, tooltip=words, id=f"{screen}.{name}"))
+    return found
 
 
 def ids(screen: str, names: str) -> tuple[str, ...]:

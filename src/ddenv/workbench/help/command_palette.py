@@ -46,7 +46,6 @@ class Commands(Provider):
         return partial(self.app.run_action, shortcut.action, shortcut.node)
 
     def _models(self, query: str) -> list[str]:
-        """The run's models whose names contain the typed text."""
         wanted = query.strip().casefold()
         if not wanted:
             return []

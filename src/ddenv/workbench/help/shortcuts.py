@@ -69,13 +69,9 @@ def groups(screen: Screen[Any]) -> list[Group]:
     panes: list[ActiveBinding] = []
     own: list[ActiveBinding] = []
     everywhere: list[ActiveBinding] = []
-    for active in screen.active_bindings.values():
-        if not _words(active):
-            continue
-        if isinstance(active.node, App) or (active.node is screen and not active.binding.id):
-            everywhere.append(active)
-        else:
-            (own if active.node is screen else panes).append(active)
+    for active in filter(_words, screen.active_bindings.values()):
+        of_app = isinstance(active.node, App) or (active.node is screen and not active.binding.id)
+        (everywhere if of_app else own if active.node is screen else panes).append(active)
     title, hints = _pane(screen.focused)
     found = [
         Group(title, _merged(panes), hints),
@@ -98,17 +94,12 @@ def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
         what = active.binding.id or _words(active)
         first.setdefault(what, active)
         keys.setdefault(what, []).append(active.binding.key)
-    return tuple(
-        Shortcut(
-            shown(",".join(keys[what])),
-            _words(active),
-            active.binding.action,
-            active.node,
-            active.binding.id or "",
-            active.enabled,
-        )
-        for what, active in first.items()
-    )
+    return tuple(_shortcut(active, shown(",".join(keys[what]))) for what, active in first.items())
+
+
+def _shortcut(active: ActiveBinding, keys: str) -> Shortcut:
+    binding = active.binding
+    return Shortcut(keys, _words(active), binding.action, active.node, binding.id or "", active.enabled)
 
 
 def _words(active: ActiveBinding) -> str:

@@ -45,7 +45,6 @@ def _split(words: dict[str, str]) -> Signs:
 
 
 def _joined(meanings: dict[str, str]) -> Signs:
-    """Meanings of one sign together."""
     found: dict[str, list[str]] = {}
     for words, sign in meanings.items():
         found.setdefault(sign, []).append(words)

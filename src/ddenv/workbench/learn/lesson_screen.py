@@ -18,6 +18,7 @@ from ddenv.learn.lesson_course import LETTERS, Course
 from ddenv.learn.shelf import Opened
 from ddenv.learn.variables import variables
 from ddenv.runfile.position import Position, Step
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
@@ -36,7 +37,6 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.observed import Observed
-from ddenv.workbench.shared.poll import Snapshot
 
 
 class LessonScreen(LearnScreen[bool]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from textual.color import Color, ColorParseError
+from textual.color import Color
 
 from ddenv.map.colors import HUES, PLAIN, RGB, blend, luminance, packed
 
@@ -111,14 +111,6 @@ def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
     """The palette for a widget's background and text colour in the app's theme."""
     if app.native_ansi_color:
         return mixed(*OWN[app.current_theme.dark], own=True)
-    start, goal, failure = _variable(app, "primary"), _variable(app, "success"), _variable(app, "error")
-    marks = (start, goal, failure) if start and goal and failure else None
-    return mixed(back.rgb, fore.rgb, accent=_variable(app, "accent") or YELLOW, marks=marks)
-
-
-def _variable(app: App[Any], name: str) -> RGB | None:
-    """A colour of the theme, if it is one."""
-    try:
-        return Color.parse(app.theme_variables.get(name, "")).rgb
-    except ColorParseError:
-        return None
+    names = ("accent", "primary", "success", "error")
+    accent, *marks = (Color.parse(app.theme_variables[name]).rgb for name in names)
+    return mixed(back.rgb, fore.rgb, accent=accent, marks=(marks[0], marks[1], marks[2]))

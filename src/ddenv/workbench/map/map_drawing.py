@@ -1,40 +1,31 @@
-"""Draws the map of a world and its run."""
+"""Draws the map of a world and its run: models, paths and letters, then the robots and the crosshair."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.color import Color
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
 
-from ddenv.evidence.took_part import in_last
-from ddenv.map.cells import Cell
+from ddenv.map.cells import Cell, place_signs
+from ddenv.map.colors import readable
 from ddenv.map.paint import Canvas
-from ddenv.map.raster import Outlines, View, fit, pack
-from ddenv.runfile.store import COLUMNS
-from ddenv.workbench.map.map_colors import Palette
-from ddenv.workbench.map.map_words import PARTING, sensed_order
-from ddenv.workbench.map.model_looks import Kept, kept, looks
-from ddenv.workbench.map.picture import (
-    Line,
-    Mark,
-    Picture,
-    Seen,
-    crosshair,
-    follow,
-    foremost,
-    names,
-    picture,
-    riders,
-    robots,
-    seen,
-)
+from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, fit, owners, pack, spans
+from ddenv.runfile.snapshot import Snapshot
+from ddenv.runfile.store import COLUMNS, Live
+from ddenv.text import plain, shortened
+from ddenv.workbench.map.map_colors import REMOVED, Palette
+from ddenv.workbench.map.map_words import PARTING
+from ddenv.workbench.map.model_looks import Looks, fill, ghosts, kept, looks
 from ddenv.workbench.map.place import MovedPrints, Point, Shown
-from ddenv.workbench.shared.poll import Snapshot
-from ddenv.world.pose import pose_of
+from ddenv.world.pose import heading, pose_of
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -43,6 +34,13 @@ if TYPE_CHECKING:
 DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
+# Maximum width of a model's name, in cells.
+NAME = 20
+ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
+# A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
+_Line = tuple[np.ndarray, int, int]
+# The place and heading of a robot, its colour, and the arrows to draw it with.
+_Robot = tuple[tuple[float, float, float], int, str]
 
 
 # Lying models are the slow part of a frame: 16 of 19 ms with 3,000 models, and only zooming and panning change it.
@@ -52,8 +50,40 @@ def _outlines(prints: tuple[Footprint, ...]) -> Outlines:
 
 
 @lru_cache(maxsize=4)
-def _seen(prints: tuple[Footprint, ...], view: View) -> Seen:
-    return seen(_outlines(prints), view)
+def _lying(prints: tuple[Footprint, ...], view: View) -> tuple[Spans, np.ndarray]:
+    """The pixels that the models fill in `view`, and their centres in pixels, (N, 2)."""
+    outlines = _outlines(prints)
+    return spans(outlines, view), view.pixels(outlines.centers)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A canvas for `view`, with the looks of the models and the owner of each pixel: kept models in `grid`, removed ones in `gone`.
+
+    `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where each model's sign begins, if it
+    has one.
+    """
+
+    view: View
+    how: Looks
+    canvas: Canvas
+    grid: np.ndarray
+    gone: np.ndarray
+    dotted: np.ndarray
+    written: np.ndarray
+    cells: dict[int, Cell]
+
+    def holds(self, cell: Cell) -> bool:
+        """Whether a cell is in the picture."""
+        rows, columns = self.canvas.chars.shape
+        return cell[0] < int(rows) and cell[1] < int(columns)
+
+    def owner(self, cell: Cell) -> int | None:
+        """The number of the model that is seen in a cell, a removed one if there are dots; None if there is none."""
+        row, column = cell
+        grid = self.gone if self.dotted[cell] else self.grid
+        owner = int(grid[2 * row : 2 * row + 2, column].max())
+        return None if owner == EMPTY else owner
 
 
 class MapDrawing:
@@ -75,24 +105,40 @@ class MapDrawing:
 
     def follow(self, snapshot: Snapshot) -> None:
         """Adds to the paths behind the robots that drive now."""
-        self._trails = follow(self._trails, snapshot)
+        self._trails = {live.test: self._trails.get(live.test, []) for live in snapshot.live}
+        for live in snapshot.live:
+            trail, point = self._trails[live.test], (live.pose[0], live.pose[1])
+            if trail[-1:] != [point]:
+                trail.append(point)
 
     def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         shown = self._with_live(shown)
         still = _still(shown, view, palette)
-        canvas, trails = still.canvas.copy(), self._trails if "path" in shown.layers else {}
-        if shown.ways:
-            riders(canvas, view, still.written, shown.ways, palette, DASH)
-        else:
-            robots(canvas, view, still.written, shown.snapshot, trails, palette)
+        canvas = still.canvas.copy()
+        paths, robots = _riders(shown, palette) if shown.ways else self._driving(shown, palette)
+        for points, color, dash in paths:
+            bits = braille(points, view, dash)
+            # They hide no letter.
+            bits[still.written] = 0
+            canvas.dots(bits, color)
+        for (x, y, yaw), color, signs in robots:
+            canvas.put(view.cell(x, y), arrow(yaw, signs), readable(color), color)
         if cursor is not None:
-            crosshair(canvas, cursor, still.written, palette)
+            _crosshair(canvas, cursor, still.written, palette)
         return canvas, still
+
+    def _driving(self, shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
+        """The running tests, with the paths behind their robots; those of the candidate in focus stand out."""
+        live, ids = shown.snapshot.live, _in_focus(shown.snapshot)
+        colors = {one.test: palette.live if one.test in ids or not ids else palette.dull for one in live}
+        trails = self._trails if "path" in shown.layers else {}
+        paths = [(np.array(trail), colors.get(test, palette.dull), 0) for test, trail in trails.items()]
+        return paths, [((one.pose[0], one.pose[1], heading(one.pose[3:])), colors[one.test], ARROWS) for one in live]
 
     def _with_live(self, shown: Shown) -> Shown:
         """With the models where they are in the running test whose robot stands out."""
-        live = None if shown.ways else foremost(shown.snapshot)
+        live = None if shown.ways else _foremost(shown.snapshot)
         if (live is None or not live.models) and self._moved is None:
             return shown
         if self._moved is None or self._moved.place is not shown.place:
@@ -102,36 +148,91 @@ class MapDrawing:
         return shown if prints is shown.place.prints else replace(shown, place=replace(shown.place, prints=prints))
 
 
+def _in_focus(snapshot: Snapshot) -> frozenset[int]:
+    """The running tests of the candidate in focus."""
+    focus = snapshot.focus
+    return frozenset(test.id for test in snapshot.running if focus is not None and test.candidate == focus.index)
+
+
+def _foremost(snapshot: Snapshot) -> Live | None:
+    """The running test that stands out: one of the candidate in focus, if there is one."""
+    ids = _in_focus(snapshot)
+    return next((live for live in snapshot.live if live.test in ids), next(iter(snapshot.live), None))
+
+
+def _riders(shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
+    """The robots on one or two ways with their paths; the second one, a hollow arrow, is below the first one."""
+    looks_of = ((palette.live, 0, ARROWS), (palette.dull, DASH, HOLLOW))
+    both = list(zip(shown.ways, looks_of, strict=False))[::-1]
+    paths = [(way.points[: way.gone], color, dash) for way, (color, dash, _) in both]
+    return paths, [(way.robot, color, signs) for way, (color, _, signs) in both if way.robot is not None]
+
+
 def _still(shown: Shown, view: View, palette: Palette) -> Picture:
-    """All but what moves."""
-    prints, layers, snapshot = shown.place.prints, shown.layers, shown.snapshot
-    lines = [Line(_path(snapshot.evidence), palette.path)] if "path" in layers else []
-    if "original" in layers and not shown.same_paths:
-        lines.insert(0, Line(_path(snapshot.original), palette.original, DASH))
-    if shown.ways:
-        both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
-        lines = [Line(way.points, color, dash) for way, color, dash in both][::-1]
-    how, marks = looks(prints, _who(shown), palette), tuple(_marks(shown, palette))
-    still = picture(_seen(prints, view), how, removed="removed" in layers, lines=lines, marks=marks)
-    if "names" in layers:
-        names(still, prints, shown.failure or shown.start)
+    """All that does not change while robots drive. Letters cover paths, and marks cover letters."""
+    how = looks(shown.place.prints, kept(shown), palette)
+    filled, centers = _lying(shown.place.prints, view)
+    canvas = Canvas(view.rows, view.columns, palette.back)
+    grid = owners(filled, view, np.flatnonzero(how.kinds != REMOVED))
+    gone = owners(filled, view, np.flatnonzero(how.kinds == REMOVED))
+    fill(canvas, grid, how)
+    dotted, written = (np.zeros(canvas.chars.shape, dtype=bool) for _ in range(2))
+    if "removed" in shown.layers:
+        dotted = ghosts(canvas, gone, grid, how, palette.faint)
+    for points, color, dash in _lines(shown, palette):
+        canvas.dots(braille(points, view, dash), color)
+    marks = {
+        cell: (sign, ground)
+        for point, sign, ground in _marks(shown, palette)
+        if (cell := view.cell(*point)) is not None
+    }
+    cells = place_signs(grid, centers, how.signs, marks)
+    for index, (row, column) in cells.items():
+        text, tone = how.signs.texts[index], how.looks[how.tones[index]]
+        canvas.put((row, column), text, back=tone.fill)
+        written[row, column : column + len(text)] = True
+    for cell, (sign, ground) in marks.items():
+        canvas.put(cell, sign, readable(ground), ground)
+        written[cell] = True
+    still = Picture(view, how, canvas, grid, gone, dotted, written, cells)
+    if "names" in shown.layers:
+        _names(still, shown.place.prints, shown.failure or shown.start)
     return still
 
 
-def _who(shown: Shown) -> Kept:
-    """Which models are in the environment, and how they stand out."""
-    place, state, layers = shown.place, shown.snapshot.state, shown.layers
-    who, met = kept(state, shown.candidate), in_last(state) if "took part" in layers else None
-    if not who.elements:
-        who = Kept(place.elements, place.elements)
-    return replace(
-        who,
-        parts=who.parts if "partitions" in layers else {},
-        pinned=who.pinned if "pinned" in layers else frozenset(),
-        selected=shown.selection,
-        sensed=sensed_order(state) if "sensed" in layers else {},
-        shown=who.shown if met is None else frozenset(met.names(state.elements)),
-    )
+def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> None:
+    """Writes the names of kept models beside their signs: the nearest to the place `near` first, then the largest; none overlap."""
+    canvas, written, view = drawn.canvas, drawn.written, drawn.view
+    kept = np.flatnonzero(drawn.how.kinds != REMOVED).tolist()
+    away = {index: round(prints[index].distance(near), 1) if near else 0.0 for index in kept}
+    for index in sorted(kept, key=lambda index: (away[index], -prints[index].area)):
+        at = drawn.cells.get(index) or view.cell(*prints[index].center)
+        if at is None:
+            continue
+        text = shortened(plain(prints[index].name), NAME)
+        sign = len(drawn.how.signs.texts[index]) if index in drawn.cells else 0
+        begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
+        for down, right in begins:
+            row, column = at[0] + down, at[1] + right
+            if not (0 <= row < view.rows and 0 <= column <= view.columns - len(text)):
+                continue
+            # With a free cell on each side names stay apart.
+            if not written[row, max(0, column - (right != sign + 1)) : column + len(text) + 1].any():
+                canvas.put((row, column), text)
+                written[row, column : column + len(text)] = True
+                break
+
+
+def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
+    """The paths below the letters; the first one covers the second one."""
+    layers, snapshot = shown.layers, shown.snapshot
+    if shown.ways:
+        both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
+        return [(way.points, color, dash) for way, color, dash in both][::-1]
+    lines = [(_path(snapshot.evidence), palette.path, 0)] if "path" in layers else []
+    if "original" in layers and not shown.same_paths:
+        lines.insert(0, (_path(snapshot.original), palette.original, DASH))
+    return lines
 
 
 def _path(rows: array[float] | None) -> np.ndarray:
@@ -139,9 +240,37 @@ def _path(rows: array[float] | None) -> np.ndarray:
     return np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
 
 
-def _marks(shown: Shown, palette: Palette) -> Iterator[Mark]:
+def _marks(shown: Shown, palette: Palette) -> Iterator[tuple[Point, str, int]]:
+    """Letters at places, m, with their own backgrounds, so that they are easy to find."""
     places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal)]
     if "failure" in shown.layers:
         places.append((shown.failure, "×", palette.failure))
     places.append((shown.parting, PARTING, palette.live))
-    return (Mark(point, sign, ground) for point, sign, ground in places if point and np.isfinite(point).all())
+    return ((point, sign, ground) for point, sign, ground in places if point and np.isfinite(point).all())
+
+
+def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
+    """Marks a cell by four arms; a letter in it stays readable."""
+    rows, columns = canvas.chars.shape
+    row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
+    for (down, right), sign in ARMS:
+        place = row + down, column + right
+        if 0 <= place[0] < rows and 0 <= place[1] < columns:
+            canvas.put(place, sign)
+    sign = chr(canvas.chars[row, column]) if written[row, column] else "┼"
+    canvas.put((row, column), sign, readable(palette.live), palette.live)
+
+
+def strip(canvas: Canvas, row: int) -> Strip:
+    """One row of `canvas`."""
+    segments = [Segment(run.text, _style(run.fore, run.back, run.bold)) for run in canvas.runs(row)]
+    return Strip(segments, canvas.chars.shape[1])
+
+
+@lru_cache(maxsize=4096)
+def _style(fore: int, back: int, bold: bool) -> Style:
+    return Style(color=_color(fore), bgcolor=_color(back), bold=bold)
+
+
+def _color(value: int) -> Color:
+    return Color.default() if value < 0 else Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)

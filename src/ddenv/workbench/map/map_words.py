@@ -73,7 +73,6 @@ def legend(shown: Shown, width: int) -> Text:
 
 
 def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
-    """The signs of a map of finished tests."""
     for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
         yield sign, way.name
     if shown.parting is not None:
@@ -119,7 +118,6 @@ def _size(each: Footprint) -> str:
 
 
 def _standing(state: RunState, name: str) -> str:
-    """Whether a model is kept, and in which part."""
     if not state.elements:
         return ""
     if name in state.pinned:
@@ -134,12 +132,11 @@ def _standing(state: RunState, name: str) -> str:
 
 
 class MapLines(Widget):
-    """One line on what is shown, and one of signs; drawn again only after changes."""
+    """One line on what is shown, and one of signs."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._legend: Callable[[int], Text] | None = None
-        self._made_of: tuple[int, tuple[str, int] | None, Names, str] = (0, None, (), "")
+        self._shown: tuple[int, Candidate | Trial | None, Names, Callable[[int], Text]] | None = None
 
     def show(
         self, selected: int, shown: Candidate | Trial | None, fallen: Names, legend: Callable[[int], Text]
@@ -148,26 +145,23 @@ class MapLines(Widget):
 
         `fallen` would drop without the selected ones, or without those that are not shown.
         """
-        facts = (selected, None if shown is None else (shown.label, shown.size), fallen, legend(200).plain)
-        if facts != self._made_of:
-            self._made_of, self._legend = facts, legend
-            self.refresh()
+        self._shown = selected, shown, fallen, legend
+        self.refresh()
 
     def render(self) -> Text:
-        if self._legend is None:
+        if self._shown is None:
             return Text()
         width = self.size.width
-        selected, shown, fallen, _ = self._made_of
+        selected, shown, fallen, legend = self._shown
         text, drop = Text(no_wrap=True), dropping(fallen, LONGEST_DROPPED if width > 44 else SHORT_DROPPED)
         if selected:
             text.append(f"{selected} selected", "bold")
             text.append(": p pin, w try without, o try only" if width > 44 else ": p, w or o", "dim")
             text.append(f"  w {drop}" if drop else "", "bold")
         elif shown is not None:
-            label, size = shown
             # Where there is little room, the table has the number.
-            words = [count(size, "model")] if width > 44 or not drop else []
-            text.append(f"{label}: {', '.join([*words, drop] if drop else words)}", "bold")
+            words = [count(shown.size, "model")] if width > 44 or not drop else []
+            text.append(f"{shown.label}: {', '.join([*words, drop] if drop else words)}", "bold")
             text.append("  others in small letters" if width > 44 and not drop else "", "dim")
         text.truncate(width, overflow="ellipsis")
-        return text.append("\n").append_text(self._legend(width))
+        return text.append("\n").append_text(legend(width))

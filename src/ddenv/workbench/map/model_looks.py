@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ddenv.evidence.took_part import in_last
 from ddenv.map.cells import Signs
 from ddenv.map.colors import HUES
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY
-from ddenv.runfile.state import Candidate, RunState, Trial, partition_letter
+from ddenv.runfile.state import partition_letter
 from ddenv.runfile.supports import drops
 from ddenv.words.signs import DROPS
 from ddenv.workbench.map.map_colors import (
@@ -30,6 +31,8 @@ from ddenv.workbench.map.map_colors import (
     Palette,
     Tone,
 )
+from ddenv.workbench.map.map_words import sensed_order
+from ddenv.workbench.map.place import Shown
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -49,11 +52,6 @@ class Looks:
     palette: Palette
     signs: Signs
 
-    @property
-    def labels(self) -> Sequence[str]:
-        """The sign on each model, "" for none."""
-        return self.signs.texts
-
 
 @dataclass(frozen=True, slots=True)
 class Kept:
@@ -72,13 +70,22 @@ class Kept:
     sensed: dict[str, int] = field(default_factory=dict)
 
 
-def kept(state: RunState, candidate: Candidate | Trial | None) -> Kept:
-    """What the map needs of a run's state; the models of `candidate` stand out."""
-    partitions = state.round.partitions if state.round else ()
-    parts = {name: index for index, part in enumerate(partitions) for name in part}
-    shown = frozenset(candidate.models) if candidate else None
-    fallen = frozenset(drops(state, candidate)) if candidate else frozenset()
-    return Kept(frozenset(state.elements), frozenset(state.environment), shown, fallen, parts, state.pinned)
+def kept(shown: Shown) -> Kept:
+    """What the map needs of a run's state, and how models stand out in the layers that are shown."""
+    state, layers, candidate, place = shown.snapshot.state, shown.layers, shown.candidate, shown.place
+    partitions = state.round.partitions if state.round and "partitions" in layers else ()
+    met = in_last(state) if "took part" in layers else None
+    standing = frozenset(candidate.models) if candidate else None
+    return Kept(
+        frozenset(state.elements) or place.elements,
+        frozenset(state.environment) if state.elements else place.elements,
+        standing if met is None else frozenset(met.names(state.elements)),
+        frozenset(drops(state, candidate)) if candidate else frozenset(),
+        {name: index for index, part in enumerate(partitions) for name in part},
+        state.pinned if "pinned" in layers else frozenset(),
+        shown.selection,
+        sensed_order(state) if "sensed" in layers else {},
+    )
 
 
 def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:

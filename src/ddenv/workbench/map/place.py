@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ddenv.errors import UserError
+from ddenv.runfile.snapshot import Snapshot
+from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.observed import Busy, Observed
-from ddenv.workbench.shared.poll import Snapshot
 
 if TYPE_CHECKING:
     import numpy as np
+    from textual.screen import Screen
 
     from ddenv.map.footprints import Footprint
     from ddenv.runfile.state import Candidate, Trial
@@ -149,3 +152,16 @@ def place_of_run(path: Path) -> Place:
             if time.monotonic() > until:
                 raise
             time.sleep(0.1)
+
+
+def read_world(screen: Screen[Any], run: Path, show: Callable[[Place, str], None]) -> None:
+    """Calls `show` with the place, and with what is wrong with it, once it is read in a thread. The first paint comes before."""
+
+    def read() -> None:
+        try:
+            place, notice = place_of_run(run), ""
+        except UserError as error:
+            place, notice = Place(), str(error)
+        call_if_open(screen, show, place, notice)
+
+    screen.call_after_refresh(screen.run_worker, read, thread=True, group="world", exclusive=True)

@@ -14,15 +14,16 @@ from textual import events
 from textual.binding import Binding
 from textual.geometry import Region
 from textual.message import Message
+from textual.reactive import var
 from textual.strip import Strip
 from textual.widget import Widget
 
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_words import describe, legend
 from ddenv.workbench.map.place import Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
-from ddenv.workbench.shared.poll import Snapshot
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
@@ -31,8 +32,7 @@ if TYPE_CHECKING:
     from ddenv.map.paint import Canvas
     from ddenv.map.raster import View
     from ddenv.runfile.state import Candidate, Trial
-    from ddenv.workbench.map.map_drawing import MapDrawing
-    from ddenv.workbench.map.picture import Picture
+    from ddenv.workbench.map.map_drawing import MapDrawing, Picture
 
 # One step of the wheel zooms by this factor.
 WHEEL = 1.25
@@ -41,6 +41,8 @@ WHEEL = 1.25
 class WorldMap(Widget, can_focus=True):
     """Top-down map. It takes a `Place`, then snapshots. While `picking`, enter and clicks choose places, not models."""
 
+    # Whether enter and clicks choose places.
+    picking = var(False)
     HELP = "click: select or unselect a model   wheel: zoom   drag: move the map"
     BINDINGS: ClassVar = [
         Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
@@ -87,7 +89,6 @@ class WorldMap(Widget, can_focus=True):
         self._canvas: Canvas | None = None
         self._strips: dict[int, Strip] = {}
         self._due = False
-        self._picking = False
         # What the map showed before it marked a model.
         self._unmarked: Viewport | None = None
         # Where the mouse button went down on the map, and whether the mouse has moved since.
@@ -129,20 +130,13 @@ class WorldMap(Widget, can_focus=True):
     def shown_layers(self) -> frozenset[str]:
         return self.shown.layers
 
-    @property
-    def picking(self) -> bool:
-        """Whether enter and clicks choose places."""
-        return self._picking
-
-    @picking.setter
-    def picking(self, picking: bool) -> None:
-        self._picking = picking
+    def watch_picking(self) -> None:
         self.draw()
 
     @property
     def aims(self) -> bool:
         """Whether the crosshair is shown."""
-        return self.has_focus or self._picking or self._unmarked is not None
+        return self.has_focus or self.picking or self._unmarked is not None
 
     def set_place(self, place: Place, notice: str = "") -> None:
         """Shows another world, or `notice` if there is none."""
@@ -256,7 +250,7 @@ class WorldMap(Widget, can_focus=True):
     def action_pick(self) -> None:
         """While picking, chooses the place under the crosshair; otherwise selects its model."""
         name, state, port = self.model_at_cursor, self.snapshot.state, self.viewport
-        if self._picking and port.view is not None:
+        if self.picking and port.view is not None:
             self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
         elif name is None or not state.elements or self.shown.ways:
             return
@@ -287,7 +281,6 @@ class WorldMap(Widget, can_focus=True):
 
     @property
     def _has_world(self) -> bool:
-        """Whether there is something to draw."""
         return not self.notice or bool(self.place.prints)
 
     def on_resize(self) -> None:
@@ -393,7 +386,7 @@ class WorldMap(Widget, can_focus=True):
         if self._canvas is None or y >= self._canvas.chars.shape[0]:
             return Strip.blank(width, self.rich_style)
         if y not in self._strips:
-            from ddenv.workbench.map.picture import strip
+            from ddenv.workbench.map.map_drawing import strip
 
             self._strips[y] = strip(self._canvas, y)
         return self._strips[y]
@@ -410,7 +403,7 @@ class WorldMap(Widget, can_focus=True):
             self._subtitle_shown = self.parent.border_subtitle = subtitle
 
     def _subtitle(self, model: str | None, view: View) -> Text:
-        if self._picking:
+        if self.picking:
             x, y = view.point(self.viewport.cursor)
             return Text(f"x {x:.2f}, y {y:.2f} m")
         if model is not None:

@@ -29,8 +29,7 @@ from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
-from ddenv.workbench.map.place import MovedPrints, Place, Point
-from ddenv.workbench.map.read_world import read_world
+from ddenv.workbench.map.place import MovedPrints, Place, Point, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
@@ -53,8 +52,8 @@ NUMBER, WORDS, SEED, OUTCOME = 7, 36, 12, 16
 class Playing:
     """At simulated `time`, s, of `length`; it runs at `speed` while `on`."""
 
-    def __init__(self, length: float) -> None:
-        self.length, self.time, self.speed, self.on = length, 0.0, USUAL, False
+    def __init__(self, length: float, speed: float = USUAL) -> None:
+        self.length, self.time, self.speed, self.on = length, 0.0, speed, False
 
     @property
     def at_end(self) -> bool:
@@ -129,7 +128,7 @@ class Playback(Screen[None]):
         ("fit", "0", "fit", "fit", "map: show all that matters"),
         ("signs", "k", "signs", "signs", "what the signs and letters on the map mean"),
         HELP,
-        ("close", "escape,q", "close", "close", "back to where it was opened", "esc"),
+        ("close", "escape,q", "dismiss", "close", "back to where it was opened", "esc"),
     )
 
     def __init__(self, file: RunFile, position: Position, place: Place, test: int, beside: int | None = None) -> None:
@@ -137,9 +136,7 @@ class Playback(Screen[None]):
         super().__init__()
         self._file, self._position, self._place = file, position, place
         self._tests: tuple[Played, ...] = ()
-        self._ways: tuple[RobotWay, ...] = ()
         self._apart: tuple[str, str] | None = None
-        self._legend = Text()
         self._parting: tuple[float, Point] | None = None
         self.playing = Playing(0.0)
         self._ticked = now()
@@ -181,15 +178,13 @@ class Playback(Screen[None]):
     def _take(self, numbers: Sequence[int]) -> None:
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
-        self._tests = tests
+        self._tests, self._parting = tests, None
         self._ways = tuple(RobotWay(one, f"test {one.test.id}" if len(tests) == 2 else "its way") for one in tests)
         self._prints = MovedPrints(self._place)
-        self._parting = None
         if len(tests) == 2 and all(one.rows for one in tests):
             _, at, place = parted(tests[0].rows, tests[1].rows)
-            self._parting = None if at is None or place is None else (at, place)
-        speed, self.playing = self.playing.speed, Playing(max(one.length for one in tests))
-        self.playing.speed = speed
+            self._parting = (at, place) if at is not None and place is not None else None
+        self.playing = Playing(max(one.length for one in tests), self.playing.speed)
 
     def _change(self, numbers: Sequence[int]) -> None:
         at = self.playing.time
@@ -202,7 +197,6 @@ class Playback(Screen[None]):
         self._put()
 
     def _put(self) -> None:
-        """Shows the tests."""
         first, state = self._tests[0], self._position.end
         there = [one.models if one.models is not None else state.environment for one in self._tests]
         differ, either = frozenset(there[0]) ^ frozenset(there[-1]), frozenset(there[0]) | frozenset(there[-1])
@@ -238,10 +232,9 @@ class Playback(Screen[None]):
         playing, at = self.playing, self.playing.time
         moving = self._tests[0].moving
         prints = self._prints.at({name: pose_at(samples, at) for name, samples in moving.items()})
-        place = None if self._parting is None else self._parting[1]
+        parting, place = self._parting or (None, None)
         self.map.show_ways(tuple(way.at(at) for way in self._ways), place, self._apart, prints)
         tests = tuple(one.test for one in self._tests)
-        parting = None if self._parting is None else self._parting[0]
         lengths = tuple(one.length for one in self._tests)
         self.query_one(Timeline).show(Instant(at, playing.length, tests, lengths, parting))
         self.query_one(Met).show(at)
@@ -249,7 +242,6 @@ class Playback(Screen[None]):
         self._show_legend()
 
     def _words(self) -> str:
-        """The instant in words."""
         playing = self.playing
         if not playing.length:
             return "no way is stored"
@@ -261,10 +253,7 @@ class Playback(Screen[None]):
 
     def _show_legend(self) -> None:
         legend = self.query_one("#playback-legend", Static)
-        words = self.map.legend(legend.size.width)
-        if words != self._legend:
-            self._legend = words
-            legend.update(words)
+        legend.update(self.map.legend(legend.size.width), layout=False)
 
     def on_timeline_moved(self, event: Timeline.Moved) -> None:
         self._go(event.seconds)
@@ -338,9 +327,6 @@ class Playback(Screen[None]):
 
     def action_signs(self) -> None:
         self.app.push_screen(SignsDialog())
-
-    def action_close(self) -> None:
-        self.dismiss(None)
 
     def _refuse(self, why: str) -> None:
         self.notify(plain(why), severity="warning", timeout=4, markup=False)

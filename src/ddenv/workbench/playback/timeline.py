@@ -70,7 +70,6 @@ class Timeline(Widget):
 
     @property
     def _room(self) -> int:
-        """How many cells the slider has."""
         return max(2, self.size.width - SIGN - self._words - 1)
 
     def _cell(self, time: float) -> int:

@@ -67,7 +67,7 @@ class Opening:
 
     def history(self) -> None:
         """Shows the tree of reductions, to go back to one of them."""
-        from ddenv.workbench.history.history_screen import History
+        from ddenv.workbench.history import History
 
         def chosen(node: int | None) -> None:
             if node is not None:
@@ -155,7 +155,7 @@ class Opening:
 
     def export(self) -> None:
         """Asks what to export."""
-        from ddenv.workbench.export.export_dialog import ExportScreen
+        from ddenv.workbench.export import ExportScreen
 
         self._screen.app.push_screen(ExportScreen(self._poll.path))
 

@@ -101,7 +101,7 @@ class RunsScreen(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (20, "-low"), (30, "-tall")]
     BINDINGS: ClassVar = keys(
         "runs",
-        ("watch", "w", "watch", "watch", "watch it without changing anything"),
+        ("watch", "w", "open(True)", "watch", "watch it without changing anything"),
         ("like", "n", "copy", "new like it", "a new run with its scenario and other settings"),
         ("filter", "slash", "filter", "filter", "filter by name, scenario, method or state"),
         ("sort", "s", "sort", "sort", "sort by the next column; a click on a column does so, too"),
@@ -164,7 +164,6 @@ class RunsScreen(Screen[None]):
             self.set_timer(0.05, self._look)
 
     def _list(self) -> None:
-        """Shows the runs that pass the filter."""
         part = self.query_one("#filter", Input).value
         shown = sorted(named(self._runs, part), key=ORDERS[self._order])
         table = self.query_one(RunTable)
@@ -206,13 +205,10 @@ class RunsScreen(Screen[None]):
     # Actions on a run.
 
     @on(DataTable.RowSelected)
-    def _open(self) -> None:
-        self._go_to(watch=False)
+    def _selected(self) -> None:
+        self.action_open(watch=False)
 
-    def action_watch(self) -> None:
-        self._go_to(watch=True)
-
-    def _go_to(self, watch: bool) -> None:
+    def action_open(self, watch: bool) -> None:
         if (run := self._readable()) is not None:
             self.post_message(ShowRun(run.path, watch))
 

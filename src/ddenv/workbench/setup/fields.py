@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
@@ -77,12 +78,12 @@ class SchemaSelect(Select[str]):
         Binding("pageup", "screen.scroll(-1)", "back", id="schema.back", tooltip="scroll it back", show=False),
     ]
 
+    @dataclass
     class Looked(Message):
-        """The explained name changed: the chosen one, or in the open list the highlighted one."""
+        """In the open list another name is highlighted."""
 
-        def __init__(self, kind: Kind, name: str) -> None:
-            super().__init__()
-            self.kind, self.name = kind, name
+        kind: Kind
+        name: str
 
     def __init__(self, kind: Kind, tooltip: str) -> None:
         super().__init__([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
@@ -96,16 +97,9 @@ class SchemaSelect(Select[str]):
     def on_mount(self) -> None:
         self.watch(self.query_one(OptionList), "highlighted", self._highlighted, init=False)
 
-    def on_focus(self) -> None:
-        self.post_message(self.Looked(self.kind, self.chosen))
-
     def _highlighted(self, index: int | None) -> None:
         if self.expanded and index is not None:
             self.post_message(self.Looked(self.kind, names(self.kind)[index]))
-
-    @on(Select.Changed)
-    def _changed(self) -> None:
-        self.post_message(self.Looked(self.kind, self.chosen))
 
 
 class Explained(VerticalScroll):
@@ -131,12 +125,11 @@ class Explained(VerticalScroll):
 class OptionsForm(Vertical):
     """Fields by the ids of `ddenv.workbench.setup.form`, the method, the cost, the equivalent command, and Start."""
 
+    @dataclass
     class Edited(Message):
         """A setting changed; `place` says that spawn or goal did."""
 
-        def __init__(self, place: bool = False) -> None:
-            super().__init__()
-            self.place = place
+        place: bool = False
 
         def can_replace(self, message: Message) -> bool:
             return isinstance(message, OptionsForm.Edited) and self.place >= message.place
@@ -197,7 +190,6 @@ class OptionsForm(Vertical):
         return self._unopened | {id: str(field.value) for id, field in self._fields()}
 
     def _fields(self) -> Iterator[tuple[str, Input | Select[str]]]:
-        """The fields that are there, by id."""
         for field in self.query("Input, Select"):
             if isinstance(field, Input | Select) and field.id in FIELDS:
                 yield field.id, field
@@ -369,6 +361,8 @@ class OptionsForm(Vertical):
     def _picked(self, event: Select.Changed) -> None:
         event.stop()
         self._dim()
+        if isinstance(event.select, SchemaSelect):
+            self._explain(event.select)
         self._edited(event.select)
 
     def _edited(self, widget: Widget) -> None:
@@ -380,7 +374,6 @@ class OptionsForm(Vertical):
 
 
 def _widgets(fields: tuple[Field, ...], texts: Mapping[str, str] = {}) -> Iterator[Widget]:
-    """A label and a field for each, with its text."""
     for field in fields:
         yield Label(field.label, markup=False)
         if field.choices:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -50,12 +51,11 @@ def _listed() -> list[Path]:
 class FileList(OptionList):
     """Scenarios by their names, worlds by their files' names; a run gives its own scenario and world."""
 
+    @dataclass
     class Looked(Message):
         """The cursor is on this file."""
 
-        def __init__(self, path: Path) -> None:
-            super().__init__()
-            self.path = path
+        path: Path
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)

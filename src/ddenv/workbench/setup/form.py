@@ -47,41 +47,25 @@ def _shown(where: Shown) -> tuple[Field, ...]:
 
 JOBS_FIELD = _field(JOBS)
 BASIC = (*_shown("basic"), JOBS_FIELD)
-PLACES = (
-    Field("spawn_x", "spawn x m", float, "robot.spawn.x", meaning="Where the robot starts, m."),
-    Field("spawn_y", "spawn y m", float, "robot.spawn.y", meaning="Where the robot starts, m."),
-    Field(
-        "spawn_z",
-        "spawn z m",
-        float,
-        "robot.spawn.z",
-        meaning="Height of the robot's frame at the start, m. A place picked on the map fills it in.",
-    ),
-    Field(
-        "spawn_yaw",
-        "yaw rad",
-        float,
-        "robot.spawn.yaw",
-        meaning="Heading at the start, rad, counterclockwise from x.",
-        most=TURNS,
-    ),
-    Field("goal_x", "goal x m", float, "goal.x", meaning="Where the robot has to go, m."),
-    Field("goal_y", "goal y m", float, "goal.y", meaning="Where the robot has to go, m."),
+START, TARGET = "Where the robot starts, m.", "Where the robot has to go, m."
+HEIGHT = "Height of the robot's frame at the start, m. A place picked on the map fills it in."
+HEADING = "Heading at the start, rad, counterclockwise from x."
+SPAWN = (
+    Field("spawn_x", "spawn x m", float, "robot.spawn.x", meaning=START),
+    Field("spawn_y", "spawn y m", float, "robot.spawn.y", meaning=START),
+    Field("spawn_z", "spawn z m", float, "robot.spawn.z", meaning=HEIGHT),
+    Field("spawn_yaw", "yaw rad", float, "robot.spawn.yaw", meaning=HEADING, most=TURNS),
 )
+GOAL = (
+    Field("goal_x", "goal x m", float, "goal.x", meaning=TARGET),
+    Field("goal_y", "goal y m", float, "goal.y", meaning=TARGET),
+)
+PLACES = (*SPAWN, *GOAL)
 ADVANCED = _shown("more")
-NAME = Field(
-    "name",
-    "run name",
-    str,
-    meaning="The name of the run: a file in the runs folder, or a path that ends in .ddenv.",
-)
-ACCEPT = Field(
-    "accept",
-    "accept",
-    str,
-    choices=("automatic", "ask"),
-    meaning="Whether each reduction is taken at once (automatic), or waits for you to accept or reject it (ask).",
-)
+NAMED = "The name of the run: a file in the runs folder, or a path that ends in .ddenv."
+NAME = Field("name", "run name", str, meaning=NAMED)
+ACCEPTED = "Whether each reduction is taken at once (automatic), or waits for you to accept or reject it (ask)."
+ACCEPT = Field("accept", "accept", str, choices=("automatic", "ask"), meaning=ACCEPTED)
 ALL = (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)
 
 
@@ -115,9 +99,7 @@ def value(field: Field, text: str) -> Value:
 def _wanted(field: Field) -> str:
     """What an empty field asks for."""
     if field in PLACES:
-        return (
-            "press s for the start, on the map" if field.id.startswith("spawn") else "press g for the goal, on the map"
-        )
+        return f"press {'s for the start' if field in SPAWN else 'g for the goal'}, on the map"
     return f"type {field.setting.range}" if field.setting is not None and field.setting.range else "type one"
 
 
@@ -194,21 +176,10 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
     return validate(data, "options")
 
 
-def spawn(texts: Mapping[str, str]) -> tuple[float, float, float, float] | None:
-    """x, y, z, m, and yaw, rad, of the start; None while one of them is not a number."""
-    found = _numbers(PLACES[:4], texts)
-    return (found[0], found[1], found[2], found[3]) if found else None
-
-
-def goal(texts: Mapping[str, str]) -> tuple[float, float] | None:
-    """x and y of the goal, m; None while one of them is not a number."""
-    found = _numbers(PLACES[4:], texts)
-    return (found[0], found[1]) if found else None
-
-
-def _numbers(fields: tuple[Field, ...], texts: Mapping[str, str]) -> list[float] | None:
+def numbers(fields: tuple[Field, ...], texts: Mapping[str, str]) -> tuple[float, ...] | None:
+    """The numbers of `SPAWN` or `GOAL`; None while one of them is wrong or missing."""
     try:
-        return [float(number) for number in values(fields, texts).values() if number is not None]
+        return tuple(float(number) for number in values(fields, texts).values() if number is not None)
     except FieldError:
         return None
 
@@ -228,4 +199,4 @@ def field_of(error: UserError) -> str | None:
 
 def together(id: str) -> tuple[str, ...]:
     """The fields whose errors a change of one field may correct: the robot stands where all numbers of the spawn say."""
-    return tuple(field.id for field in PLACES if field.id.startswith("spawn")) if id.startswith("spawn") else (id,)
+    return tuple(field.id for field in SPAWN) if id.startswith("spawn") else (id,)

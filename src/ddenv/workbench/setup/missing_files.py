@@ -23,6 +23,7 @@ from textual.widgets.option_list import Option
 from ddenv.errors import UserError
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import count, plain
+from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.path_entry import PathEntry
 
@@ -150,25 +151,21 @@ def _on_the_map(uri: str, world: World) -> str:
     return by.removeprefix("a guess, ").removeprefix("the stand-in ")
 
 
-def _key(key: str, action: str, words: str, tooltip: str) -> Binding:
-    return Binding(key, action, words, id=f"missing.{'choose' if key == 'enter' else words}", tooltip=tooltip)
-
-
 class MissingList(OptionList):
     """A row for each missing file; hidden while there is none."""
 
-    BINDINGS: ClassVar = [
-        _key("enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
-        _key("a", "guess", "guess", "take the guessed shape wherever nothing is chosen, or else for this one"),
-        _key("w", "without", "without", "leave this one out"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "missing",
+        ("choose", "enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
+        ("guess", "a", "guess", "guess", "take the guessed shape wherever nothing is chosen, or else for this one"),
+        ("without", "w", "without", "without", "leave this one out"),
+    )
 
+    @dataclass
     class Chosen(Message):
         """The user chose remedies, by URI; "" takes one back."""
 
-        def __init__(self, remedies: dict[str, str]) -> None:
-            super().__init__()
-            self.remedies = remedies
+        remedies: dict[str, str]
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)

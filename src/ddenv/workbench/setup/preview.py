@@ -159,14 +159,14 @@ class Preview(Vertical):
     # Start and goal.
 
     @property
-    def spawn(self) -> tuple[float, float, float, float] | None:
-        """The form's start, see `form.spawn`."""
-        return form.spawn(self._form.texts)
+    def spawn(self) -> tuple[float, ...] | None:
+        """The form's start: x, y, z, m, and yaw, rad."""
+        return form.numbers(form.SPAWN, self._form.texts)
 
     @property
-    def goal(self) -> tuple[float, float] | None:
-        """The form's goal."""
-        return form.goal(self._form.texts)
+    def goal(self) -> tuple[float, ...] | None:
+        """The form's goal: x, y, m."""
+        return form.numbers(form.GOAL, self._form.texts)
 
     @property
     def asks(self) -> bool:
@@ -176,8 +176,9 @@ class Preview(Vertical):
     def show_places(self) -> None:
         """Shows the form's start and goal, on the map and in words, and what is wrong with the start."""
         if self.choice is not None:
-            spawn = self.spawn
-            self.map.set_marks(spawn and (spawn[0], spawn[1], spawn[3]), self.goal)
+            spawn, goal = self.spawn, self.goal
+            start = (spawn[0], spawn[1], spawn[3]) if spawn else None
+            self.map.set_marks(start, (goal[0], goal[1]) if goal else None)
             self._show_picking()
             self._look_at_start(self.choice, spawn)
 
@@ -347,7 +348,6 @@ def _point(place: tuple[float, ...] | None) -> str:
 
 
 def _free_name(scenario_name: str) -> str:
-    """The name that the next run of a scenario gets."""
     from ddenv.runs.folder import free_run_path
 
     try:

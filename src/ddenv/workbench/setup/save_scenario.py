@@ -26,22 +26,17 @@ SUFFIXES = (".yaml", ".yml")
 
 def scenario_path(text: str) -> Path:
     """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid name."""
+    from ddenv.world.access import is_folder, without_tilde
+
     text = text.strip()
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
-    path = Path(text)
-    try:
-        path = path.expanduser()
-    except RuntimeError:
-        raise UserError(f"{path}: unknown user") from None
+    path = without_tilde(text)
     path = path if path.suffix.lower() in SUFFIXES else path.with_name(f"{path.name}.yaml")
-    try:
-        if path.is_dir():
-            raise UserError(f"{path}: is a folder; give the name of a file")
-        if not path.parent.is_dir():
-            raise UserError(f"{path}: there is no folder {path.parent}")
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
+    if is_folder(path):
+        raise UserError(f"{path}: is a folder; give the name of a file")
+    if not is_folder(path.parent):
+        raise UserError(f"{path}: there is no folder {path.parent}")
     return path
 
 
@@ -50,6 +45,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
 
     Files in the folder of `path` are named relative to it, so that the folder can be moved.
     """
+    from ddenv.runs.export import keys_in
     from ddenv.runs.trust import scenario_text
     from ddenv.world.access import write_file
 
@@ -58,28 +54,13 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
             raise UserError(
                 f"{each}: no longer exists, so a scenario cannot refer to it; 'ddenv export' writes the world of a run"
             )
-    data = scenario.model_dump(mode="json")
-    folder = path.resolve().parent
-    data["world"], data["robot"]["model"] = _name(scenario.world, folder), _name(scenario.robot.model, folder)
-    data["reading"]["model_path"] = [_name(each, folder) for each in scenario.reading.model_path]
-    # This folder is only searched for the user's own programs.
-    if scenario.oracle is None and ":" not in scenario.controller.use:
-        del data["folder"]
-    else:
-        data["folder"] = _name(scenario.folder, folder)
-    write_file(path, scenario_text(data, scenario))
-
-
-def _name(path: Path, folder: Path) -> str:
-    """`path` as written in a scenario in `folder`: relative if it is inside that folder."""
-    path = path.resolve()
-    return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
+    write_file(path, scenario_text(keys_in(path.resolve().parent, scenario), scenario))
 
 
 class SaveScenario(ModalScreen[Path | None]):
     """Returns the file that was written, or None. An existing file is only replaced after a second enter."""
 
-    BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="save.cancel", tooltip="write nothing")]
+    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="save.cancel", tooltip="write nothing")]
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__()
@@ -99,12 +80,14 @@ class SaveScenario(ModalScreen[Path | None]):
 
     @on(Input.Submitted)
     def _submitted(self, event: Input.Submitted) -> None:
+        from ddenv.world.access import is_file
+
         try:
             path = scenario_path(event.value)
         except UserError as error:
             self._show_error(str(error))
             return
-        if path.exists() and path != self._replace:
+        if is_file(path) and path != self._replace:
             self._replace = path
             self._show_error(f"{path} exists already: enter again replaces it, or type another name")
             return
@@ -121,9 +104,6 @@ class SaveScenario(ModalScreen[Path | None]):
 
     def _show_error(self, words: str) -> None:
         self.query_one("#wrong", Static).update(Text(plain(words)))
-
-    def action_cancel(self) -> None:
-        self.dismiss(None)
 
 
 def _suggested(name: str) -> str:

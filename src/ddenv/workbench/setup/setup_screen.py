@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
 from textual import events, on, work
 from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.reactive import Reactive
 from textual.screen import Screen
@@ -19,6 +20,7 @@ from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
+from ddenv.workbench.help.bindings import ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
@@ -28,10 +30,12 @@ from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
 from ddenv.workbench.setup.files import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
-from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, Saved, ask_trust, command_words, create, run_file
+from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.messages import ShowRun
+from ddenv.workbench.shared.processes import Engine
 from ddenv.workbench.widgets.panes import Panes
+from ddenv.workbench.widgets.question import once_trusted
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -42,49 +46,13 @@ ROOMY = (110, 32)
 # From this size on the rarely used settings are shown, too.
 VAST = (160, 48)
 PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
+BASELINE = "start, and pause after the baseline: it shows how often the whole world fails"
 # Where the focus goes in each pane.
 HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
-def _key(keys: str, action: str, id: str, tooltip: str, words: str = "", display: str | None = None) -> Binding:
-    """A key of this screen; one with `display` is in the footer."""
-    shown = display is not None
-    return Binding(
-        keys, action, words or id, id=f"setup.{id}", tooltip=tooltip, show=shown, key_display=display or None
-    )
-
-
-KEYS: list[Binding] = [
-    _key("ctrl+s,f5", "start", "start", "start the reduction", display="^s"),
-    _key(
-        "f6,ctrl+b",
-        "baseline",
-        "baseline",
-        "start, and pause after the baseline: it shows how often the whole world fails",
-        display="f6",
-    ),
-    _key("f7,ctrl+g", "save", "save", "save as a scenario file", display="f7"),
-    _key("f8,ctrl+y", "copy", "copy", "copy the ddenv run command that does the same", display="f8"),
-    _key("f9", "more", "more", "show or hide the rarely used settings"),
-    _key("ctrl+o", "open", "open", "choose a scenario or world file", display=""),
-    _key("s", "pick('start')", "pick_start", "set the start on the map", "start"),
-    _key("h", "pick('heading')", "pick_heading", "set the heading on the map", "heading"),
-    _key("g", "pick('goal')", "pick_goal", "set the goal on the map", "goal"),
-    _key("m", "missing", "missing", "to the missing files and their remedies"),
-    _key("plus,equals_sign", "zoom(1.25)", "closer", "map: closer"),
-    _key("minus", "zoom(0.8)", "farther", "map: farther away"),
-    _key("0", "fit", "fit", "map: show all of it"),
-    _key("f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
-    _key("f3", "pane('map')", "map", "to the map"),
-    _key("f4", "pane('settings')", "settings", "to the settings"),
-    _key("R", "app.runs", "runs", "the list of all runs"),
-    _key("L", "app.lessons", "lessons", "lessons on delta debugging"),
-    _key("f1,question_mark", "app.help", "help", "show every key", display="?"),
-    _key("escape", "home", "home", "stop picking; back to the list of files", "back"),
-    _key("q", "app.leave", "quit", "leave", display=""),
-]
 # In the footer.
-SHOWN = tuple(each.id or "" for each in KEYS if each.show)
+SHOWN = ids("setup", "start baseline save copy open help quit")
 
 
 class SetupScreen(Screen[None]):
@@ -102,7 +70,30 @@ class SetupScreen(Screen[None]):
         (VAST[0], "-vast"),
     ]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
-    BINDINGS: ClassVar[list[BindingType]] = [*KEYS]
+    BINDINGS: ClassVar = keys(
+        "setup",
+        ("start", "ctrl+s,f5", "start", "start", "start the reduction", "^s"),
+        ("baseline", "f6,ctrl+b", "baseline", "baseline", BASELINE, "f6"),
+        ("save", "f7,ctrl+g", "save", "save", "save as a scenario file", "f7"),
+        ("copy", "f8,ctrl+y", "copy", "copy", "copy the ddenv run command that does the same", "f8"),
+        ("more", "f9", "more", "more", "show or hide the rarely used settings"),
+        ("open", "ctrl+o", "open", "open", "choose a scenario or world file"),
+        ("pick_start", "s", "pick('start')", "start", "set the start on the map"),
+        ("pick_heading", "h", "pick('heading')", "heading", "set the heading on the map"),
+        ("pick_goal", "g", "pick('goal')", "goal", "set the goal on the map"),
+        ("missing", "m", "missing", "missing", "to the missing files and their remedies"),
+        ("closer", "plus,equals_sign", "zoom(1.25)", "closer", "map: closer"),
+        ("farther", "minus", "zoom(0.8)", "farther", "map: farther away"),
+        ("fit", "0", "fit", "fit", "map: show all of it"),
+        ("choose", "f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
+        ("map", "f3", "pane('map')", "map", "to the map"),
+        ("settings", "f4", "pane('settings')", "settings", "to the settings"),
+        ("runs", "R", "app.runs", "runs", "the list of all runs"),
+        ("lessons", "L", "app.lessons", "lessons", "lessons on delta debugging"),
+        ("help", "f1,question_mark", "app.help", "help", "show every key", "?"),
+        ("home", "escape", "home", "back", "stop picking; back to the list of files"),
+        ("quit", "q", "app.leave", "quit", "leave"),
+    )
     # As on the run screen, the widgets draw what the focus changes.
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
@@ -125,7 +116,8 @@ class SetupScreen(Screen[None]):
         # Whether the choice is still being read, as is the first file when the screen opens.
         self._awaited = True
         self._past = Past()
-        self._saved: Saved | None = None
+        # The file that the scenario was saved in, with the scenario in it.
+        self._saved: tuple[Path, Scenario] | None = None
         self._opened_now: Path | None = None
         self._keep_places = False
         self._busy = False
@@ -179,10 +171,6 @@ class SetupScreen(Screen[None]):
         elif not files.option_count:
             self.preview.show_nothing("there are no bundled scenarios; ctrl+o opens a file")
 
-    @on(FileList.Looked)
-    def _looked_at(self, event: FileList.Looked) -> None:
-        self._choose(event.path)
-
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
         """A world without a start is asked for it first."""
@@ -208,12 +196,13 @@ class SetupScreen(Screen[None]):
 
     # The choice.
 
-    def _choose(self, path: Path) -> None:
+    @on(FileList.Looked)
+    def _choose(self, event: FileList.Looked) -> None:
         self.preview.remember_places()
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
         self.form.show_message("")
-        self.preview.read(path, opened=path == self._opened_now)
+        self.preview.read(event.path, opened=event.path == self._opened_now)
         self._show_outcome()
 
     @on(Preview.Read)
@@ -298,7 +287,6 @@ class SetupScreen(Screen[None]):
             call_if_open(self, self.form.show_cost, cost)
 
     def _scenario(self) -> Scenario:
-        """The scenario that the form describes. Raises UserError."""
         choice, (pair, algorithm) = self._chosen(), self.form.method
         choice.check_remedies()
         return form.asked_of(choice.settings, self.form.texts, pair, algorithm)
@@ -313,9 +301,12 @@ class SetupScreen(Screen[None]):
 
     def _command(self) -> list[str]:
         """The words of the command that does the same, empty if there is none. Raises UserError."""
-        jobs, name = form.jobs(self.form.texts["jobs"]), self.form.own_name
-        choice = self._chosen()
-        return command_words(choice, self._saved, self._scenario(), jobs=jobs, reading=choice.options, name=name)
+        choice, jobs = self._chosen(), form.jobs(self.form.texts["jobs"])
+        source = self._saved if choice.run else (choice.path, choice.settings)
+        if source is None:
+            return []
+        bare, name = choice.scenario is None, self.form.own_name
+        return command_words(*source, self._scenario(), bare=bare, jobs=jobs, reading=choice.options, name=name)
 
     def action_copy(self) -> None:
         """The whole command to the clipboard (OSC 52)."""
@@ -341,38 +332,46 @@ class SetupScreen(Screen[None]):
         self._begin(only_baseline=True)
 
     def _begin(self, only_baseline: bool) -> None:
+        from ddenv.runs.trust import trust_own
+
         if self._busy:
             return
         texts = self.form.texts
         try:
-            scenario = self._scenario()
+            choice, scenario = self._chosen(), self._scenario()
             path = run_file(scenario.name, str(form.value(form.NAME, texts["name"])))
-            new = NewRun(self._chosen(), scenario, form.jobs(texts["jobs"]), texts["accept"], path)
+            jobs, mode = form.jobs(texts["jobs"]), texts["accept"]
         except UserError as error:
             self._complain(error)
             return
+
+        def answered(trusts: bool) -> None:
+            if trusts:
+                start = partial(
+                    create, choice, scenario, path, jobs=jobs, accept_mode=mode, only_baseline=only_baseline
+                )
+                self._create(path, start)
+            else:
+                self._complain(UserError("not started: it needs a program that you do not trust"))
+
         self.preview.remember_places()
         self._busy = True
         self.form.show_message("checking ...")
-        ask_trust(self.app, new, lambda yes: self._answered(yes, new, only_baseline))
-
-    def _answered(self, trusts: bool, new: NewRun, only_baseline: bool) -> None:
-        if trusts:
-            self._create(new, only_baseline)
-        else:
-            self._complain(UserError("not started: it needs a program that you do not trust"))
+        # A run file is never the user's own: somebody may have sent it.
+        if not choice.run:
+            trust_own(scenario, choice.path)
+        once_trusted(self.app, scenario, choice.path, answered)
 
     @work(thread=True, group="start", exclusive=True)
-    def _create(self, new: NewRun, only_baseline: bool) -> None:
+    def _create(self, path: Path, start: Callable[[], Engine]) -> None:
         try:
-            engine = create(new, only_baseline)
+            engine = start()
         except UserError as error:
             call_if_open(self, self._complain, error)
             return
-        call_if_open(self, self.post_message, ShowRun(new.path, engine=engine))
+        call_if_open(self, self.post_message, ShowRun(path, engine=engine))
 
     def _complain(self, error: UserError) -> None:
-        """Shows an error, and marks its field."""
         self._busy = False
         if form.field_of(error) not in (None, form.NAME.id):
             self._show_pane("settings")
@@ -401,13 +400,13 @@ class SetupScreen(Screen[None]):
 
         remember(path)
         try:
-            saved = Saved(path, load_scenario(path))
+            saved = path, load_scenario(path)
         except UserError as error:
             call_if_open(self, self._complain, error)
             return
         call_if_open(self, self._keep_saved, saved)
 
-    def _keep_saved(self, saved: Saved) -> None:
+    def _keep_saved(self, saved: tuple[Path, Scenario]) -> None:
         self._saved = saved
         self._show_outcome()
 
@@ -418,7 +417,6 @@ class SetupScreen(Screen[None]):
         self._arrange()
 
     def _arrange(self) -> None:
-        """Shows all panes, or only one."""
         # Not by classes of the screen: these would compute all styles again.
         (width, height), pane = self.size, self._pane
         all = width >= ROOMY[0] and height >= ROOMY[1]

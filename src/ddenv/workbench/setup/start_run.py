@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from textual.app import App
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
@@ -22,34 +19,33 @@ from ddenv.workbench.shared.processes import Engine
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-PLACES = {
-    "spawn": ("robot.spawn.x", "robot.spawn.y", "robot.spawn.z", "robot.spawn.yaw"),
-    "goal": ("goal.x", "goal.y"),
-}
 JOBS_FILE = "jobs.json"
 NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
-def command(
-    source: str,
-    own: Scenario | None,
+def command_words(
+    source: Path,
+    own: Scenario,
     asked: Scenario,
     *,
-    standard: Scenario,
+    bare: bool = False,
     jobs: int,
     reading: Mapping[str, Sequence[Any]],
     name: str = "",
 ) -> list[str]:
-    """The words of the command, to be joined by `shlex.join`.
+    """The words of the command that runs `asked` as Start does, to be joined by `shlex.join`.
 
-    `source` is a scenario's name or file, or a world; `own` is the scenario in it, None for a world, which starts with `standard`.
-    `reading` are the options for reading worlds, `name` is the run's name if it is not the next free one.
+    `own` is the scenario in the file `source`, or the defaults for a `bare` world. `reading` are the options for reading worlds,
+    `name` is the run's name if it is not the next free one.
     """
-    before, after = (own or standard).model_dump(mode="json"), asked.model_dump(mode="json")
-    words = ["ddenv", "run", source]
-    for place, keys in PLACES.items():
-        numbers = [read_key(after, key) for key in keys]
-        if own is None or numbers != [read_key(before, key) for key in keys]:
+    from ddenv.world.load import SCENARIOS
+
+    before, after = own.model_dump(mode="json"), asked.model_dump(mode="json")
+    bundled = source.parent == SCENARIOS and source.suffix == ".yaml"
+    words = ["ddenv", "run", source.stem if bundled else _path(source)]
+    for place, fields in (("spawn", form.SPAWN), ("goal", form.GOAL)):
+        numbers = [read_key(after, field.key) for field in fields]
+        if bare or numbers != [read_key(before, field.key) for field in fields]:
             words.append(f"--{place}={','.join(map(number_text, numbers))}")
     changed = [one for one in OPTIONS if read(after, one) != read(before, one)]
     # As printed sets the others.
@@ -67,63 +63,29 @@ def command(
     return [*words, "--output", _path(Path(name))] if len(Path(name).parts) > 1 else [*words, "--name", name]
 
 
-def source_of(path: Path, bundled: Path) -> str:
-    """A file as an argument of `ddenv run`: the name of a bundled scenario, or the whole path."""
-    if path.parent == bundled and path.suffix == ".yaml":
-        return path.stem
-    return _path(path)
-
-
 def _path(path: Path) -> str:
     return str(path.absolute())
 
 
-@dataclass(frozen=True, slots=True)
-class NewRun:
-    """A run as described by the form: `scenario` for the `choice`, with `jobs` tests at a time, in the file `path`."""
-
-    choice: Choice
-    scenario: Scenario
-    jobs: int
-    accept_mode: str
-    path: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Saved:
-    """A scenario that was saved in a file."""
-
-    path: Path
-    scenario: Scenario
-
-
-def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
-    """Calls `then` with whether what the run starts is trusted. A run file is never the user's own: somebody may have sent it."""
-    from ddenv.runs.trust import trust_own
-    from ddenv.workbench.widgets.question import once_trusted
-
-    if not new.choice.run:
-        trust_own(new.scenario, new.choice.path)
-    once_trusted(app, new.scenario, new.choice.path, then)
-
-
-def create(new: NewRun, only_baseline: bool) -> Engine:
-    """Writes the run file and starts its engine. Raises UserError."""
+def create(
+    choice: Choice, scenario: Scenario, path: Path, *, jobs: int, accept_mode: str, only_baseline: bool
+) -> Engine:
+    """Writes the run file `path` and starts its engine, with `jobs` tests at a time. Raises UserError."""
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like, create_run
 
-    engine = Engine(new.path)
-    if new.choice.run:
-        create_like(new.choice.path, new.scenario, new.path)
+    engine = Engine(path)
+    if choice.run:
+        create_like(choice.path, scenario, path)
     else:
-        create_run(new.scenario, new.path)
-        remember(new.choice.path)
-    engine.start(new.jobs, new.accept_mode)
+        create_run(scenario, path)
+        remember(choice.path)
+    engine.start(jobs, accept_mode)
     # The usual number is not remembered: another machine has other cores.
-    write_state(JOBS_FILE, None if new.jobs == processor.usable_cores() else new.jobs)
+    write_state(JOBS_FILE, None if jobs == processor.usable_cores() else jobs)
     if only_baseline:
         # A step of one round ends after the baseline. The engine has started: it ignores older commands.
-        with RunFile(new.path) as run:
+        with RunFile(path) as run:
             run.send("step", unit="round")
     return engine
 
@@ -132,21 +94,6 @@ def usual_jobs() -> int:
     """The number of jobs of the last run that was started here, or of this machine's cores."""
     found = read_state(JOBS_FILE)
     return found if type(found) is int and JOBS.allows(found) else processor.usable_cores()
-
-
-def command_words(
-    choice: Choice, saved: Saved | None, scenario: Scenario, *, jobs: int, reading: Mapping[str, Any], name: str
-) -> list[str]:
-    """The command that does the same as Start; empty if the scenario has no file."""
-    from ddenv.world.load import SCENARIOS
-
-    if not choice.run:
-        path, base, standard = choice.path, choice.scenario, choice.settings
-    elif saved is not None:
-        path, base, standard = saved.path, saved.scenario, saved.scenario
-    else:
-        return []
-    return command(source_of(path, SCENARIOS), base, scenario, standard=standard, jobs=jobs, reading=reading, name=name)
 
 
 def run_file(scenario_name: str, name: str) -> Path:

@@ -53,10 +53,7 @@ class Log:
     @staticmethod
     def parts(entry: Entry, width: int) -> list[Text]:
         """An entry with its time of day, in lines that fit; what belongs to the line before stays indented."""
-        indent = " " * (len(entry.words) - len(entry.words.lstrip()))
-        first, *more = wrap(plain(entry.words), max(20, width - len(BEGIN) - len(indent) - 2)) or [""]
-        lines = [Text(f"{BEGIN}{indent}  {words}", no_wrap=True) for words in more]
-        return [_timed(entry.time, f"{indent}{first}"), *lines]
+        return _in_lines(entry.time, entry.words, width, "  ")
 
 
 def as_it_is(text: Text, _: int) -> Text:
@@ -67,6 +64,18 @@ def as_it_is(text: Text, _: int) -> Text:
 def decision_line(decision: Decision, width: int) -> Text:
     """A decision with its time of day."""
     return _timed(decision.time, plain(decision.words))
+
+
+def decision_lines(decision: Decision, width: int) -> list[Text]:
+    """A decision with its time of day, in lines that fit."""
+    return _in_lines(decision.time, decision.words, width)
+
+
+def _in_lines(at: float, words: str, width: int, hanging: str = "") -> list[Text]:
+    indent = " " * (len(words) - len(words.lstrip()))
+    first, *more = wrap(plain(words), max(12, width - len(BEGIN) - len(indent) - len(hanging))) or [""]
+    lines = [Text(f"{BEGIN}{indent}{hanging}{line}", no_wrap=True) for line in more]
+    return [_timed(at, f"{indent}{first}"), *lines]
 
 
 def _timed(at: float, words: str) -> Text:

@@ -14,8 +14,7 @@ from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.runfile.fold import Follower, spent
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.snapshot import EngineIs
-from ddenv.runfile.snapshot import Snapshot as Snapshot
+from ddenv.runfile.snapshot import EngineIs, Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.workbench.shared.observed import Busy, Gone, Observed

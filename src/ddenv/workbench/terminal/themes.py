@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from rich.color import ANSI_COLOR_NAMES
 from rich.color import Color as RichColor
@@ -11,6 +11,7 @@ from textual.color import Color, ColorParseError
 from textual.theme import BUILTIN_THEMES, Theme
 
 from ddenv.errors import UserError
+from ddenv.schemas import nearest
 
 # Calm and dark.
 DARK = Theme(
@@ -62,14 +63,6 @@ def theme_called(name: str, where: str) -> str:
     if found in theme_names():
         return found
     raise UserError(f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' lists them")
-
-
-def nearest(name: str, names: Iterable[str]) -> str:
-    """A question that suggests the nearest name, or nothing."""
-    from difflib import get_close_matches
-
-    found = get_close_matches(name, list(names), 1, 0.5)
-    return f"; did you mean '{found[0]}'?" if found else ""
 
 
 def fitting(color_system: str | None) -> str:

@@ -95,7 +95,6 @@ def _of_chops(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
 
 
 def _differing(before: list[Cell], now: list[Cell]) -> list[tuple[int, int]]:
-    """The spans in which cells differ."""
     found: list[tuple[int, int]] = []
     for place, (old, new) in enumerate(zip(before, now, strict=True)):
         if old == new:

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from ddenv.evidence.claims import current, in_the_making
 from ddenv.runfile.progress import Claim
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
@@ -19,7 +20,6 @@ from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
 from ddenv.words.signs import CLAIM
 from ddenv.workbench.playback.moving import snapshot_with
-from ddenv.workbench.shared.poll import Snapshot
 
 # The maximum number of models in the list.
 LISTED = 200

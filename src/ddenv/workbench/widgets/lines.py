@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rich.segment import Segment
@@ -20,12 +21,12 @@ class Lines(ScrollView, can_focus=True):
     With `parts` an item takes several lines: `parts(item, width)` are what `line` is called with.
     """
 
+    @dataclass
     class Clicked(Message):
         """A line was clicked; `item` is what it shows."""
 
-        def __init__(self, lines: Lines, item: Any) -> None:
-            super().__init__()
-            self.lines, self.item = lines, item
+        lines: Lines
+        item: Any
 
         @property
         def control(self) -> Lines:

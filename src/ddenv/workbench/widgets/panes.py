@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from textual import events
 from textual.app import ComposeResult
@@ -14,12 +15,11 @@ from textual.widgets import Static
 class Panes(HorizontalGroup):
     """Brackets mark the shown pane, and so do colours if there are any."""
 
+    @dataclass
     class Chosen(Message):
         """A title was clicked."""
 
-        def __init__(self, pane: str) -> None:
-            super().__init__()
-            self.pane = pane
+        pane: str
 
     def __init__(self, titles: Mapping[str, str], *, id: str) -> None:
         """`titles` are the texts of each pane by name: its key, and what it shows."""

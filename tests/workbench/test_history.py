@@ -11,7 +11,7 @@ from textual.widgets import DataTable
 from ddenv.runfile import branches
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import Node
-from ddenv.workbench.history.history_screen import Compare, History, compare
+from ddenv.workbench.history import Compare, History, compare
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
@@ -30,18 +30,18 @@ def test_the_way_to_where_the_run_is_goes_straight_down():
     assert tree(0, 1, 1, 3, 0, here=4) == ["0", "├─5", "1", "├─2", "3", "4"]
     assert tree(0, 1, 1, 3, 0, here=2) == ["0", "├─5", "1", "├─3", "│ 4", "2"]
     assert tree(0, 1, 1, here=1) == ["0", "1", "├─2", "3"]
-
-
-def test_long_histories_are_drawn_at_once():
-    lines = tree(*range(1500), here=1500)
-    assert lines[-1] == "1500"
+    # Long histories are drawn at once.
+    assert tree(*range(1500), here=1500)[-1] == "1500"
     assert branches.path([], 0) == []
 
 
-def test_what_a_node_is_has_a_sign_and_words(run):
+def test_what_a_node_is_has_a_sign_words_and_tests_of_its_own(run):
     state = fold(fake_moments.guided(run).file.events())
     told = [(branches.sign(node, state.node), branches.words(node, state.node)) for node in state.nodes]
     assert told == [("○", ""), ("○", ""), ("✗", "taken back"), ("●", "here")]
+    # The test of the reduction that was taken back is not the last one's own.
+    assert [node.own_tests for node in state.nodes] == [0, 5, 6, 6]
+    assert state.nodes[-1].tests == 7
     state = fold(fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
     assert branches.words(state.nodes[-1], 0) == "minimal"
     assert branches.words(replace(state.nodes[-1], rejected=True), 0) == "was minimal"
@@ -113,14 +113,6 @@ async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_
             in session.said()
         )
         assert len(started) == 1
-
-
-def test_each_branch_counts_its_own_tests(run):
-    state = fold(fake_moments.guided(run).file.events())
-    baseline, first, undone, adopted = state.nodes
-    assert [node.own_tests for node in (baseline, first, undone)] == [0, 5, 6]
-    # The test of the reduction that was taken back is not its own.
-    assert (adopted.tests, adopted.own_tests) == (7, 6)
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (121, 36), (147, 40)], but=[(121, 36)]), ids=str)

@@ -8,7 +8,7 @@ import fake_moments
 import pytest
 
 from ddenv.guiding.offers import ACTIONS
-from ddenv.workbench.lines.line_mode import GUIDES, QUESTIONS, LineMode
+from ddenv.workbench.line_mode import GUIDES, QUESTIONS, LineMode
 from ddenv.workbench.run.run_keys import GUIDING
 
 
@@ -69,16 +69,11 @@ def test_typed_words_and_the_keys_of_the_screen_guide_the_run(run):
         assert why in words
 
 
-def test_a_question_is_answered_by_the_next_line(run):
+def test_a_question_is_answered_by_the_next_line_and_watching_changes_nothing(run):
     fake_moments.not_shown(run)
     run.hold()
     assert "there is no 'try 1'" in said(run, "accept try 1")
     assert "not possible: there is nothing to reject" in said(run, "reject", "yes")
-    assert commands(run) == []
-
-
-def test_watching_changes_nothing(run):
-    fake_moments.mid_round(run).hold()
     assert "watching only" in said(run, "pause", "undo", watch=True)
     assert commands(run) == []
 

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 from textual import on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
@@ -20,6 +19,7 @@ from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
+from ddenv.world.access import without_tilde
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
@@ -49,7 +49,7 @@ class ExportScreen(ModalScreen[None]):
     CSS_PATH = "export.tcss"
     AUTO_FOCUS = "#export-write"
     BINDINGS: ClassVar = [
-        Binding("ctrl+s", "write", "write", id="export.write", tooltip="write the chosen files", priority=True),
+        *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
         *keys(
             "export",
             ("close", "escape", "dismiss", "close", "close this dialog"),
@@ -125,7 +125,7 @@ class ExportScreen(ModalScreen[None]):
 
     def _wanted(self) -> Wanted:
         """Raises UserError for names that cannot be used."""
-        folder = _home(Path(self._value("folder") or "."))
+        folder = without_tilde(self._value("folder") or ".")
         wanted = {id: self._path(folder, id, title, endings) for id, title, endings in KINDS if self._ticked(id)}
         if not wanted:
             raise UserError("nothing is chosen: tick what to write (space)")
@@ -138,7 +138,7 @@ class ExportScreen(ModalScreen[None]):
         name = self._value(f"{id}-name")
         if not name or not f"{folder}{name}".isprintable():
             raise UserError(f"{title}: give a name that ends in {endings[0]}")
-        path = folder / _home(Path(name))
+        path = folder / without_tilde(name)
         if path.suffix.lower() not in endings:
             raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
         return path
@@ -178,7 +178,6 @@ class ExportScreen(ModalScreen[None]):
         self._report("\n".join(written), wrong)
 
     def _report(self, words: str, wrong: str = "") -> None:
-        """Shows what was done, and what went wrong."""
         self.query_one("#export-words", Static).update(words)
         self.query_one("#export-wrong", Static).update(wrong)
 
@@ -187,14 +186,6 @@ def suggested(run: Path) -> tuple[str, str, str]:
     """Names for world, scenario and report of a run."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
     return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html"
-
-
-def _home(path: Path) -> Path:
-    """`path` with `~` expanded. Raises UserError for an unknown user."""
-    try:
-        return path.expanduser()
-    except RuntimeError:
-        raise UserError(f"{path}: unknown user") from None
 
 
 def _here() -> Path:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from textwrap import wrap
 from typing import ClassVar, Literal
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen, Screen
 from textual.widgets import DataTable, Static
@@ -18,7 +15,8 @@ from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile import branches
-from ddenv.runfile.progress import Decision, Node
+from ddenv.runfile.progress import Node
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen
@@ -29,8 +27,7 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
-from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_lines
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 
@@ -43,8 +40,6 @@ ROOM = 90
 TREE = 15
 MARK = "marked"
 GO = "go on from this environment: the run pauses there (branch)"
-# Where the words of a decision begin, after its time.
-INDENT = 10
 
 
 class Tree(DataTable[Text]):
@@ -63,13 +58,13 @@ class History(Screen[int | None]):
     CSS_PATH: ClassVar = ["history.tcss"]
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
     BINDINGS: ClassVar = [
-        Binding("enter", "go", "go on from here", id="history.go", tooltip=GO, priority=True),
+        *keys("history", ("go", "enter", "go", "go on from here", GO), priority=True),
         *keys(
             "history",
             ("mark", "m", "mark", "mark", "mark this environment, to compare another with it"),
             ("compare", "c", "compare", "compare", "compare the marked environment with this one"),
             HELP,
-            ("close", "escape,h,q", "close", "close", "back to the run", "esc"),
+            ("close", "escape,h,q", "dismiss(None)", "close", "back to the run", "esc"),
         ),
     ]
 
@@ -145,7 +140,6 @@ class History(Screen[int | None]):
         self.call_after_refresh(self._arrange)
 
     def _arrange(self) -> None:
-        """Fits the table to the size of the screen."""
         at = self.under_cursor
         if at is None:
             self._look()
@@ -203,18 +197,8 @@ class History(Screen[int | None]):
             first = self._tree[self._marked]
             self.app.push_screen(Compare(first, node, self._look_at().state, self._place))
 
-    def action_close(self) -> None:
-        self.dismiss(None)
-
     def _refuse(self, why: str) -> None:
         self.notify(why, severity="warning", timeout=4, markup=False)
-
-
-def decision_lines(decision: Decision, width: int) -> list[Text]:
-    """A decision with its time of day, in lines that fit."""
-    first, *rest = wrap(plain(decision.words), max(width - INDENT, 12)) or [""]
-    lines = [decision_line(replace(decision, words=first), width)]
-    return lines + [Text(" " * INDENT + line) for line in rest]
 
 
 def _side(name: str) -> Literal["left", "right"]:

@@ -7,7 +7,7 @@ import pytest
 from textual.app import App
 from textual.widgets import Button, Checkbox, Input, Static
 
-from ddenv.workbench.export.export_dialog import ExportScreen
+from ddenv.workbench.export import ExportScreen
 
 NAMES = ("crates-1.html", "crates-1.minimal.robot.sdf", "crates-1.minimal.sdf", "crates-1.minimal.yaml")
 
@@ -96,7 +96,7 @@ async def test_a_scenario_goes_with_a_world(run, folder):
 async def test_what_is_wrong_is_said_in_the_dialog(run, folder):
     wrong = (
         ("folder", "/no/such/folder", "/no/such/folder/crates-1.minimal.sdf: cannot be written"),
-        ("folder", "~nobody-here/x", "unknown user"),
+        ("folder", "~nobody-here/x", "~nobody-here/x/crates-1.minimal.sdf: cannot be written"),
         ("world-name", f"{'n' * 300}.sdf", "cannot be written"),
         ("world-name", "", "world (SDF): give a name that ends in .sdf"),
         ("world-name", "a\x00.sdf", "give a name that ends in .sdf"),

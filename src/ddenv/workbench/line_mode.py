@@ -17,6 +17,7 @@ from ddenv.guiding.commands import Command, question, said, send, starts_engine
 from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.situation import Row, Situation
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
 from ddenv.runs.tests_left import remaining
@@ -26,7 +27,7 @@ from ddenv.words.claims import drift, what_ran
 from ddenv.words.explain import explain
 from ddenv.words.news import headline, news
 from ddenv.workbench.shared.log import NOTHING_DECIDED
-from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine
 
 # The maximum number of models that a line names.

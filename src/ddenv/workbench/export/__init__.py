@@ -1,1 +1,0 @@
-"""The dialog that writes what a run left."""
