@@ -92,14 +92,18 @@ def test_a_gigabyte_that_is_named_is_refused_at_once(tmp_path, text):
     assert "MB" in refusal(check_bounded(path, seconds=AT_ONCE), path)
 
 
-def test_a_folder_is_refused(tmp_path):
-    assert "folder" in refusal(check_bounded(tmp_path), tmp_path)
-
-
-def test_a_file_that_is_missing_is_refused(tmp_path, check_file):
-    for name in ("none.world", "none/none.world", "a" * 300, "new\nline"):
-        said = check_file(tmp_path / name)
-        refusal(said, tmp_path)
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("", "is a folder"),
+        ("none.world", "no such file"),
+        ("none/none.world", "no such"),
+        ("a" * 300, "too long"),
+        ("a\nb", "no such"),
+    ],
+)
+def test_a_folder_and_a_file_that_is_missing_are_refused(tmp_path, check_file, name, words):
+    assert words in refusal(check_file(tmp_path / name), tmp_path)
 
 
 @pytest.mark.parametrize("name", slow(pytest.mark.fuzz, ["/dev/zero", "/dev/null", "/dev/tty"], but=["/dev/zero"]))
@@ -141,12 +145,9 @@ def test_files_that_include_each_other_are_refused(check, tmp_path, count):
     for number in range(count):
         (tmp_path / f"f{number}.sdf").write_text(sdf_model("m", include(f"f{(number + 1) % count}.sdf")))
     said, _ = check(world(include("f0.sdf")))
-    assert "form a cycle" in refusal(said, tmp_path)
+    cycle = " includes ".join(f"f{number}.sdf" for number in (*range(count), 0))
+    assert f"form a cycle: {cycle}" in refusal(said, tmp_path)
     assert re.match(rf"ddenv: {tmp_path}/f\d.sdf:1: /sdf/model\[@name='m'\]/include: ", said.stderr)
-
-
-def test_a_world_that_includes_itself_is_refused(check):
-    assert "form a cycle" in refusal(*check(world(include("hostile.world"))))
 
 
 def test_files_that_include_each_other_through_a_linked_folder_are_refused(tmp_path):
