@@ -18,6 +18,7 @@ from ddenv.words.slices import slice_in_short
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.models import FREE, Course, steps
 from ddenv.workbench.shared.poll import Snapshot
+from tests.engine.reading import state_of
 from tests.command import in_process
 from tests.engine.fake import drive
 from tests.engine.participation import MODELS, Participation, sliced_run
@@ -118,8 +119,7 @@ def test_a_report_gives_the_reason_for_each_model(run):
 def test_the_map_of_a_run_shows_what_took_part(run, monkeypatch, capsys):
     said = in_process(monkeypatch, capsys, "world", "show", run, "--took-part")
     assert said.returncode == 0
-    with RunFile(run) as file:
-        state = fold(file.events())
+    state = state_of(run)
     met = set().union(*(test.took_part.names(state.elements) for test in state.tests if test.phase == "baseline"))
     for name in MODELS:
         assert (f"  {name}: " in said.stdout) == (name in met)
