@@ -9,7 +9,7 @@ from ddenv.cli.summary import summary, summary_lines
 from ddenv.evidence.took_part import why_sliced
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
-from ddenv.runfile.fold import apply, fold
+from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.words.explain import explain
@@ -18,10 +18,10 @@ from ddenv.words.slices import slice_in_short
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.models import FREE, Course, steps
 from ddenv.workbench.shared.poll import Snapshot
-from tests.engine.reading import state_of
 from tests.command import in_process
 from tests.engine.fake import drive
 from tests.engine.participation import MODELS, Participation, sliced_run
+from tests.engine.reading import state_of
 
 SIMULATOR = Participation(2, ("box_1", "box_7", "box_12"), ties=(("box_1", "box_20"),))
 
