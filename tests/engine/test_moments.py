@@ -5,12 +5,12 @@ from dataclasses import asdict
 import pytest
 
 from ddenv.engine.control import Stopped
-from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
-from tests.engine.guided import at_once, events, guided, numbers, until  # noqa: F401
+from tests.engine.guided import at_once, guided, numbers, until  # noqa: F401
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import flaky, needs
+from tests.engine.reading import events, send, state_of
 
 
 def elsewhere(keep, _):
@@ -87,8 +87,7 @@ def test_what_is_accepted_is_taken_before_the_next_decision(tmp_path):
 
     def guide():
         state = yield from first_waits()
-        with RunFile(path) as other:
-            other.send("accept", round=state.round.number, candidate=state.waiting_candidate)
+        send(path, "accept", round=state.round.number, candidate=state.waiting_candidate)
         yield "undo", {}
         yield "accept_mode", {"mode": "automatic"}
 
@@ -164,8 +163,7 @@ def test_what_is_unpinned_is_not_called_minimal_before_it_was_left_out(tmp_path)
 
     path = new_run(tmp_path)
     assert guided(path, needs("wall"), guide()).minimal
-    with RunFile(path) as viewer:
-        viewer.send("unpin", models=numbers("ball"))
+    send(path, "unpin", models=numbers("ball"))
     state = drive(path, FakePool(needs("wall"), 1))
     assert state.environment == ("wall",)
     assert [node.environment for node in state.nodes if node.minimal] == [("wall",)]
@@ -189,15 +187,14 @@ def test_trials_keep_to_the_budget(tmp_path):
     path = new_run(tmp_path, budget=6)
     with pytest.raises(Stopped, match="the budget of 6 tests is used up"):
         guided(path, needs("wall"), guide(), 2)
-    assert fold(events(path)).tests_done == 6
+    assert state_of(path).tests_done == 6
 
 
 def test_with_more_budget_the_search_goes_on_as_it_was(tmp_path):
     path, undisturbed = new_run(tmp_path, budget=6, pair="learner/timestep"), new_run(tmp_path, pair="learner/timestep")
     with pytest.raises(Stopped):
         drive(path, FakePool(needs("wall", "beam"), 1))
-    with RunFile(path) as viewer:
-        viewer.send("change", settings={"budget": 500})
+    send(path, "change", settings={"budget": 500})
     drive(path, FakePool(needs("wall", "beam"), 1))
     drive(undisturbed, FakePool(needs("wall", "beam"), 1))
     rounds = [
@@ -225,8 +222,7 @@ def test_a_decision_counts_once_whenever_the_engine_is_killed(tmp_path):
     for after in range(1, 7):
         path = new_run(tmp_path, iterations=0)
         drive(path, FakePool(needs("wall"), 1))
-        with RunFile(path) as viewer:
-            viewer.send("undo")
+        send(path, "undo")
         with pytest.raises(Killed):
             drive(path, FakePool(needs("wall"), 1), prepare=lambda file, after=after: kill_after(file, after))
         state = drive(path, FakePool(needs("wall"), 1))

@@ -8,13 +8,13 @@ import time
 
 import pytest
 
-from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
+from tests.engine.reading import state_of
 from tests.waiting import wait_until
 
 LIMIT = 3.0
@@ -37,11 +37,6 @@ def engine(path):
         os.killpg(process.pid, signal.SIGCONT)
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-
-
-def state_of(path):
-    with RunFile(path) as file:
-        return fold(file.events())
 
 
 def at_work(path):
