@@ -52,6 +52,7 @@ def decided(path):
             case LeftOut():
                 found.append(("left out", event.without))
             case CertificateFinished():
+                assert {state.tests[test - 1].phase for test in event.tests} == {"certify"}
                 claims = [(one.without, one.verdict, one.shown, one.runs, one.outcomes) for one in event.claims]
                 found.append((claims, named(event.tests)))
             case Finished():

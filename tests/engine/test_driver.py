@@ -59,18 +59,6 @@ METHODS = [
 every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()))
 
 
-@pytest.mark.programs
-@every_method
-def test_workers_never_change_the_result(tmp_path, method):
-    for salt in range(5):
-        stories = [
-            story(drive(new_run(tmp_path, **method), FakePool(flaky(salt, "wall", "ball"), jobs, seed)))
-            for jobs in (1, 2, 5)
-            for seed in (1, 2)
-        ]
-        assert all(each == stories[0] for each in stories)
-
-
 def test_where_f_is_flaky_splitting_looks_once_and_a_miss_shows_nothing_yet(tmp_path):
     path = new_run(tmp_path, algorithm="splitting", iterations=3)
     state = drive(path, FakePool(flaky(5, "wall", "ball"), 2))
@@ -218,13 +206,6 @@ def test_the_failure_that_the_user_chose_is_reduced(tmp_path):
     assert (usual.environment, usual.baseline.failures) == (("wall",), 3)
     assert (rarer.environment, rarer.baseline.failures) == (("ball",), 2)
 
-    none = drive(new_run(tmp_path, baseline_runs=5, failure=3), FakePool(oracle, 2))
-    assert (none.status, none.rounds_done, none.minimal) == ("finished", 0, False)
-    assert none.reason == (
-        "there is no failure number 3; 5 runs of the whole world showed these: "
-        "1. stuck at (2.00, 0.00) in 3 runs; 2. stuck at (9.00, 0.00) in 2 runs"
-    )
-
 
 def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
     asked = []
@@ -301,10 +282,6 @@ def test_commands_without_sense_are_marked_and_ignored(tmp_path):
     state = drive(path, FakePool(needs("wall"), 2))
     assert state.minimal
     assert state.last_command == 6
-
-
-def test_elements_are_those_of_the_world(tmp_path):
-    assert drive(new_run(tmp_path), FakePool(needs("wall"), 1)).elements == ELEMENTS
 
 
 class SlowPool(FakePool):

@@ -1,6 +1,7 @@
 """What a night brings: a full disk, a clock that jumps, a run file that is copied, deleted or replaced under an engine."""
 
 import errno
+import os
 import shutil
 import sqlite3
 import threading
@@ -15,7 +16,6 @@ from ddenv.engine.control import Control
 from ddenv.engine.disturbances import NEEDED, ClockJumps, DiskSpace
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
-from ddenv.runfile import lock
 from ddenv.runfile.events import EngineStarted, Paused, TestFinished
 from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
@@ -209,31 +209,25 @@ def test_a_run_that_is_copied_while_an_engine_works_is_readable(tmp_path):
     drive(copies[1] / path.name, FakePool(oracle, 2))
 
 
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
-def test_a_folder_without_locks_is_told_in_one_line(tmp_path, monkeypatch, number):
+NO_LOCKS = "its folder has no file locks .* copy the run"
+REFUSED = {
+    "no locks": ("fcntl.flock", errno.ENOLCK, NO_LOCKS),
+    "unsupported": ("fcntl.flock", errno.EOPNOTSUPP, NO_LOCKS),
+    "no writing": ("os.open", errno.EACCES, "Permission denied; copy the run"),
+}
+
+
+@pytest.mark.parametrize(("call", "number", "words"), REFUSED.values(), ids=REFUSED)
+def test_a_folder_in_which_no_engine_can_work_is_told_in_one_line(tmp_path, monkeypatch, call, number, words):
     path = new_run(tmp_path)
 
     def refuse(*_):
-        raise OSError(number, "No locks available")
+        raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(lock.fcntl, "flock", refuse)
-    with (
-        pytest.raises(UserError, match=r"no engine can work here: its folder has no file locks .* copy the run"),
-        engine_lock(path),
-    ):
+    monkeypatch.setattr(f"ddenv.runfile.lock.{call}", refuse)
+    with pytest.raises(UserError, match=f"no engine can work here: {words}"), engine_lock(path):
         pass
     assert not engine_is_alive(path)
-
-
-def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path, monkeypatch):
-    path = new_run(tmp_path)
-
-    def refuse(*_):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    monkeypatch.setattr(lock.os, "open", refuse)
-    with pytest.raises(UserError, match="no engine can work here: Permission denied; copy the run"), engine_lock(path):
-        pass
 
 
 def test_an_error_of_writing_that_is_no_full_disk_is_not_waited_for(tmp_path):

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine.control import Stopped
 from ddenv.evidence.claims import helping
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
@@ -115,25 +114,6 @@ def test_another_failure_is_taken_for_as_good(tmp_path):
     state = guided(new_run(tmp_path), oracle, guide())
     assert state.environment == ("wall",)
     assert state.minimal
-
-
-def test_a_finished_run_can_be_taken_up_again(tmp_path):
-    path = new_run(tmp_path)
-    assert drive(path, FakePool(needs("wall"), 1)).environment == ("wall",)
-    send(path, "undo")
-    state = drive(path, FakePool(needs("wall"), 1))
-    assert state.status == "finished"
-    assert "wall" in state.environment
-    assert len(state.decisions) == 1
-
-
-def test_a_budget_stops_the_run_and_more_of_it_goes_on(tmp_path):
-    path = new_run(tmp_path, budget=5)
-    with pytest.raises(Stopped, match="the budget of 5 tests is used up"):
-        drive(path, FakePool(needs("wall"), 2))
-    assert state_of(path).tests_done == 5
-    send(path, "change", settings={"budget": 500})
-    assert drive(path, FakePool(needs("wall"), 2)).minimal
 
 
 def test_a_model_that_only_helps_is_left_out_and_the_search_goes_on(tmp_path):

@@ -55,10 +55,7 @@ def test_what_goes_lets_the_robot_pass_and_not_with_any_one_model_put_back(group
     assert put_back - {NOTHING} <= set(tried)
 
 
-@given(
-    passing=st.sets(st.integers(1, 31).map(Environment)),
-    first=st.integers(1, 5),
-)
+@given(passing=st.sets(st.integers(1, 31).map(Environment)), first=st.integers(1, 5))
 @examples(3)
 def test_it_is_one_minimal_whatever_passes(passing, first):
     """Also where a larger removal fails again."""

@@ -88,11 +88,7 @@ def test_models_that_went_too_early_are_found_and_all_others_go_again(needed, st
 
 @pytest.mark.parametrize(
     ("good", "bad", "end", "groups"),
-    [
-        (6, 4, 1, [(1, 2, 3), (4,), (5,)]),
-        (4, 3, 1, [(1, 2)]),
-        (4, 1, 1, [(1,), (2, 3)]),
-    ],
+    [(6, 4, 1, [(1, 2, 3), (4,), (5,)]), (4, 3, 1, [(1, 2)]), (4, 1, 1, [(1,), (2, 3)])],
 )
 def test_first_goes_what_went_later_then_halves_of_the_step_that_lost_it(good, bad, end, groups):
     """Environments of the first so many models."""

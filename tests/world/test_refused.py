@@ -155,9 +155,7 @@ def on_frame_a(*others: str) -> bytes:
 # These point at the element.
 AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
     "`<population>`": {"<population> is not supported; write its models out": [world("<population name='p'/>")]},
-    "`<joint>` between models": {
-        "joints between models are not supported": [world("<joint name='j' type='fixed'/>")],
-    },
+    "`<joint>` between models": {"joints between models are not supported": [world("<joint name='j' type='fixed'/>")]},
     "a second `<state>`": {
         "/state: a second <state>; a world may have only one": [world("<state/><state/>")],
         "/state/insertions: <insertions> in <state>": [
@@ -178,7 +176,7 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
             f"<model name='m'>{TWO}<joint name='' type='fixed'>{AB}</joint></model>"
         ),
         r"/frame(\[@name='\s*'\])?: has no name": nameless(
-            f"<model name='m'>{LINK}<frame name=''/><link name='k'><pose relative_to='l'/></link></model>",
+            f"<model name='m'>{LINK}<frame name=''/><link name='k'><pose relative_to='l'/></link></model>"
         ),
         r"/state/model: has no name": [world("<state><model/></state>")],
     },
@@ -197,9 +195,7 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         for words, poses in POSES.items()
     },
     "a quaternion without": {
-        "the quaternion has no usable length": [
-            model(f"<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose>{LINK}"),
-        ],
+        "the quaternion has no usable length": [model(f"<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose>{LINK}")],
         "rotation_format 'rpy' is unknown": [model(f"<pose rotation_format='rpy'>0 0 0 0 0 0</pose>{LINK}")],
     },
     "a frame that does not exist": {
@@ -262,10 +258,7 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
             rf"{COLLISION}/geometry/\w+/{tag}: {NO_SIZE}": [shape(text.format(size)) for size in NO_SIZES]
             for tag, text in SIZES.items()
         },
-        rf"{COLLISION}: has no <geometry>": [
-            model("<link name='l'><collision name='c'/></link>"),
-            shape(""),
-        ],
+        rf"{COLLISION}: has no <geometry>": [model("<link name='l'><collision name='c'/></link>"), shape("")],
         "<torus> is not a known shape; use one of box": [shape("<torus><radius>1</radius></torus>")],
     },
     "a plane's normal": {"/normal: the normal has no usable length": [shape("<plane><normal>0 0 0</normal></plane>")]},

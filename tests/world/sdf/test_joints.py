@@ -126,9 +126,10 @@ def test_an_inertia_that_can_be_is_kept(read):
     assert world.models[0].links[0].inertia.moments == (1, 1, 1)
 
 
-def test_automatic_inertia_uses_the_density(read):
-    auto = "<inertial auto='true'><density>10</density></inertial>"
-    assert read(moving(auto), "1.11").models[0].links[0].inertia.mass == pytest.approx(60)
+@pytest.mark.parametrize(("given", "mass"), [("<density>10</density>", 60), ("<mass>7</mass>", 7)])
+def test_automatic_inertia_uses_the_density_or_spreads_a_mass(read, given, mass):
+    world = read(moving(f"<inertial auto='true'>{given}</inertial>"), "1.11")
+    assert world.models[0].links[0].inertia.mass == pytest.approx(mass)
 
 
 def test_static_models_need_no_inertia(read):
@@ -173,11 +174,6 @@ def test_a_joint_that_was_saved_beyond_half_a_turn_is_within_its_limits(read, li
     state = f"<state><model name='m'><link name='b'><pose>0 0 1 0 0 {angle}</pose></link></model></state>"
     (one,) = read(f"<model name='m'>{LINKS}{joint('revolute', limit)}</model>{state}", "1.6").models[0].joints
     assert (one.lower, one.upper) == pytest.approx(left)
-
-
-def test_a_given_mass_is_spread_by_automatic_inertia(read):
-    auto = "<inertial auto='true'><mass>7</mass></inertial>"
-    assert read(moving(auto), "1.11").models[0].links[0].inertia.mass == pytest.approx(7)
 
 
 def test_a_thin_plate_in_round_figures_is_kept(read):
