@@ -29,11 +29,11 @@ from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
 from ddenv.settings import PRINTED
-from ddenv.world.load import load_scenario
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
+from tests.wall import wall
 
 # What every run notices, in s; the ground is no element.
 SENSED = {"beam": 0.5, "wall": 0.25, "ground_plane": 0.0}
@@ -125,12 +125,9 @@ class FakePool:
 
 def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction) -> Path:
     """A run file of the small world, reduced as printed: the tests know the paper's rounds, and oracles a run by its seed."""
-    scenario = load_scenario(DATA / "wall.yaml")
     usual = PRINTED | CHEAP | {"early_stop": early_stop, "seeds": "consecutive"}
-    changed = {"world": world, "reduction": scenario.reduction.model_copy(update=usual | reduction)}
-    scenario = scenario.model_copy(update=changed)
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
-    create_run(scenario, path)
+    create_run(wall(world=world, reduction=usual | reduction), path)
     return path
 
 

@@ -15,12 +15,11 @@ from ddenv.runfile.state import BROKEN
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import last_words, start_engine
 from ddenv.runs.trust import program_of, trust
-from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle
-from tests.conftest import DATA
 from tests.engine.killing import story
 from tests.engine.reading import models_in, state_of, told
 from tests.waiting import PATIENCE, PERIOD
+from tests.wall import wall
 
 KILLS = int(os.environ.get("DDENV_KILLS", "6"))
 # An engine is killed within this time after its first test began, and so is one of its workers, s. One engine in so many dies
@@ -38,15 +37,8 @@ exit 0
 
 def new_run(folder: Path, name: str) -> Path:
     (folder / "robot.sh").write_text(ROBOT)
-    scenario = load_scenario(DATA / "wall.yaml")
     more = {"iterations": 9, "growth": "paper", "skip": "known", "baseline_runs": 6}
-    scenario = scenario.model_copy(
-        update={
-            "oracle": Oracle(command="sh robot.sh {world}"),
-            "folder": folder,
-            "reduction": scenario.reduction.model_copy(update=more),
-        }
-    )
+    scenario = wall(oracle=Oracle(command="sh robot.sh {world}"), folder=folder, reduction=more)
     run = folder / f"{name}.ddenv"
     create_run(scenario, run)
     trust(program_of(scenario))

@@ -20,8 +20,6 @@ from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
 from ddenv.settings import SETTINGS
 from ddenv.words.news import news
-from ddenv.world.load import load_scenario
-from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.hostile_simulators import DiesWithoutTheBeam, Hostile, dies_at_once
 from tests.engine.killing import Killed, kill_after, story
@@ -29,6 +27,7 @@ from tests.engine.oracles import needs
 from tests.engine.reading import models_in, told
 from tests.engine.test_pool import EVERYTHING, parts, result
 from tests.tiers import slow
+from tests.wall import wall
 
 
 @pytest.fixture
@@ -101,10 +100,8 @@ def test_a_sub_environment_that_kills_its_worker_twice_is_unknown(tmp_path):
 
 def test_without_a_number_workers_share_what_the_machine_allows(monkeypatch):
     monkeypatch.setattr("ddenv.runs.processor.usable_memory", lambda: 10e9)
-    scenario = parts()[0]
-    assert memory_limit(scenario, 3) == pytest.approx(3e9)
-    asked = scenario.simulation.model_copy(update={"memory_limit": 0.5})
-    assert memory_limit(scenario.model_copy(update={"simulation": asked}), 3) == 0.5e9
+    assert memory_limit(wall(), 3) == pytest.approx(3e9)
+    assert memory_limit(wall(simulation={"memory_limit": 0.5}), 3) == 0.5e9
 
 
 # Of the small world's scenario.
@@ -146,9 +143,7 @@ def test_how_long_tests_take_changes_no_verdict(tmp_path):
 
 
 def test_a_number_of_the_users_holds_for_all_tests(tmp_path):
-    scenario = load_scenario(DATA / "wall.yaml")
-    asked = scenario.simulation.model_copy(update={"wall_timeout": 33.0})
-    create_run(scenario.model_copy(update={"simulation": asked}), path := tmp_path / "run.ddenv")
+    create_run(wall(simulation={"wall_timeout": 33.0}), path := tmp_path / "run.ddenv")
     drive(path, pool := Timed(30.0))
     assert set(pool.limits) == {33.0}
 

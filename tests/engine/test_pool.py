@@ -13,18 +13,16 @@ from ddenv.engine.pool import PREPARATION, Pool
 from ddenv.engine.worker import PERIOD, Broken, Moment, Run, answered
 from ddenv.errors import UserError
 from ddenv.runs.subject import load_parts
-from ddenv.world.load import load_scenario
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.waiting import wait_until
+from tests.wall import wall
 
 EVERYTHING = frozenset({"deck", "wall"})
 
 
 def parts(**simulation):
-    scenario = load_scenario(DATA / "wall.yaml")
-    changed = scenario.simulation.model_copy(update=simulation)
-    scenario = scenario.model_copy(update={"simulation": changed})
+    scenario = wall(simulation=simulation)
     return scenario, *load_parts(scenario)
 
 

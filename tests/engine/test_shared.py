@@ -11,12 +11,12 @@ from ddenv.engine import shared
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
-from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.oracles import needs
 from tests.engine.reading import told
+from tests.wall import wall
 
 METHOD = {"algorithm": "splitting"}
 
@@ -115,8 +115,7 @@ DIFFERS = {
 
 def asked():
     """What the run `made` was asked for, but for how the world is reduced."""
-    scenario = load_scenario(DATA / "wall.yaml")
-    return scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update={"early_stop": False})})
+    return wall(reduction={"early_stop": False})
 
 
 def changed_run(folder, changed):
