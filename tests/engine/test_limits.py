@@ -24,7 +24,7 @@ from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.hostile_simulators import DiesWithoutTheBeam, Hostile, dies_at_once
 from tests.engine.killing import Killed, kill_after, story
 from tests.engine.oracles import needs
-from tests.engine.reading import models_in, told
+from tests.engine.reading import events, models_in, told
 from tests.engine.test_pool import EVERYTHING, parts, result
 from tests.tiers import slow
 from tests.wall import wall
@@ -118,11 +118,6 @@ class Timed(FakePool):
     def finished(self, seconds):
         ended = super().finished(seconds)
         return [(test, replace(each, wall_seconds=self.real * each.simulated_seconds)) for test, each in ended]
-
-
-def events(path):
-    with RunFile(path) as file:
-        return list(file.events())
 
 
 @pytest.mark.parametrize(("real", "later"), [(0.1, LEAST), (30.0, FACTOR * 30 * TIMEOUT)])
