@@ -25,8 +25,8 @@ from tests.hostile_runs import hostile_run, templates
 from tests.tiers import slow
 
 # A batch of runs is one test.
-SIZE = 2
-BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "20"))), but=[0])
+SIZE = 5
+BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0])
 KEYS = ("1", "4", "h", "escape", "e", "escape", "E", "escape", "W", "down", "enter", "escape", "escape", "P", "right")
 
 
