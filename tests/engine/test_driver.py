@@ -282,6 +282,7 @@ def test_commands_without_sense_are_marked_and_ignored(tmp_path):
     state = drive(path, FakePool(needs("wall"), 2))
     assert state.minimal
     assert state.last_command == 6
+    assert not told(path, "resumed")
 
 
 class SlowPool(FakePool):
