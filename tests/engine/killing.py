@@ -31,12 +31,12 @@ def story(state):
     return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
 
 
-def killed(path, pool, moments):
+def killed(path, pool, moments, **options):
     """One engine after another works on the run, each killed after so many events, until one comes to the end."""
     for moment in moments:
         pool.running.clear()
         try:
-            return drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after))
+            return drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after), **options)
         except Killed:
             pass
     return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,9 +15,9 @@ from ddenv.environment import Environment
 from ddenv.runfile.events import named
 from ddenv.runfile.failures import CHUNK, alike, atlas, grouped
 from ddenv.runfile.state import RunState, Test
-from tests.engine.fake import drive, new_run
+from tests.engine.fake import new_run
 from tests.engine.guided import COMMANDS, Disturbed
-from tests.engine.killing import Killed, kill_after
+from tests.engine.killing import killed
 from tests.engine.oracles import flaky
 from tests.engine.reading import state_of
 from tests.tiers import examples
@@ -83,12 +84,8 @@ def test_each_other_failure_is_found_with_the_smallest_environment_that_showed_i
     with tempfile.TemporaryDirectory() as folder:
         path = new_run(Path(folder), early_stop=early_stop)
         pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, sorted(plan, key=lambda one: one[0]), salt)
-        try:
-            drive(path, pool, prepare=lambda file: kill_after(file, moment))
-        except Killed:
-            pass
-        finally:
-            pool.viewer.close()
+        with closing(pool.viewer):
+            killed(path, pool, [moment])
         state = state_of(path)
     others = [test.id for test in state.tests if test.outcome == "other"]
     found = atlas(state)
