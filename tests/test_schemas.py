@@ -119,6 +119,7 @@ needy = some_robotics_lab:Needy
 
 [ddenv.algorithms]
 one-by-one = some_robotics_lab:one_by_one
+ddenv = some_robotics_lab:one_by_one
 """
 
 
@@ -174,55 +175,52 @@ def test_entry_points_may_point_into_classes(plugin):
     assert done.stdout.splitlines() == ["imported", "[0.0]"]
 
 
-@pytest.mark.parametrize(
-    ("pair", "words"),
-    [
-        ("half/sequential", "partitioning 'half': its partitions must be disjoint, not empty, and cover E"),
-        ("needy/sequential", "partitioning 'needy': cannot be instantiated:"),
-        ("half/rude", "prioritization 'rude': large_lab.rude:order cannot be loaded: no licence"),
-        ("model2model/too-few", "prioritization 'too-few': expected a score for each of 2 partitions"),
-    ],
-)
-def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin, pair, words):
-    split, order = pair.split("/")
+BREAK_THEIR_WORD = {
+    "half/sequential": "partitioning 'half': its partitions must be disjoint, not empty, and cover E",
+    "needy/sequential": "partitioning 'needy': cannot be instantiated:",
+    "half/rude": "prioritization 'rude': large_lab.rude:order cannot be loaded: no licence",
+    "model2model/too-few": "prioritization 'too-few': expected a score for each of 2 partitions",
+}
+
+
+def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin):
     done = plugin(
         "import ddenv\n"
         "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, 0, 0))\n"
-        "try:\n"
-        f"    ddenv.reduce('abcdef', lambda kept: kept >= {{'c'}}, partitioning='{split}', prioritization='{order}', **facts)\n"
-        "except ddenv.UserError as error:\n"
-        "    print(error)\n"
+        f"for split, order in map(lambda pair: pair.split('/'), {list(BREAK_THEIR_WORD)}):\n"
+        "    try:\n"
+        "        ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, partitioning=split, prioritization=order, **facts)\n"
+        "    except ddenv.UserError as error:\n"
+        "        print('told:', error)\n"
     )
-    assert words in done.stdout.splitlines()[-1], done.stderr
+    lines = [line for line in done.stdout.splitlines() if line != "imported"]
+    for line, words in zip(lines, BREAK_THEIR_WORD.values(), strict=True):
+        assert line.startswith("told: ") and words in line, done.stderr
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [("broken", "cannot be loaded"), ("no-function", "is not a function"), ("gone", "cannot be loaded: No module")],
-)
-def test_a_broken_package_is_told_in_one_line(plugin, name, words):
+BROKEN = {"broken": "cannot be loaded", "no-function": "is not a function", "gone": "cannot be loaded: No module"}
+
+
+def test_a_broken_package_is_told_in_one_line(plugin):
     done = plugin(
         "from ddenv import UserError, schemas\n"
-        f"print(repr(schemas.explanation('prioritization', '{name}')))\n"
-        "try:\n"
-        f"    schemas.load('prioritization', '{name}')\n"
-        "except UserError as error:\n"
-        "    print(error)\n"
+        f"for name in {list(BROKEN)}:\n"
+        "    try:\n"
+        "        print(repr(schemas.explanation('prioritization', name)), end=' ')\n"
+        "        schemas.load('prioritization', name)\n"
+        "    except UserError as error:\n"
+        "        print(error)\n"
     )
-    lines = done.stdout.splitlines()
-    assert lines[0] == "''"
-    assert f"prioritization '{name}'" in lines[1]
-    assert words in lines[1]
+    for line, (name, words) in zip(done.stdout.splitlines(), BROKEN.items(), strict=True):
+        assert line.startswith("'' ") and f"prioritization '{name}'" in line and words in line, done.stderr
 
 
-def test_ours_come_first(plugin):
-    done = plugin("from ddenv import schemas; print(schemas.names('prioritization')[0], schemas.pairs()[0])")
-    assert done.stdout.split() == ["failure-proximal", "model2model/failure-proximal"]
-
-
-def test_ours_cannot_be_replaced_by_name(plugin):
-    done = plugin("from ddenv import schemas; print(schemas.load('algorithm', 'ddenv').__module__)")
-    assert done.stdout.strip() == "ddenv.reduction.algorithms"
+def test_ours_come_first_and_cannot_be_replaced_by_name(plugin):
+    done = plugin(
+        "from ddenv import schemas\n"
+        "print(schemas.names('prioritization')[0], schemas.pairs()[0], schemas.load('algorithm', 'ddenv').__module__)"
+    )
+    assert done.stdout.split() == ["failure-proximal", "model2model/failure-proximal", "ddenv.reduction.algorithms"]
 
 
 def test_each_algorithm_of_ours_has_its_listing_its_words_and_how_many_tests_it_takes():

@@ -5,15 +5,19 @@ from __future__ import annotations
 import random
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from ddenv.engine.__main__ import _begin
 from ddenv.engine.beginning import check_repeats
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
+from ddenv.engine.disturbances import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.shared import Key, Place
@@ -23,10 +27,13 @@ from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts
 from ddenv.settings import PRINTED
-from ddenv.world.load import load_scenario
+from ddenv.world.model import World
+from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
+from tests.wall import wall
 
 # What every run notices, in s; the ground is no element.
 SENSED = {"beam": 0.5, "wall": 0.25, "ground_plane": 0.0}
@@ -118,38 +125,54 @@ class FakePool:
 
 def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction) -> Path:
     """A run file of the small world, reduced as printed: the tests know the paper's rounds, and oracles a run by its seed."""
-    scenario = load_scenario(DATA / "wall.yaml")
     usual = PRINTED | CHEAP | {"early_stop": early_stop, "seeds": "consecutive"}
-    changed = {"world": world, "reduction": scenario.reduction.model_copy(update=usual | reduction)}
-    scenario = scenario.model_copy(update=changed)
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
-    create_run(scenario, path)
+    create_run(wall(world=world, reduction=usual | reduction), path)
     return path
 
 
-def drive(
+class Engine(NamedTuple):
+    """What works on a run."""
+
+    scenario: Scenario
+    world: World
+    journal: Journal
+    bench: Bench
+    control: Control
+
+    @property
+    def driver(self) -> Driver:
+        return Driver(*self)
+
+
+@contextmanager
+def engine(
     path: Path,
     pool: FakePool,
     accept_mode: str | None = None,
-    prepare: Callable[[RunFile], None] | None = None,
-    mixed: bool = False,
+    prepare: Callable[[RunFile], object] = lambda _: None,
     others: dict[Key, Place] | None = None,
-) -> RunState:
-    """Works on a run as the engine program does, in this process."""
-    from ddenv.engine.__main__ import _begin
-    from ddenv.runs.subject import read_parts
-
+    terminated: threading.Event | None = None,
+    watch: Callable[[RunFile], DiskSpace | None] = lambda _: None,
+) -> Iterator[Engine]:
+    """An engine as the program has it, in this process."""
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)
-        file.own()
+        disk = watch(file)
+        file.own(*([disk.wait] if disk else []))
         journal = Journal(file)
         _begin(journal, pool.jobs, accept_mode)
-        if prepare is not None:
-            prepare(file)
-        control = Control(journal, threading.Event(), time.time())
-        check_repeats(journal, pool, control, mixed)
-        Driver(scenario, world, journal, Bench(journal, pool, control, others), control).reduce()
-        return journal.state
+        prepare(file)
+        control = Control(journal, terminated or threading.Event(), time.time(), disk)
+        yield Engine(scenario, world, journal, Bench(journal, pool, control, others), control)
+
+
+def drive(path: Path, pool: FakePool, mixed: bool = False, **options) -> RunState:
+    """Works on a run to its end; `options` are those of `engine`."""
+    with engine(path, pool, **options) as one:
+        check_repeats(one.journal, pool, one.control, mixed)
+        one.driver.reduce()
+        return one.journal.state
 
 
 ELEMENTS = read_world(DATA / "wall.sdf").elements()

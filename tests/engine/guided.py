@@ -4,6 +4,7 @@ import pytest
 from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive
 
@@ -20,13 +21,13 @@ class Guided(FakePool):
 
     def __init__(self, path, oracle, guide, jobs=1):
         super().__init__(oracle, jobs)
-        self.viewer = RunFile(path)
+        self.viewer, self.state = RunFile(path), RunState()
         self.guide = guide
         # The first value stands for nothing: the guide reads on from there.
         assert next(guide) is None
 
     def finished(self, seconds):
-        state = fold(self.viewer.events())
+        self.state = state = fold(self.viewer.events(self.state.revision), self.state)
         if state.last_command == len(self.viewer.commands()):
             try:
                 asked = self.guide.send(state)
@@ -53,11 +54,6 @@ def until(condition):
 
 def guided(path, oracle, guide, jobs=1):
     return drive(path, Guided(path, oracle, guide, jobs))
-
-
-def events(path):
-    with RunFile(path) as file:
-        return file.events()
 
 
 # Any commands at any moment, and a kill at any event.

@@ -1,7 +1,7 @@
 """An engine that is killed at a moment, and what is to be the same when another one goes on."""
 
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
+from tests.engine.fake import drive
+from tests.engine.reading import state_of
 
 
 class Killed(Exception):
@@ -23,9 +23,7 @@ def kill_after(file, after):
 
 def finished_tests(path):
     """Each finished test as (environment, run)."""
-    with RunFile(path) as file:
-        state = fold(file.events())
-        return [(test.environment, test.run) for test in state.finished_tests]
+    return [(test.environment, test.run) for test in state_of(path).finished_tests]
 
 
 def story(state):
@@ -33,6 +31,19 @@ def story(state):
     return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
 
 
-def models_in(state, test):
-    """The models in the world of a test, given by its number."""
-    return frozenset(state.models_of(state.tests[test - 1]))
+def killed(path, pool, moments, **options):
+    """One engine after another works on the run, each killed after so many events, until one comes to the end."""
+    for moment in moments:
+        pool.running.clear()
+        try:
+            return drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after), **options)
+        except Killed:
+            pass
+    return None
+
+
+def resumed(path, pool):
+    """The end of a run that may have been killed."""
+    pool.running.clear()
+    state = state_of(path)
+    return state if state.status == "finished" else drive(path, pool)

@@ -13,13 +13,13 @@ from ddenv.engine.judging import fix_failure
 from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.runfile.events import BaselineFinished, Outcomes
-from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile
 from ddenv.words.baseline import baseline
 from ddenv.world.scenario import FailureSpec
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import Killed
+from tests.engine.reading import state_of
 
 SPEC = FailureSpec(epsilon=0.5)
 
@@ -123,12 +123,10 @@ def last_baseline(folder, oracle, jobs: int, kill_every: int, baseline_runs: int
         with suppress(Killed):
             drive(path, pool, prepare=lambda file: _kill_at_end_of_baseline(file, kill_every))
             break
-        with RunFile(path) as file:
-            state = fold(file.events())
+        state = state_of(path)
         if state.baseline is not None:
             break
-    with RunFile(path) as file:
-        state = fold(file.events())
+    state = state_of(path)
     runs = {test.run for test in state.tests if test.phase == "baseline" and test.is_finished}
     if state.baseline is None:
         return None, state.status, sorted(runs)

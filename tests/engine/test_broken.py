@@ -13,13 +13,12 @@ import pytest
 from ddenv.engine.bench import MOST_BROKEN
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
 from ddenv.runs.subject import load_parts
 from ddenv.runs.trust import program_of, trust
 from ddenv.world.scenario import Scenario
+from tests.engine.reading import send, state_of
 from tests.engine.test_pool import EVERYTHING, result, workers
 from tests.robot.external.own import FAMILY, SLEEP, TOKEN, own_scenario, processes_with
 from tests.tiers import slow
@@ -106,8 +105,7 @@ def test_an_engine_that_ends_takes_its_commands_along(tmp_path, token, way):
     engine = start_engine(run, 2)
     wait_until(lambda: len(processes_with(token, COMMAND)) >= 6)
     if way == "stopped":
-        with RunFile(run) as file:
-            file.send("stop")
+        send(run, "stop")
     else:
         engine.send_signal(signal.SIGKILL if way == "killed" else signal.SIGTERM)
     engine.wait(PATIENCE)
@@ -140,15 +138,13 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
         f"ddenv: {MOST_BROKEN} tests in a row broke, the last one: the command's exit code is 2, neither 0 nor 1: no display; "
         f"fix this and continue with 'ddenv resume {run}' (these tests are then made again)\n"
     )
-    with RunFile(run) as file:
-        state = fold(file.events())
+    state = state_of(run)
     assert state.status == "failed"
     assert [test.outcome for test in state.tests].count("error") == MOST_BROKEN
     (tmp_path / "mended").touch()
     done = _resume(run)
     assert done.returncode in (0, 1), done.stderr
-    with RunFile(run) as file:
-        state = fold(file.events())
+    state = state_of(run)
     assert state.status == "finished"
     assert {"deck", "wall"} <= set(state.environment)
     # What broke proves nothing.

@@ -1,10 +1,8 @@
 """What a result is worth: the rate is kept, fresh runs show it, and nothing that broke counts."""
 
 import tempfile
-import threading
-import time
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from zlib import crc32
 
@@ -12,20 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine.__main__ import _begin
-from ddenv.engine.bench import Bench
-from ddenv.engine.control import Control, Stopped
-from ddenv.engine.driver import Driver
+from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.evidence.claims import current
-from ddenv.runfile.fold import fold
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import read_parts
 from ddenv.words.claims import missing
-from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run
-from tests.engine.killing import Killed, kill_after, models_in, story
+from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, engine, new_run
+from tests.engine.killing import Killed, killed, resumed, story
 from tests.engine.oracles import needs
+from tests.engine.reading import models_in, send, state_of, told
 from tests.tiers import examples
 
 METHODS = [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep", "growth": "steady", "skip": "implied"}]
@@ -172,13 +166,10 @@ def test_tests_that_break_leave_a_candidate_unknown_and_no_model_is_called_neede
     assert claims(state)["wall"].verdict == "unknown"
     assert "tests broke without wall" in state.reason
     assert state.lower_bound == 0
-    with RunFile(path) as file:
-        judged = [asdict(event.event)["verdict"] for event in file.events() if event.kind == "candidate_judged"]
-        journal = Journal(file)
-    assert "unknown" in judged
+    assert "unknown" in [data["verdict"] for data in told(path, "candidate_judged")]
     # Each was made again once.
     broken = [test for test in state.tests if test.outcome == "error"]
-    keys = [(models_in(journal.state, test.id), test.run) for test in broken]
+    keys = [(models_in(state, test.id), test.run) for test in broken]
     assert all(keys.count(key) == 2 for key in keys)
 
 
@@ -205,15 +196,9 @@ def test_the_next_engine_makes_broken_tests_again(tmp_path):
 
 def certified_again(path, oracle, at_least):
     """The state after one more certificate."""
-    with RunFile(path) as file:
-        scenario, world, _ = read_parts(file)
-        file.own()
-        journal = Journal(file)
-        _begin(journal, 2, None)
-        control = Control(journal, threading.Event(), time.time())
-        pool = FakePool(oracle, 2)
-        Driver(scenario, world, journal, Bench(journal, pool, control), control).certify(at_least)
-        return journal.state
+    with engine(path, FakePool(oracle, 2)) as one:
+        one.driver.certify(at_least)
+        return one.journal.state
 
 
 def test_a_certificate_can_be_made_again_with_more_runs(tmp_path):
@@ -260,24 +245,21 @@ def test_fresh_runs_of_an_earlier_environment_are_read_back_as_such(tmp_path):
     oracle = at_rates(3, ({"wall", "beam"}, 1.0), ({"wall", "ball"}, 0.3))
     path = kept(tmp_path)
     drive(path, FakePool(oracle, 1))
-    with RunFile(path) as file:
-        file.send("try", models=["wall", "ball"])
+    send(path, "try", models=["wall", "ball"])
+    state = drive(path, FakePool(oracle, 1))
+    for trial in (one for one in state.trials if one.verdict == "similar"):
+        send(path, "adopt", trial=trial.number)
         state = drive(path, FakePool(oracle, 1))
-        for trial in (one for one in state.trials if one.verdict == "similar"):
-            file.send("adopt", trial=trial.number)
-            state = drive(path, FakePool(oracle, 1))
-        journal = Journal(file)
     for test in state.tests:
         if test.phase == "certify" and test.is_finished:
-            assert (oracle(models_in(journal.state, test.id), test.seed) == "similar") == (test.outcome == "similar")
+            assert (oracle(models_in(state, test.id), test.seed) == "similar") == (test.outcome == "similar")
 
 
 def test_the_budget_counts_the_tests_of_the_certificate(tmp_path):
     path = kept(tmp_path, budget=30)
     with pytest.raises(Stopped, match="the budget of 30 tests is used up"):
         drive(path, FakePool(needs("wall"), 2))
-    with RunFile(path) as file:
-        state = fold(file.events())
+    state = state_of(path)
     assert state.confirming
     assert state.tests_done == 30
 
@@ -296,84 +278,32 @@ def certificates(state):
     ]
 
 
-@given(
-    salt=st.integers(0, 30),
-    moments=st.lists(st.integers(1, 250), min_size=1, max_size=4),
-    jobs=st.integers(1, 3),
-)
-@examples(0.2)
+@given(salt=st.integers(0, 30), moments=st.lists(st.integers(1, 250), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@examples(0.3)
 def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
     oracle = at_rates(salt, *DRIFTING)
     with tempfile.TemporaryDirectory() as folder:
         undisturbed = drive(kept(folder, **CHEAP), FakePool(oracle, 1))
         path = kept(folder, **CHEAP)
-        _killed(path, FakePool(oracle, jobs, salt), moments)
-        state = _resumed(path, FakePool(oracle, jobs, salt))
+        killed(path, FakePool(oracle, jobs, salt), moments)
+        state = resumed(path, FakePool(oracle, jobs, salt))
     assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
     # Neither workers nor kills change which seeds a certificate has, and what it rests on.
     assert certificates(state) == certificates(undisturbed)
-
-
-@pytest.mark.programs
-def test_killed_at_moments_of_every_kind_it_goes_on_and_makes_no_test_twice(tmp_path):
-    oracle = at_rates(3, *DRIFTING)
-    undisturbed = drive(kept(tmp_path, **CHEAP), FakePool(oracle, 1))
-    for moment in range(1, undisturbed.revision, max(1, undisturbed.revision // 12)):
-        path = kept(tmp_path, **CHEAP)
-        _killed(path, FakePool(oracle, 2), [moment])
-        state = _resumed(path, FakePool(oracle, 2))
-        assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
-        with RunFile(path) as file:
-            journal = Journal(file)
-        made = [(models_in(journal.state, test.id), test.run) for test in state.finished_tests]
-        assert len(made) == len(set(made))
-
-
-def _killed(path, pool, moments):
-    for moment in moments:
-        pool.running.clear()
-        try:
-            drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after))
-        except Killed:
-            continue
-        return
-
-
-def _resumed(path, pool):
-    with RunFile(path) as file:
-        state = fold(file.events())
-    return state if state.status == "finished" else drive(path, pool)
-
-
-def test_what_a_certificate_rests_on_does_not_depend_on_the_workers(tmp_path):
-    def rests_on(jobs):
-        path = kept(tmp_path)
-        oracle = at_rates(1, ({"wall", "beam"}, 0.9), ({"wall"}, 0.2))
-        state = drive(path, FakePool(oracle, jobs))
-        with RunFile(path) as file:
-            named = [
-                asdict(event.event)["tests"]
-                for event in file.events()
-                if event.kind in ("certificate_finished", "rate_lost")
-            ]
-        tests = [[state.tests[number - 1] for number in tests] for tests in named]
-        assert all(test.phase == "certify" for certificate in tests for test in certificate)
-        return [sorted((test.run, test.node, test.without or "") for test in certificate) for certificate in tests]
-
-    assert rests_on(1) == rests_on(3) != []
+    made = [(models_in(state, test.id), test.run) for test in state.finished_tests]
+    assert len(made) == len(set(made))
 
 
 def test_a_certificate_that_is_broken_off_leaves_the_one_before_as_it_was(tmp_path):
     path = kept(tmp_path)
     drive(path, FakePool(needs("wall"), 2))
 
-    def killed(keep, seed):
+    def dies(keep, seed):
         raise Killed
 
     with suppress(Killed):
-        certified_again(path, killed, 40)
-    with RunFile(path) as file:
-        state = fold(file.events())
+        certified_again(path, dies, 40)
+    state = state_of(path)
     assert [bool(one.claims) for one in state.certificates] == [True, False]
     assert current(state) == state.certificates[0]
     assert not missing(state)

@@ -4,7 +4,6 @@ import json
 import math
 import sqlite3
 import tempfile
-from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,15 +14,15 @@ from hypothesis import strategies as st
 from ddenv.engine import bench
 from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
-from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile.events import RoundStarted
-from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.schemas import names, pairs
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
-from tests.engine.killing import Killed, finished_tests, kill_after, story
+from tests.engine.guided import Guided, at_once, guided, until  # noqa: F401
+from tests.engine.killing import Killed, finished_tests, kill_after, killed, resumed, story
 from tests.engine.oracles import flaky, needs
+from tests.engine.reading import state_of, told
 from tests.tiers import examples
 
 
@@ -60,24 +59,11 @@ METHODS = [
 every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()))
 
 
-@pytest.mark.programs
-@every_method
-def test_workers_never_change_the_result(tmp_path, method):
-    for salt in range(5):
-        stories = [
-            story(drive(new_run(tmp_path, **method), FakePool(flaky(salt, "wall", "ball"), jobs, seed)))
-            for jobs in (1, 2, 5)
-            for seed in (1, 2)
-        ]
-        assert all(each == stories[0] for each in stories)
-
-
 def test_where_f_is_flaky_splitting_looks_once_and_a_miss_shows_nothing_yet(tmp_path):
     path = new_run(tmp_path, algorithm="splitting", iterations=3)
     state = drive(path, FakePool(flaky(5, "wall", "ball"), 2))
     assert set(state.environment) == {"wall", "ball"}
-    with RunFile(path) as file:
-        judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
+    judged = told(path, "candidate_judged")
     looked = [data for data in judged if data["verdict"] == "missed"]
     assert looked
     assert judged[0]["verdict"] in ("similar", "missed")
@@ -91,8 +77,7 @@ def test_what_a_run_noticed_is_recorded_and_looked_at(tmp_path):
     assert dict(state.tests[0].first_sensed) == {"wall": 0.25, "beam": 0.5}
     assert dict(state.tests[0].first_touched) == {"beam": 1.5}
     # The partition of the wall, which was sensed first, is tried first in each round.
-    with RunFile(path) as file:
-        rounds = [asdict(event.event) for event in file.events() if event.kind == "round_started"]
+    rounds = told(path, "round_started")
     wall = ELEMENTS.index("wall")
     assert all(wall in data["partitions"][0] for data in rounds)
 
@@ -128,8 +113,7 @@ def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, m
     monkeypatch.setattr(Driver, "_learn", noted)
     oracle, method = needs("deck", "wall"), {"pair": "timeseg/sequential", "iterations": 0}
     drive(path := new_run(tmp_path, **method), FakePool(oracle, 1))
-    with RunFile(path) as file:
-        known = [asdict(e.event) for e in file.events() if e.kind == "candidate_judged" and asdict(e.event)["known"]]
+    known = [data for data in told(path, "candidate_judged") if data["known"]]
     # Behind one that has to be tested: there is time for a veto.
     again = next(data for data in known if data["candidate"] > 1)
     path = new_run(tmp_path, **method)
@@ -137,8 +121,7 @@ def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, m
     with pytest.raises(Killed):
         drive(path, FakePool(oracle, 1), prepare=lambda file: _veto_in(file, again["round"], again["candidate"]))
     first = list(learnt)
-    with RunFile(path) as file:
-        assert Journal(file).state.refused
+    assert state_of(path).refused
     learnt.clear()
     drive(path, FakePool(oracle, 1))
     assert learnt[: len(first)] == first
@@ -167,13 +150,9 @@ def test_a_schema_that_is_not_installed_is_told(tmp_path):
 
 def test_one_worker_makes_no_test_for_nothing(tmp_path):
     """On one worker, each test made is part of a verdict."""
-    state = drive(new_run(tmp_path), pool := FakePool(flaky(1, "wall"), 1))
+    state = drive(path := new_run(tmp_path), pool := FakePool(flaky(1, "wall"), 1))
     assert len(pool.made) == len(set(pool.made)) == len(state.tests)
-    with RunFile(path := Path(tmp_path / "run-0.ddenv")) as file:
-        judged = {
-            test for event in file.events() if event.kind == "candidate_judged" for test in asdict(event.event)["tests"]
-        }
-    assert path.exists()
+    judged = {test for data in told(path, "candidate_judged") for test in data["tests"]}
     assert judged == {test.id for test in state.tests if test.phase == "round"}
 
 
@@ -184,19 +163,9 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(method, salt, moments, 
     with tempfile.TemporaryDirectory() as folder:
         oracle = flaky(salt, "wall", "beam")
         undisturbed = drive(new_run(Path(folder), **method), FakePool(oracle, jobs))
-        path, made = new_run(Path(folder), **method), []
-        for moment in moments:
-            pool = FakePool(oracle, jobs, moment)
-            try:
-                drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after))
-            except Killed:
-                made += finished_tests(path)[len(made) :]
-            else:
-                break
-        pool = FakePool(oracle, jobs)
-        state = fold(RunFile(path).events())
-        if state.status != "finished":
-            state = drive(path, pool)
+        path, pool = new_run(Path(folder), **method), FakePool(oracle, jobs, salt)
+        killed(path, pool, moments)
+        state = resumed(path, pool)
         assert story(state) == story(undisturbed)
         finished = finished_tests(path)
         assert len(finished) == len(set(finished))
@@ -237,90 +206,54 @@ def test_the_failure_that_the_user_chose_is_reduced(tmp_path):
     assert (usual.environment, usual.baseline.failures) == (("wall",), 3)
     assert (rarer.environment, rarer.baseline.failures) == (("ball",), 2)
 
-    none = drive(new_run(tmp_path, baseline_runs=5, failure=3), FakePool(oracle, 2))
-    assert (none.status, none.rounds_done, none.minimal) == ("finished", 0, False)
-    assert none.reason == (
-        "there is no failure number 3; 5 runs of the whole world showed these: "
-        "1. stuck at (2.00, 0.00) in 3 runs; 2. stuck at (9.00, 0.00) in 2 runs"
-    )
-
 
 def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
-    path = new_run(tmp_path)
-    viewer = RunFile(path)
-
     asked = []
 
-    class Answering(FakePool):
-        """Rejects the first reduction it is asked about, accepts the others."""
+    def guide():
+        """Rejects the first reduction, accepts the others."""
+        while True:
+            state = yield from until(lambda state: state.waiting_candidate is not None)
+            asked.append((state.round.number, state.waiting_candidate))
+            yield "accept" if asked[1:] else "reject", {"round": asked[-1][0], "candidate": asked[-1][1]}
 
-        def finished(self, seconds):
-            state = fold(viewer.events())
-            if state.waiting_candidate is not None:
-                key = (state.round.number, state.waiting_candidate)
-                if key not in asked:
-                    viewer.send("accept" if asked else "reject", round=key[0], candidate=key[1])
-                    asked.append(key)
-            return super().finished(seconds)
-
-    state = drive(path, Answering(needs("wall"), 1), accept_mode="ask")
+    path = new_run(tmp_path)
+    state = drive(path, Guided(path, needs("wall"), guide()), accept_mode="ask")
     assert len(asked) >= 2
     assert state.environment == ("wall",)
-    with RunFile(path) as file:
-        decided = [asdict(event.event)["decision"] for event in file.events() if event.kind == "decided"]
-        reduced = [
-            (asdict(event.event)["round"], asdict(event.event)["candidate"])
-            for event in file.events()
-            if event.kind == "reduced"
-        ]
-    assert decided[0] == "reject"
-    assert asked[0] not in reduced
-    assert reduced == asked[1:]
+    assert told(path, "decided")[0]["decision"] == "reject"
+    assert [(data["round"], data["candidate"]) for data in told(path, "reduced")] == asked[1:]
 
 
 def test_a_vetoed_candidate_is_not_run_and_the_end_is_not_called_minimal(tmp_path):
-    path = new_run(tmp_path)
-    viewer = RunFile(path)
+    def without_ball(state):
+        candidates = () if state.round is None else state.round.candidates
+        return next((one for one in candidates if "ball" not in one.models and not one.verdict), None)
 
-    class Vetoing(FakePool):
-        """Vetoes every candidate that leaves out the ball."""
+    def guide():
+        while True:
+            state = yield from until(without_ball)
+            yield "veto", {"round": state.round.number, "candidate": without_ball(state).index}
 
-        def finished(self, seconds):
-            state = fold(viewer.events())
-            for one in () if state.round is None else state.round.candidates:
-                if "ball" not in one.models and not one.verdict and state.last_command == len(viewer.commands()):
-                    viewer.send("veto", round=state.round.number, candidate=one.index)
-                    return []
-            return super().finished(seconds)
-
-    state = drive(path, Vetoing(needs("wall"), 1))
+    state = guided(new_run(tmp_path), needs("wall"), guide())
     assert set(state.environment) == {"wall", "ball"}
     assert not state.minimal
     assert "vetoed or rejected" in state.reason
 
 
 def test_steps_make_one_test_or_one_round_and_then_pause(tmp_path):
-    path = new_run(tmp_path)
-    viewer = RunFile(path)
     pauses = []
 
-    class Stepping(FakePool):
-        """Pauses at once, then steps three tests, then a round, then stops."""
-
-        def finished(self, seconds):
-            state = fold(viewer.events())
-            if not viewer.commands():
-                viewer.send("pause")
-            elif state.status == "paused" and not self.busy and state.last_command == len(viewer.commands()):
-                pauses.append((len(state.finished_tests), state.rounds_done))
-                if len(pauses) == 5:
-                    viewer.send("stop")
-                else:
-                    viewer.send("step", unit="test" if len(pauses) < 4 else "round")
-            return super().finished(seconds)
+    def guide():
+        yield from until(lambda state: state.tests)
+        yield "pause", {}
+        for unit in ("test", "test", "test", "round", ""):
+            state = yield from until(lambda state: state.paused and not state.running_tests)
+            pauses.append((len(state.finished_tests), state.rounds_done))
+            yield ("step", {"unit": unit}) if unit else ("stop", {})
 
     with pytest.raises(Stopped):
-        drive(path, Stepping(needs("wall", "far_box"), 2))
+        guided(new_run(tmp_path), needs("wall", "far_box"), guide(), 2)
     tests = [count for count, _ in pauses]
     assert [after - before for before, after in pairwise(tests[:4])] == [1, 1, 1]
     assert pauses[4][1] == pauses[3][1] + 1
@@ -342,16 +275,14 @@ def test_commands_without_sense_are_marked_and_ignored(tmp_path):
             ("veto", {"round": 9}),
             ("accept_mode", {"mode": 3}),
             ("dance", {}),
+            ("resume", {}),
             ("step", {"unit": 1}),
         ]:
             viewer.send(kind, **data)
     state = drive(path, FakePool(needs("wall"), 2))
     assert state.minimal
-    assert state.last_command == 5
-
-
-def test_elements_are_those_of_the_world(tmp_path):
-    assert drive(new_run(tmp_path), FakePool(needs("wall"), 1)).elements == ELEMENTS
+    assert state.last_command == 6
+    assert not told(path, "resumed")
 
 
 class SlowPool(FakePool):
@@ -363,8 +294,7 @@ class SlowPool(FakePool):
 
 
 def forecasts(path):
-    with RunFile(path) as file:
-        return [asdict(event.event) for event in file.events() if event.kind == "forecast"]
+    return told(path, "forecast")
 
 
 def test_each_round_is_forecast_while_tests_run(tmp_path, monkeypatch):

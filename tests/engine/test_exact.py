@@ -10,13 +10,11 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
-from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY
-from ddenv.runfile.store import RunFile
 from ddenv.schemas import names
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import guided, until
-from tests.engine.killing import Killed, kill_after, story
+from tests.engine.killing import killed, resumed, story
 from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.tiers import examples
@@ -78,20 +76,9 @@ def test_killed_at_any_moment_and_with_any_workers_it_comes_to_the_same_end(salt
     with tempfile.TemporaryDirectory() as folder:
         undisturbed = drive(exact_run(folder), FakePool(chaotic(salt), 1))
         path = exact_run(folder)
-        for moment in moments:
-            try:
-                drive(
-                    path,
-                    FakePool(chaotic(salt), jobs, moment),
-                    prepare=lambda file, after=moment: kill_after(file, after),
-                )
-            except Killed:
-                continue
-            break
-        with RunFile(path) as file:
-            state = fold(file.events())
-        if state.status != "finished":
-            state = drive(path, FakePool(chaotic(salt), jobs))
+        pool = FakePool(chaotic(salt), jobs, salt)
+        killed(path, pool, moments)
+        state = resumed(path, pool)
     assert story(state) == story(undisturbed)
 
 

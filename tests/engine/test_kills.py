@@ -7,22 +7,19 @@ import signal
 import time
 from collections import Counter
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from ddenv.engine.journal import Journal
 from ddenv.runfile.state import BROKEN
-from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import last_words, start_engine
 from ddenv.runs.trust import program_of, trust
-from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle
-from tests.conftest import DATA
-from tests.engine.killing import models_in, story
+from tests.engine.killing import story
+from tests.engine.reading import models_in, state_of, told
 from tests.waiting import PATIENCE, PERIOD
+from tests.wall import wall
 
 KILLS = int(os.environ.get("DDENV_KILLS", "6"))
 # An engine is killed within this time after its first test began, and so is one of its workers, s. One engine in so many dies
@@ -40,15 +37,8 @@ exit 0
 
 def new_run(folder: Path, name: str) -> Path:
     (folder / "robot.sh").write_text(ROBOT)
-    scenario = load_scenario(DATA / "wall.yaml")
     more = {"iterations": 9, "growth": "paper", "skip": "known", "baseline_runs": 6}
-    scenario = scenario.model_copy(
-        update={
-            "oracle": Oracle(command="sh robot.sh {world}"),
-            "folder": folder,
-            "reduction": scenario.reduction.model_copy(update=more),
-        }
-    )
+    scenario = wall(oracle=Oracle(command="sh robot.sh {world}"), folder=folder, reduction=more)
     run = folder / f"{name}.ddenv"
     create_run(scenario, run)
     trust(program_of(scenario))
@@ -72,8 +62,7 @@ def workers(engine: int) -> list[int]:
 
 def how_many_began(run: Path) -> int:
     """How many tests ever began in a run."""
-    with RunFile(run) as file:
-        return sum(event.kind == "test_started" for event in file.events())
+    return len(told(run, "test_started"))
 
 
 def lives(run: Path, dice: random.Random, most: int) -> int:
@@ -99,23 +88,19 @@ def lives(run: Path, dice: random.Random, most: int) -> int:
 
 
 def what_became(run: Path):
-    with RunFile(run) as file:
-        journal = Journal(file)
-        judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
-    verdicts = [(data["round"], data["candidate"], data["verdict"]) for data in judged]
-    sound = [test for test in journal.state.finished_tests if test.outcome not in BROKEN]
-    made = Counter((models_in(journal.state, test.id), test.run) for test in sound)
+    state = state_of(run)
+    verdicts = [(data["round"], data["candidate"], data["verdict"]) for data in told(run, "candidate_judged")]
+    sound = [test for test in state.finished_tests if test.outcome not in BROKEN]
+    made = Counter((models_in(state, test.id), test.run) for test in sound)
     assert set(made.values()) == {1}, "a finished test was made again"
-    assert journal.state.status == "finished"
-    return story(journal.state), verdicts
+    assert state.status == "finished"
+    return story(state), verdicts
 
 
 def came_of(run: Path) -> Counter:
     """How many engines worked on a run, how many of its tests ended, and how many were broken or lost by kills."""
-    with RunFile(run) as file:
-        state = Journal(file).state
-        engines = sum(event.kind == "engine_started" for event in file.events())
-    outcomes = Counter(test.outcome for test in state.tests)
+    engines = len(told(run, "engine_started"))
+    outcomes = Counter(test.outcome for test in state_of(run).tests)
     broken, lost = outcomes.pop("error", 0), outcomes.pop("lost", 0)
     return Counter(engines=engines, ended=outcomes.total(), broken=broken, lost=lost)
 
@@ -133,8 +118,7 @@ def test_killed_at_random_moments_it_ends_as_if_nothing_had_happened(tmp_path, m
         finished = False
         while not finished:
             left -= lives(run, dice, left)
-            with RunFile(run) as file:
-                finished = Journal(file).state.status == "finished"
+            finished = state_of(run).status == "finished"
         assert what_became(run) == expected, number
         came += came_of(run)
     print(f"{KILLS} kills in {number} runs: {dict(came)}")

@@ -1,16 +1,14 @@
 """What the user decides at awkward moments: while a reduction waits, one thing right after another, or as the engine is killed."""
 
-from dataclasses import asdict
-
 import pytest
 
 from ddenv.engine.control import Stopped
-from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
-from tests.engine.guided import at_once, events, guided, numbers, until  # noqa: F401
+from tests.engine.guided import at_once, guided, numbers, until  # noqa: F401
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import flaky, needs
+from tests.engine.reading import send, state_of, told
 
 
 def elsewhere(keep, _):
@@ -59,7 +57,7 @@ def test_while_one_waits_an_earlier_one_is_wanted_after_all(tmp_path, refused):
 
     path = new_run(tmp_path)
     state = guided(path, lambda *_: "similar", guide())
-    assert next(asdict(event.event)["candidate"] for event in events(path) if event.kind == "reduced") == 0
+    assert told(path, "reduced")[0]["candidate"] == 0
     # Resumed, it goes the same way.
     again = FakePool(lambda *_: "similar", 1)
     assert drive(path, again).environment == state.environment
@@ -87,8 +85,7 @@ def test_what_is_accepted_is_taken_before_the_next_decision(tmp_path):
 
     def guide():
         state = yield from first_waits()
-        with RunFile(path) as other:
-            other.send("accept", round=state.round.number, candidate=state.waiting_candidate)
+        send(path, "accept", round=state.round.number, candidate=state.waiting_candidate)
         yield "undo", {}
         yield "accept_mode", {"mode": "automatic"}
 
@@ -164,8 +161,7 @@ def test_what_is_unpinned_is_not_called_minimal_before_it_was_left_out(tmp_path)
 
     path = new_run(tmp_path)
     assert guided(path, needs("wall"), guide()).minimal
-    with RunFile(path) as viewer:
-        viewer.send("unpin", models=numbers("ball"))
+    send(path, "unpin", models=numbers("ball"))
     state = drive(path, FakePool(needs("wall"), 1))
     assert state.environment == ("wall",)
     assert [node.environment for node in state.nodes if node.minimal] == [("wall",)]
@@ -189,21 +185,18 @@ def test_trials_keep_to_the_budget(tmp_path):
     path = new_run(tmp_path, budget=6)
     with pytest.raises(Stopped, match="the budget of 6 tests is used up"):
         guided(path, needs("wall"), guide(), 2)
-    assert fold(events(path)).tests_done == 6
+    assert state_of(path).tests_done == 6
 
 
 def test_with_more_budget_the_search_goes_on_as_it_was(tmp_path):
     path, undisturbed = new_run(tmp_path, budget=6, pair="learner/timestep"), new_run(tmp_path, pair="learner/timestep")
-    with pytest.raises(Stopped):
+    with pytest.raises(Stopped, match="the budget of 6 tests is used up"):
         drive(path, FakePool(needs("wall", "beam"), 1))
-    with RunFile(path) as viewer:
-        viewer.send("change", settings={"budget": 500})
-    drive(path, FakePool(needs("wall", "beam"), 1))
+    assert state_of(path).tests_done == 6
+    send(path, "change", settings={"budget": 500})
+    assert drive(path, FakePool(needs("wall", "beam"), 1)).minimal
     drive(undisturbed, FakePool(needs("wall", "beam"), 1))
-    rounds = [
-        [asdict(event.event) for event in events(each) if event.kind == "round_started"] for each in (path, undisturbed)
-    ]
-    assert rounds[0] == rounds[1]
+    assert told(path, "round_started") == told(undisturbed, "round_started")
 
 
 def test_a_decision_at_the_last_moment_counts(tmp_path):
@@ -225,9 +218,9 @@ def test_a_decision_counts_once_whenever_the_engine_is_killed(tmp_path):
     for after in range(1, 7):
         path = new_run(tmp_path, iterations=0)
         drive(path, FakePool(needs("wall"), 1))
-        with RunFile(path) as viewer:
-            viewer.send("undo")
+        send(path, "undo")
         with pytest.raises(Killed):
             drive(path, FakePool(needs("wall"), 1), prepare=lambda file, after=after: kill_after(file, after))
         state = drive(path, FakePool(needs("wall"), 1))
         assert [one.kind for one in state.decisions] == ["undo"]
+        assert state.status == "finished" and "wall" in state.environment

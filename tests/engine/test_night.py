@@ -1,33 +1,31 @@
 """What a night brings: a full disk, a clock that jumps, a run file that is copied, deleted or replaced under an engine."""
 
 import errno
+import os
 import shutil
 import sqlite3
 import threading
 import time
 from collections import namedtuple
-from dataclasses import asdict
+from functools import partial
 
 import pytest
 
 from ddenv.engine import disturbances
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.disturbances import NEEDED, ClockJumps, DiskSpace
-from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
-from ddenv.runfile import lock
 from ddenv.runfile.events import EngineStarted, Paused, TestFinished
 from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import LOGS, NoRoom, RunFile
-from ddenv.runs.subject import read_parts
 from ddenv.words.news import news
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import story
 from tests.engine.oracles import needs
+from tests.engine.reading import events, told
 
 Usage = namedtuple("Usage", "free")
 
@@ -37,19 +35,9 @@ oracle = needs("deck", "wall")
 
 def watched(path, terminated=None):
     """Works on a run as `drive` does, with an eye on the disk."""
-    from ddenv.engine.__main__ import _begin
-
     terminated = terminated or threading.Event()
-    with RunFile(path) as file:
-        scenario, world, _ = read_parts(file)
-        watch = DiskSpace(file, terminated)
-        file.own(watch.wait)
-        journal = Journal(file)
-        pool = FakePool(oracle, 2)
-        _begin(journal, pool.jobs, None)
-        control = Control(journal, terminated, disk=watch)
-        Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
-        return journal.state
+    watch = partial(DiskSpace, terminated=terminated)
+    return drive(path, FakePool(oracle, 2), terminated=terminated, watch=watch)
 
 
 @pytest.fixture
@@ -65,15 +53,14 @@ def disk(monkeypatch, free):
     monkeypatch.setattr(disturbances.shutil, "disk_usage", lambda _: Usage(free()))
 
 
-def told(path):
+def lines_and_kinds(path):
     """The lines that a follower reads, and the kinds of events."""
     lines, kinds, state = [], [], None
-    with RunFile(path) as file:
-        for event in file.events():
-            before, state = state, fold([event], state)
-            kinds.append(event.kind)
-            if before is not None and (line := news(event.kind, before, state)):
-                lines.append(line.strip())
+    for event in events(path):
+        before, state = state, fold([event], state)
+        kinds.append(event.kind)
+        if before is not None and (line := news(event.kind, before, state)):
+            lines.append(line.strip())
     return lines, kinds
 
 
@@ -84,7 +71,7 @@ def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_t
     disk(monkeypatch, lambda: next(looks, 10 * NEEDED))
     path = new_run(tmp_path)
     assert story(watched(path)) == undisturbed
-    lines, kinds = told(path)
+    lines, kinds = lines_and_kinds(path)
     first, last = (number for number, kind in enumerate(kinds) if kind == "disk_space")
     assert "test_started" not in kinds[first:last] and "test_started" in kinds[:first]
     assert "no room on the disk: waits until 32 MB are free" in lines and "there is room on the disk again" in lines
@@ -148,9 +135,8 @@ def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path):
         for jump, passed in ((0.1, 0.1), (-1.0, 600.0), (8 * 3600.0, 0.1), (0.0, 0.1), (-3 * 86400.0, 0.1)):
             now[0], now[1] = now[0] + jump, now[1] + passed
             jumps.look()
-        found = [asdict(event.event)["seconds"] for event in file.events() if event.kind == "clock_jumped"]
-        assert found == pytest.approx([8 * 3600.0, -3 * 86400.0])
-    assert "the machine slept, or its clock was set: that time does not count" in told(path)[0]
+    assert [data["seconds"] for data in told(path, "clock_jumped")] == pytest.approx([8 * 3600.0, -3 * 86400.0])
+    assert "the machine slept, or its clock was set: that time does not count" in lines_and_kinds(path)[0]
 
 
 def test_a_stop_for_an_earlier_engine_stops_no_later_one_although_the_clock_was_set_back(tmp_path, monkeypatch):
@@ -216,38 +202,32 @@ def test_a_run_that_is_copied_while_an_engine_works_is_readable(tmp_path):
         file.append = counted
 
     drive(path, FakePool(oracle, 2), prepare=disturb)
-    for folder, events in zip(copies, (counts[0], 1), strict=True):
+    for folder, count in zip(copies, (counts[0], 1), strict=True):
         with RunFile(folder / path.name) as file:
             found = whole(file)
-            assert (found.trouble, found.events) == ("", events)
+            assert (found.trouble, found.events) == ("", count)
     drive(copies[1] / path.name, FakePool(oracle, 2))
 
 
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
-def test_a_folder_without_locks_is_told_in_one_line(tmp_path, monkeypatch, number):
+NO_LOCKS = "its folder has no file locks .* copy the run"
+REFUSED = {
+    "no locks": ("fcntl.flock", errno.ENOLCK, NO_LOCKS),
+    "unsupported": ("fcntl.flock", errno.EOPNOTSUPP, NO_LOCKS),
+    "no writing": ("os.open", errno.EACCES, "Permission denied; copy the run"),
+}
+
+
+@pytest.mark.parametrize(("call", "number", "words"), REFUSED.values(), ids=REFUSED)
+def test_a_folder_in_which_no_engine_can_work_is_told_in_one_line(tmp_path, monkeypatch, call, number, words):
     path = new_run(tmp_path)
 
     def refuse(*_):
-        raise OSError(number, "No locks available")
+        raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(lock.fcntl, "flock", refuse)
-    with (
-        pytest.raises(UserError, match=r"no engine can work here: its folder has no file locks .* copy the run"),
-        engine_lock(path),
-    ):
+    monkeypatch.setattr(f"ddenv.runfile.lock.{call}", refuse)
+    with pytest.raises(UserError, match=f"no engine can work here: {words}"), engine_lock(path):
         pass
     assert not engine_is_alive(path)
-
-
-def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path, monkeypatch):
-    path = new_run(tmp_path)
-
-    def refuse(*_):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    monkeypatch.setattr(lock.os, "open", refuse)
-    with pytest.raises(UserError, match="no engine can work here: Permission denied; copy the run"), engine_lock(path):
-        pass
 
 
 def test_an_error_of_writing_that_is_no_full_disk_is_not_waited_for(tmp_path):

@@ -8,14 +8,13 @@ import time
 
 import pytest
 
-from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.world.load import load_scenario
-from tests.conftest import DATA
+from tests.engine.reading import state_of
 from tests.waiting import wait_until
+from tests.wall import wall
 
 LIMIT = 3.0
 pytestmark = [pytest.mark.programs, pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's prlimit")]
@@ -23,9 +22,7 @@ pytestmark = [pytest.mark.programs, pytest.mark.skipif(sys.platform != "linux", 
 
 @pytest.fixture
 def path(tmp_path):
-    scenario = load_scenario(DATA / "wall.yaml")
-    simulation = scenario.simulation.model_copy(update={"wall_timeout": LIMIT})
-    create_run(scenario.model_copy(update={"simulation": simulation}), tmp_path / "a.ddenv")
+    create_run(wall(simulation={"wall_timeout": LIMIT}), tmp_path / "a.ddenv")
     return tmp_path / "a.ddenv"
 
 
@@ -37,11 +34,6 @@ def engine(path):
         os.killpg(process.pid, signal.SIGCONT)
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-
-
-def state_of(path):
-    with RunFile(path) as file:
-        return fold(file.events())
 
 
 def at_work(path):

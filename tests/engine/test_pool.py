@@ -13,18 +13,16 @@ from ddenv.engine.pool import PREPARATION, Pool
 from ddenv.engine.worker import PERIOD, Broken, Moment, Run, answered
 from ddenv.errors import UserError
 from ddenv.runs.subject import load_parts
-from ddenv.world.load import load_scenario
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.waiting import wait_until
+from tests.wall import wall
 
 EVERYTHING = frozenset({"deck", "wall"})
 
 
 def parts(**simulation):
-    scenario = load_scenario(DATA / "wall.yaml")
-    changed = scenario.simulation.model_copy(update=simulation)
-    scenario = scenario.model_copy(update={"simulation": changed})
+    scenario = wall(simulation=simulation)
     return scenario, *load_parts(scenario)
 
 
@@ -59,8 +57,9 @@ def test_models_that_moved_are_told_while_a_test_runs():
 
 
 @pytest.fixture
-def pool():
-    pool = Pool(*parts(), 2)
+def pool(request):
+    """Of one worker, or of as many as the test says."""
+    pool = Pool(*parts(), getattr(request, "param", 1))
     yield pool
     pool.close()
 
@@ -115,6 +114,7 @@ def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(p
     assert (test, after.outcome) == (2, "failed")
 
 
+@pytest.mark.parametrize("pool", [2], indirect=True)
 def test_an_exception_in_a_worker_is_an_error_of_its_test_and_another_worker_goes_on(pool):
     for test in (1, 2):
         pool.submit(test, EVERYTHING, 0)

@@ -9,8 +9,6 @@ from ddenv.engine import shared
 from ddenv.engine.control import Stopped
 from ddenv.errors import UserError
 from ddenv.report.report import write_report
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
 from ddenv.runs import processor
 from tests.command import ddenv
 from tests.conftest import DATA
@@ -18,6 +16,7 @@ from tests.engine import fake
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs
+from tests.engine.reading import send, state_of
 
 FIRST = (frozenset(ELEMENTS), 0)
 
@@ -32,16 +31,11 @@ def begun(tmp_path):
     return path
 
 
-def state_of(path):
-    with RunFile(path) as file:
-        return fold(file.events())
-
-
 def resumed(path, kill=True, **options):
     """What an engine makes that goes on with the run, until it is killed, and the state after it."""
     pool = FakePool(needs("wall", "beam"), 1)
     with suppress(Killed):
-        drive(path, pool, prepare=(lambda file: kill_after(file, 20)) if kill else None, **options)
+        drive(path, pool, prepare=lambda file: kill and kill_after(file, 20), **options)
     return pool.made, state_of(path)
 
 
@@ -127,8 +121,7 @@ def test_a_stop_ends_the_comparison(begun, monkeypatch):
     pool = FakePool(needs("wall", "beam"), 1)
 
     def finished(seconds):
-        with RunFile(begun) as viewer:
-            viewer.send("stop")
+        send(begun, "stop")
         return []
 
     monkeypatch.setattr(pool, "finished", finished)

@@ -7,7 +7,6 @@ import pytest
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.single_test import plan
-from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_like
 from ddenv.runs.subject import open_subject, read_subject
@@ -17,13 +16,9 @@ from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs
+from tests.engine.reading import state_of
 
 RULES = pytest.mark.parametrize("seeds", ["hashed", "consecutive"])
-
-
-def state_of(path):
-    with RunFile(path) as file:
-        return fold(file.events())
 
 
 def half(keep, seed):

@@ -25,9 +25,10 @@ from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import Guided, numbers, until
-from tests.engine.killing import Killed, kill_after, story
+from tests.engine.killing import Killed, kill_after, killed, resumed, story
 from tests.engine.oracles import needs
-from tests.engine.test_certify import DRIFTING, _killed, _resumed, at_rates, claims
+from tests.engine.reading import events, state_of
+from tests.engine.test_certify import DRIFTING, at_rates, claims
 from tests.tiers import examples
 
 PAIRS = [("ball", "post"), ("beam", "far_box")]
@@ -57,11 +58,6 @@ def pool(oracle, jobs=2, seed=0, supports=PAIRS):
     return made
 
 
-def events(path):
-    with RunFile(path) as file:
-        return list(file.events())
-
-
 def test_what_is_wrong_with_the_start_is_told_once_each_before_the_first_test(tmp_path, world):
     path = new_run(tmp_path, world=world, budget=1)
     made = pool(needs("wall"))
@@ -73,8 +69,7 @@ def test_what_is_wrong_with_the_start_is_told_once_each_before_the_first_test(tm
         drive(path, made)
     kinds = [event.kind for event in events(path)]
     assert kinds.index("supports") < kinds.index("test_started")
-    with RunFile(path) as file:
-        notes = fold(file.events()).notes
+    notes = state_of(path).notes
     assert notes == tuple(notes_on(read_world(world), made.settled))
     assert [about for about, _ in notes] == ["unrest", "restless"]
 
@@ -102,7 +97,7 @@ def test_it_is_found_before_the_first_test_and_once(tmp_path, world):
     assert kinds.count("supports") == 1
     assert kinds.index("supports") < kinds.index("test_started")
     assert "supports_started" not in kinds
-    state = fold(events(path))
+    state = state_of(path)
     assert state.supports == (("ball", "post"), ("beam", "far_box"))
     assert state.ties == (("ball", "post"),)
 
@@ -184,7 +179,7 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
         asked["world"] = _world(aside)
         undisturbed = drive(new_run(Path(folder), **asked), pool(oracle, 1))
         path = new_run(Path(folder), **asked)
-        _killed(path, pool(oracle, jobs, salt), moments)
-        state = _resumed(path, pool(oracle, jobs, salt))
+        killed(path, pool(oracle, jobs, salt), moments)
+        state = resumed(path, pool(oracle, jobs, salt))
     assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
     assert state.supports == undisturbed.supports

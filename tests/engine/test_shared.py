@@ -3,7 +3,6 @@
 import json
 import shutil
 import sqlite3
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -12,11 +11,12 @@ from ddenv.engine import shared
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
-from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.oracles import needs
+from tests.engine.reading import told
+from tests.wall import wall
 
 METHOD = {"algorithm": "splitting"}
 
@@ -31,12 +31,6 @@ def known(path):
 def share(path, pool, found=None):
     """Works on a run; it takes over what it can."""
     return drive(path, pool, others=known(path) if found is None else found)
-
-
-def events(path):
-    """The finished tests of a run as they are written down."""
-    with RunFile(path) as file:
-        return [asdict(event.event) for event in file.events() if event.kind == "test_finished"]
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +59,8 @@ def test_a_test_that_is_taken_over_is_the_one_that_was_made(made, fresh):
     assert pool.made == []
     assert state.minimal and set(state.environment) == {"wall", "beam"}
     assert all(test.taken for test in state.tests)
-    assert events(fresh) == [data | {"taken": made.stem} for data in events(made)]
+    written = told(made, "test_finished")
+    assert told(fresh, "test_finished") == [data | {"taken": made.stem} for data in written]
     with RunFile(fresh) as one, RunFile(made) as two:
         for test in state.tests:
             assert one.motions(test.id) == two.motions(test.id) != {}
@@ -120,8 +115,7 @@ DIFFERS = {
 
 def asked():
     """What the run `made` was asked for, but for how the world is reduced."""
-    scenario = load_scenario(DATA / "wall.yaml")
-    return scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update={"early_stop": False})})
+    return wall(reduction={"early_stop": False})
 
 
 def changed_run(folder, changed):

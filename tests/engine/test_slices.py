@@ -10,13 +10,12 @@ from hypothesis import strategies as st
 from ddenv.runfile.events import SlicesRefuted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY
-from ddenv.runfile.store import RunFile
 from tests.engine.fake import FakePool, drive, new_run
-from tests.engine.guided import Guided, until
-from tests.engine.killing import Killed, kill_after, models_in
+from tests.engine.guided import Guided, at_once, until  # noqa: F401
+from tests.engine.killing import Killed, kill_after, killed, resumed
 from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
-from tests.engine.test_certify import _killed, _resumed
+from tests.engine.reading import events, models_in, state_of
 from tests.engine.test_repeating import another_drake
 from tests.tiers import examples
 
@@ -26,25 +25,9 @@ SIMULATORS = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ti
 FLAKY = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES, tenths=st.sampled_from([6, 9]))
 
 
-@pytest.fixture
-def at_once(monkeypatch):
-    """Nobody waits for the user to come to rest."""
-    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
-    monkeypatch.setattr("ddenv.engine.bench.WAIT", 0.0)
-
-
-def state_of(path):
-    with RunFile(path) as file:
-        return fold(file.events())
-
-
-def worlds_of(path):
+def worlds_of(state):
     """The models in the world of each test."""
-    from ddenv.engine.journal import Journal
-
-    with RunFile(path) as file:
-        journal = Journal(file)
-        return [(test, models_in(journal.state, test.id)) for test in journal.state.tests]
+    return [(test, models_in(state, test.id)) for test in state.tests]
 
 
 def journey(state):
@@ -70,7 +53,7 @@ def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, 
         for wanted in (True, False):
             path, pool = sliced_run(Path(folder), slice=wanted, accept_rate=accept), made_by.pool(seed=seed)
             state = drive(path, pool)
-            for test, keep in worlds_of(path):
+            for test, keep in worlds_of(state):
                 outcome, met, _ = made_by.run(keep, test.seed)
                 assert test.outcome == outcome
                 assert test.took_part is not None and set(test.took_part.names(state.elements)) == met
@@ -122,10 +105,10 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice
     with tempfile.TemporaryDirectory() as folder:
         undisturbed = drive(sliced_run(Path(folder), accept_rate=accept), made_by.pool())
         path = sliced_run(Path(folder), accept_rate=accept)
-        _killed(path, made_by.pool(jobs), moments)
-        state = _resumed(path, made_by.pool(jobs))
+        killed(path, made_by.pool(jobs), moments)
+        state = resumed(path, made_by.pool(jobs))
         assert journey(state) == journey(undisturbed)
-        finished = [(keep, test.run) for test, keep in worlds_of(path) if test.is_finished]
+        finished = [(keep, test.run) for test, keep in worlds_of(state) if test.is_finished]
         assert len(finished) == len(set(finished))
 
 
@@ -142,7 +125,7 @@ def test_a_simulator_that_does_not_say_all_is_found_out(made_by, jobs, data):
         if state.refuted is not None:
             assert not state.implied
             assert all(
-                test.outcome == made_by.run(keep, test.seed)[0] for test, keep in worlds_of(path) if test.is_finished
+                test.outcome == made_by.run(keep, test.seed)[0] for test, keep in worlds_of(state) if test.is_finished
             )
 
 
@@ -173,9 +156,9 @@ def test_an_engine_that_is_killed_before_it_compares_does_so_when_it_resumes(tmp
 def test_what_rested_on_slices_is_open_again(tmp_path):
     path = sliced_run(tmp_path, accept_rate="first", audit=1)
     state = drive(path, LIAR.pool())
-    with RunFile(path) as file:
-        event = next(event for event in file.events() if event.kind == "slices_refuted")
-        before, after = (fold(file.events()[: event.id - 1 + step]) for step in (0, 1))
+    written = events(path)
+    event = next(event for event in written if event.kind == "slices_refuted")
+    before, after = (fold(written[: event.id - 1 + step]) for step in (0, 1))
     assert before.here.how == "sliced"
     assert after.environment == state.elements
     assert after.implied == 0
@@ -191,7 +174,6 @@ def guided(path, guide):
     return drive(path, HONEST.told(Guided(path, HONEST.outcome, guide)))
 
 
-@pytest.mark.usefixtures("at_once")
 def test_a_slice_that_is_taken_back_is_not_taken_again(tmp_path):
     def guide():
         yield from until(lambda state: state.here is not None and state.here.how == "sliced")
@@ -203,7 +185,6 @@ def test_a_slice_that_is_taken_back_is_not_taken_again(tmp_path):
     assert set(state.environment) == set(HONEST.needed)
 
 
-@pytest.mark.usefixtures("at_once")
 def test_a_pinned_model_is_in_every_slice_with_what_it_is_tied_to(tmp_path):
     def guide():
         yield from until(lambda state: len(state.tests) == 1)
@@ -216,7 +197,6 @@ def test_a_pinned_model_is_in_every_slice_with_what_it_is_tied_to(tmp_path):
     assert set(state.environment) == {*HONEST.needed, "box_23"}
 
 
-@pytest.mark.usefixtures("at_once")
 def test_where_each_reduction_waits_for_the_user_none_is_made_without_a_test(tmp_path):
     def guide():
         while True:

@@ -8,16 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine.control import Stopped
-from ddenv.engine.journal import Journal
 from ddenv.evidence.claims import helping
-from ddenv.runfile.fold import fold
 from ddenv.runfile.state import FIRST_FRESH_RUN
-from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
-from tests.engine.guided import COMMANDS, Disturbed, Guided, at_once, events, guided, numbers, until  # noqa: F401
-from tests.engine.killing import Killed, finished_tests, kill_after, models_in
+from tests.engine.guided import COMMANDS, Disturbed, Guided, at_once, guided, numbers, until  # noqa: F401
+from tests.engine.killing import finished_tests, killed
 from tests.engine.oracles import flaky, needs
+from tests.engine.reading import events, models_in, send, state_of
 from tests.tiers import examples
 
 
@@ -34,9 +31,7 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     assert state.reason.endswith("; 1 pinned model was never left out")
     leg = [event.id for event in events(path) if event.kind == "leg_started"][-1]
     started = [asdict(event.event)["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
-    with RunFile(path) as file:
-        journal = Journal(file)
-    assert all("ball" in models_in(journal.state, test) for test in started)
+    assert all("ball" in models_in(state, test) for test in started)
     assert [one.kind for one in state.decisions] == ["pin"]
 
 
@@ -121,27 +116,6 @@ def test_another_failure_is_taken_for_as_good(tmp_path):
     assert state.minimal
 
 
-def test_a_finished_run_can_be_taken_up_again(tmp_path):
-    path = new_run(tmp_path)
-    assert drive(path, FakePool(needs("wall"), 1)).environment == ("wall",)
-    with RunFile(path) as viewer:
-        viewer.send("undo")
-    state = drive(path, FakePool(needs("wall"), 1))
-    assert state.status == "finished"
-    assert "wall" in state.environment
-    assert len(state.decisions) == 1
-
-
-def test_a_budget_stops_the_run_and_more_of_it_goes_on(tmp_path):
-    path = new_run(tmp_path, budget=5)
-    with pytest.raises(Stopped, match="the budget of 5 tests is used up"):
-        drive(path, FakePool(needs("wall"), 2))
-    assert fold(events(path)).tests_done == 5
-    with RunFile(path) as viewer:
-        viewer.send("change", settings={"budget": 500})
-    assert drive(path, FakePool(needs("wall"), 2)).minimal
-
-
 def test_a_model_that_only_helps_is_left_out_and_the_search_goes_on(tmp_path):
     def oracle(keep, seed):
         # In the search f is gone without the beam; with fresh seeds it is only rarer.
@@ -151,8 +125,7 @@ def test_a_model_that_only_helps_is_left_out_and_the_search_goes_on(tmp_path):
     before = drive(path, FakePool(oracle, 2))
     assert (set(before.environment), before.minimal) == ({"wall", "beam"}, False)
     assert helping(before.certificate) == ("beam",)
-    with RunFile(path) as viewer:
-        viewer.send("leave_out", model=ELEMENTS.index("beam"))
+    send(path, "leave_out", model=ELEMENTS.index("beam"))
     state = drive(path, FakePool(oracle, 2))
     assert (state.environment, state.minimal) == (("wall",), True)
     assert (state.here.how, state.decisions[-1].words) == ("left_out", "left out beam, which only helped")
@@ -245,20 +218,11 @@ def test_what_cannot_be_is_refused_with_the_reason(tmp_path, kind, data, why):
 def test_whatever_is_decided_and_whenever_it_is_killed_the_run_ends_sound(salt, plan, moments, jobs):
     with tempfile.TemporaryDirectory() as folder:
         path, oracle, plan = new_run(Path(folder)), flaky(salt, "wall", "beam"), sorted(plan, key=lambda one: one[0])
-        for moment in moments:
-            try:
-                drive(
-                    path,
-                    Disturbed(path, oracle, jobs, plan, moment),
-                    prepare=lambda file, after=moment: kill_after(file, after),
-                )
-            except Killed:
-                continue
-            break
+        killed(path, Disturbed(path, oracle, jobs, plan, salt), moments)
         state = drive(path, Disturbed(path, oracle, jobs, plan))
         assert state.status == "finished"
         # Whoever folds the file sees the same.
-        assert fold(events(path)) == state
+        assert state_of(path) == state
         assert state.pinned <= set(state.environment) or any(one.kind == "go_back" for one in state.decisions)
         finished = finished_tests(path)
         assert len(finished) == len(set(finished))

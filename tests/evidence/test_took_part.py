@@ -9,7 +9,7 @@ from ddenv.cli.summary import summary, summary_lines
 from ddenv.evidence.took_part import why_sliced
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
-from ddenv.runfile.fold import apply, fold
+from ddenv.runfile.fold import apply
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
@@ -21,6 +21,7 @@ from ddenv.workbench.run.models import FREE, Course, steps
 from tests.command import in_process
 from tests.engine.fake import drive
 from tests.engine.participation import MODELS, Participation, sliced_run
+from tests.engine.reading import state_of
 
 SIMULATOR = Participation(2, ("box_1", "box_7", "box_12"), ties=(("box_1", "box_20"),))
 
@@ -118,8 +119,7 @@ def test_a_report_gives_the_reason_for_each_model(run):
 def test_the_map_of_a_run_shows_what_took_part(run, monkeypatch, capsys):
     said = in_process(monkeypatch, capsys, "world", "show", run, "--took-part")
     assert said.returncode == 0
-    with RunFile(run) as file:
-        state = fold(file.events())
+    state = state_of(run)
     met = set().union(*(test.took_part.names(state.elements) for test in state.tests if test.phase == "baseline"))
     for name in MODELS:
         assert (f"  {name}: " in said.stdout) == (name in met)

@@ -2,6 +2,7 @@
 
 import tempfile
 import threading
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,9 +19,9 @@ from ddenv.guiding.offers import ACTIONS, Pointed, offer
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.run_keys import GUIDING, KeyOffers
-from tests.engine.fake import ELEMENTS, drive, new_run
+from tests.engine.fake import ELEMENTS, new_run
 from tests.engine.guided import COMMANDS, Disturbed, at_once
-from tests.engine.killing import Killed, kill_after
+from tests.engine.killing import killed
 from tests.engine.oracles import flaky
 from tests.tiers import examples
 
@@ -88,12 +89,8 @@ def begun(folder, salt, plan, moment, mode):
     """The file of a run that was guided by `plan` until its engine was killed after so many events."""
     path, plan = new_run(Path(folder)), sorted(plan, key=lambda one: one[0])
     pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, plan, salt)
-    try:
-        drive(path, pool, accept_mode=mode, prepare=lambda file: kill_after(file, moment))
-    except Killed:
-        pass
-    finally:
-        pool.viewer.close()
+    with closing(pool.viewer):
+        killed(path, pool, [moment], accept_mode=mode)
     return path
 
 

@@ -15,6 +15,7 @@ from ddenv.reduction.isolation import MOST_RUNS, Asked, Checked, Passing, isolat
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import standing
 from tests.reduction.driving import Driver, Known, World
+from tests.reduction.worlds import carried_through, tried
 from tests.tiers import examples
 
 MODELS = tuple(range(12))
@@ -23,18 +24,8 @@ groups = st.lists(st.sets(st.sampled_from(MODELS), min_size=1, max_size=4).map(E
 
 def search(searching, passing):
     """What is removed at the end, and all removals that were tried, in order."""
-    tried, winner = [], None
-    try:
-        while True:
-            round = searching.send(winner)
-            winner = None
-            for one in round.candidates:
-                tried.append(one.models)
-                if passing(one.models):
-                    winner = one
-                    break
-    except StopIteration as end:
-        return end.value, tried
+    removed, rounds = carried_through(searching, passing)
+    return removed, [one.models for round, winner in rounds for one in tried(round, winner)]
 
 
 def hits(groups):
@@ -55,10 +46,7 @@ def test_what_goes_lets_the_robot_pass_and_not_with_any_one_model_put_back(group
     assert put_back - {NOTHING} <= set(tried)
 
 
-@given(
-    passing=st.sets(st.integers(1, 31).map(Environment)),
-    first=st.integers(1, 5),
-)
+@given(passing=st.sets(st.integers(1, 31).map(Environment)), first=st.integers(1, 5))
 @examples(3)
 def test_it_is_one_minimal_whatever_passes(passing, first):
     """Also where a larger removal fails again."""

@@ -43,12 +43,7 @@ def needs(*needed):
 @pytest.mark.parametrize("prioritization", names("prioritization"))
 def test_every_combination_finds_the_needed_ones(algorithm, partitioning, prioritization):
     found = ddenv.reduce(
-        ELEMENTS,
-        needs("b", "g"),
-        algorithm=algorithm,
-        partitioning=partitioning,
-        prioritization=prioritization,
-        **ALL,
+        ELEMENTS, needs("b", "g"), algorithm=algorithm, partitioning=partitioning, prioritization=prioritization, **ALL
     )
     assert found.kept == ("b", "g")
 
@@ -273,10 +268,7 @@ def test_what_the_test_raises_comes_through():
 
 
 WRONG = {
-    "no positions": (
-        {},
-        "partitioning 'model2model' needs positions, which is missing; or use one of timeseg",
-    ),
+    "no positions": ({}, "partitioning 'model2model' needs positions, which is missing; or use one of timeseg"),
     "no trajectory": (
         {"positions": POSITIONS, "partitioning": "timeseg", "failure_pose": (0, 0, 0)},
         "partitioning 'timeseg' needs a trajectory",
@@ -337,9 +329,11 @@ def test_wrong_input_is_reported_in_one_line_before_any_test(case):
     assert not made
 
 
-@pytest.mark.parametrize("elements", [None, 3, [["a"]]])
-def test_elements_that_are_no_names_are_refused(elements):
-    with pytest.raises(ddenv.UserError, match="elements: expected names"):
+@pytest.mark.parametrize(
+    ("elements", "words"), [*((one, "expected names") for one in (None, 3, [["a"]])), ("abca", "'a' occurs twice")]
+)
+def test_elements_that_are_no_names_or_have_one_twice_are_refused(elements, words):
+    with pytest.raises(ddenv.UserError, match=f"elements: {words}"):
         ddenv.reduce(elements, needs("a"), algorithm="ddmin")
 
 
@@ -365,11 +359,6 @@ def test_what_a_model_is_like_reaches_the_schemas():
     known = ALL | {"traits": traits, "touched": ["a"]}
     found = ddenv.reduce(ELEMENTS, needs("a"), partitioning="learner", **known)
     assert found.kept == ("a",)
-
-
-def test_two_of_one_name_are_refused():
-    with pytest.raises(ddenv.UserError, match="elements: 'a' occurs twice"):
-        ddenv.reduce("abca", needs("a"), algorithm="ddmin")
 
 
 def test_the_library_needs_neither_drake_nor_a_screen():

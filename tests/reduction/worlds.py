@@ -41,13 +41,22 @@ def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="
     trials = []
     guide = make_guide(*pair, lambda: replace(known, trials=trials), **options)
     searching = search(algorithm, range(len(known.elements)), guide)
+
+    def learn(round, winner):
+        trials.extend(Trial(one.models, one is winner, known.elements) for one in tried(round, winner))
+
+    return carried_through(searching, is_similar, learn)
+
+
+def carried_through(searching, is_similar, learn=lambda round, winner: None):
+    """The end of a search, and its rounds with their winners."""
     rounds, winner = [], None
     try:
         while True:
             round = searching.send(winner)
             winner = next((one for one in round.candidates if is_similar(one.models)), None)
             rounds.append((round, winner))
-            trials += [Trial(one.models, one is winner, known.elements) for one in tried(round, winner)]
+            learn(round, winner)
             assert len(rounds) < 2000, "it does not end"
     except StopIteration as end:
         return end.value, rounds

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Template
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
-from ddenv.world.model import Collision, Inertia, Joint, Link, Mesh, Model, Shape, World
+from ddenv.world.model import Box, Collision, Inertia, Joint, Link, Mesh, Model, Shape, World
 from ddenv.world.pose import Pose, Vector
 from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import parse_world, read_model, read_world
@@ -58,6 +59,36 @@ def model_of(name: str, *links: Link, joints: tuple[Joint, ...] = (), **changes:
     """A model made of `links`, static if the first has no mass."""
     static = links[0].inertia is None
     return replace(Model(name, links[0].pose, static, links, joints, (), 1), **changes)
+
+
+def cube(
+    name: str, x: float, y: float, z: float = 0.15, side: float = 0.3, mass: float | None = 1.0, **changes: object
+) -> Model:
+    return model_of(name, link_of("link", Box((side, side, side)), Pose((x, y, z)), mass), **changes)
+
+
+def door(name: str, x: float, y: float, **changes: object) -> Model:
+    """A door leaf of 1 m whose hinge stands on its left."""
+    leaf = link_of("leaf", Box((0.05, 1.0, 0.8)), Pose((x, y, 0.6)), mass=3.0)
+    return model_of(name, leaf, joints=(joint_of("revolute", "world", "leaf", (x, y + 0.5, 0.6), **changes),))
+
+
+def run(template: Template, *names: str, seed: int = 1) -> RunResult:
+    return template.run(frozenset(names), seed)
+
+
+def bits(result: RunResult, *left_out: str) -> tuple:
+    """All of a run, but for how these models moved and what was noticed."""
+    motions = {name: rows.tobytes() for name, rows in result.motions.items() if name not in left_out}
+    return result.outcome, result.failure, result.trajectory.tobytes(), motions
+
+
+def noticed(result: RunResult) -> tuple[dict[str, float], dict[str, float]]:
+    return result.first_sensed, result.first_touched
+
+
+def all_bits(result: RunResult) -> tuple:
+    return *bits(result), noticed(result)
 
 
 def wedge(width: float, depth: float, height: float) -> Mesh:

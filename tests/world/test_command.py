@@ -5,9 +5,8 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
 from ddenv.world.command import command_words, filled, has_placeholder
-from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle
-from tests.conftest import DATA
+from tests.wall import wall
 
 
 @pytest.fixture
@@ -15,8 +14,7 @@ def words(tmp_path):
     (tmp_path / "run.sh").write_text("#!/bin/sh\n")
     (tmp_path / "run.sh").chmod(0o755)
     (tmp_path / "plain.sh").write_text("#!/bin/sh\n")
-    scenario = load_scenario(DATA / "wall.yaml").model_copy(update={"folder": tmp_path})
-    return lambda command: command_words(scenario.model_copy(update={"oracle": Oracle(command=command)}))
+    return lambda command: command_words(wall(folder=tmp_path, oracle=Oracle(command=command)))
 
 
 def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path):
@@ -81,13 +79,13 @@ def test_other_programs_may_start(words, tmp_path, content):
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):
-    gone = {"oracle": Oracle(command="sh"), "folder": tmp_path / "gone"}
+    gone = wall(oracle=Oracle(command="sh"), folder=tmp_path / "gone")
     with pytest.raises(UserError, match=r"^folder: there is no folder .*gone to start"):
-        command_words(load_scenario(DATA / "wall.yaml").model_copy(update=gone))
+        command_words(gone)
 
 
 def test_it_is_told_before_a_run_is_written(tmp_path):
-    scenario = load_scenario(DATA / "wall.yaml").model_copy(update={"oracle": Oracle(command="./gone.sh")})
+    scenario = wall(oracle=Oracle(command="./gone.sh"))
     with pytest.raises(UserError, match=r"^oracle.command: .*gone.sh"):
         create_run(scenario, tmp_path / "run.ddenv")
     assert not list(tmp_path.iterdir())

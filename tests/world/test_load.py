@@ -65,10 +65,19 @@ def test_a_wrong_value_is_told_with_its_key(tmp_path, changes, words):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["", "[1, 2", "just words", "a: !!python/object:os.system {}", "\x00", "[" * 5000, "name: 2024-13-45", "name: 0x_"],
-)
+NO_SCENARIOS = {
+    "empty": "",
+    "cut": "[1, 2",
+    "words": "just words",
+    "code": "a: !!python/object:os.system {}",
+    "NUL": "\x00",
+    "deep": "[" * 1000,
+    "no date": "name: 2024-13-45",
+    "no number": "name: 0x_",
+}
+
+
+@pytest.mark.parametrize("text", NO_SCENARIOS.values(), ids=NO_SCENARIOS)
 def test_a_file_that_is_no_scenario(tmp_path, text):
     path = tmp_path / "s.yaml"
     path.write_text(text)

@@ -1,9 +1,13 @@
-"""Writing a world without some of its models."""
+"""Writing a world without some of its models, and files whole or not at all."""
+
+import os
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.errors import UserError
+from ddenv.world.access import write_file
 from ddenv.world.load import SDF
 from ddenv.world.sdf.read import parse_world, read_world
 from ddenv.world.write import without
@@ -52,3 +56,22 @@ def test_models_on_one_line_leave_the_rest_of_it():
 def test_unknown_models_are_refused():
     with pytest.raises(ValueError, match="nobody"):
         without(WALL, frozenset(["nobody"]))
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    target = tmp_path / "out.sdf"
+    target.write_bytes(b"before")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(UserError, match="No space left"):
+        write_file(target, b"after")
+    assert target.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_that_is_missing_is_named(tmp_path):
+    with pytest.raises(UserError, match="cannot be written"):
+        write_file(tmp_path / "nowhere" / "out.sdf", b"")

@@ -4,14 +4,13 @@ import os
 import socket
 import subprocess
 import sys
-from dataclasses import asdict
 from pathlib import Path
 
 import yaml
 
-from ddenv.runfile.store import RunFile
 from tests.command import DDENV
 from tests.conftest import DATA, ROOT
+from tests.engine.reading import told
 from tests.waiting import wait_until
 
 # Passes unless both the deck and the wall are there; leaves a file for each test that began, and waits while there is `hold`.
@@ -110,8 +109,7 @@ def said(run: Path) -> str:
     """All that a run says of its cluster."""
     if not run.exists():
         return ""
-    with RunFile(run) as file:
-        return "\n".join(asdict(event.event)["words"] for event in file.events() if event.kind == "cluster")
+    return "\n".join(data["words"] for data in told(run, "cluster"))
 
 
 def until_said(run: Path, words: str) -> None:

@@ -2,17 +2,15 @@
 
 import os
 import signal
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
 from tests.command import ddenv
 from tests.conftest import DATA
 from tests.engine.cluster.dask import Cluster, Held, said, start, until_said
 from tests.engine.killing import finished_tests, story
+from tests.engine.reading import state_of, told
 from tests.waiting import PATIENCE, wait_until
 
 OTHER_BITS = """
@@ -48,19 +46,14 @@ def ended(program):
     return printed
 
 
-def state(run):
-    with RunFile(run) as file:
-        return fold(file.events())
-
-
 def check_same(run, other):
     """Two runs have the same end, and each test of the first was made once."""
-    tests = [(test, state(run).tests[number].seed) for number, test in enumerate(finished_tests(run))]
-    assert story(state(run)) == story(state(other))
-    assert state(run).certified == state(other).certified
+    tests = [(test, state_of(run).tests[number].seed) for number, test in enumerate(finished_tests(run))]
+    assert story(state_of(run)) == story(state_of(other))
+    assert state_of(run).certified == state_of(other).certified
     assert len(tests) == len(set(tests))
     # What only ran ahead when the search was over is not waited for.
-    assert not any(state(run).tally[outcome] for outcome in ("running", "error", "timeout"))
+    assert not any(state_of(run).tally[outcome] for outcome in ("running", "error", "timeout"))
 
 
 def is_alive(simulator):
@@ -133,7 +126,7 @@ def test_a_run_whose_scheduler_is_lost_goes_on_here_when_asked(cluster, held, ho
     held.let_go()
     done = ddenv("resume", run, "--cluster", "here")
     assert done.returncode == 0, done.stderr
-    assert state(run).environment == state(here(held.file, home / "here.ddenv")).environment
+    assert state_of(run).environment == state_of(here(held.file, home / "here.ddenv")).environment
 
 
 @LONG
@@ -144,8 +137,7 @@ def test_the_tests_of_a_killed_engine_end_and_the_next_one_uses_the_same_workers
     run = home / "there.ddenv"
     program = start(held.file, run, "--cluster", cluster.address)
     wait_until(lambda: len(held.begun()) >= 2, lambda: said(run))
-    with RunFile(run) as file:
-        engine = next(asdict(event.event)["pid"] for event in file.events() if event.kind == "engine_started")
+    engine = told(run, "engine_started")[0]["pid"]
     os.kill(engine, signal.SIGKILL)
     program.communicate(timeout=PATIENCE)
     wait_until(lambda: not any(map(is_alive, held.begun())))
@@ -163,7 +155,7 @@ def test_a_worker_with_other_bits_is_left_out_by_name(cluster, home, tmp_path):
     program = start(DATA / "wall.yaml", run, "--cluster", cluster.address)
     until_said(run, "is left out: its first run of the whole world has other bits than here")
     # Nobody made a test so far.
-    assert not state(run).tests
+    assert not state_of(run).tests
     cluster.start_worker()
     ended(program)
     assert "1 worker of the cluster can make 1 test" in said(run)
@@ -212,10 +204,10 @@ def test_it_ends_the_same_on_drake_when_a_worker_dies_and_then_the_scheduler(clu
     first, _ = cluster.start_worker(), cluster.start_worker()
     run = home / "there.ddenv"
     program = start(scenario, run, "--cluster", cluster.address)
-    wait_until(lambda: run.exists() and state(run).tests_done >= tests)
+    wait_until(lambda: run.exists() and state_of(run).tests_done >= tests)
     cluster.kill(first)
     until_said(run, "1 worker left the cluster")
-    wait_until(lambda: state(run).tests_done >= 2 * tests)
+    wait_until(lambda: state_of(run).tests_done >= 2 * tests)
     cluster.kill(cluster.scheduler)
     until_said(run, "is lost")
     cluster.start_scheduler()

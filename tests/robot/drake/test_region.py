@@ -7,24 +7,13 @@ from collections.abc import Callable
 import pytest
 
 from ddenv.robot.drake import region
-from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Template, Variants
-from ddenv.world.model import Box, Model, World
+from ddenv.world.model import Box, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
-from tests.robot.conftest import link_of, model_of
+from tests.robot.conftest import all_bits, cube, link_of, model_of
 
 EVERYTHING = 10**9
-
-
-def cube(name: str, x: float, y: float, z: float = 0.15, mass: float | None = 1.0) -> Model:
-    return model_of(name, link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, y, z)), mass))
-
-
-def bits(result: RunResult) -> tuple:
-    motions = {name: rows.tobytes() for name, rows in result.motions.items()}
-    noticed = result.first_sensed, result.first_touched
-    return result.outcome, result.failure, result.trajectory.tobytes(), motions, noticed
 
 
 @pytest.fixture
@@ -65,24 +54,24 @@ def test_every_bit_is_the_same_in_a_small_region_in_a_large_one_and_with_everyth
     names = frozenset(world.elements())
     parts = names, names - {"shelf", "crate 0 1"}
     whole, large, small = (variants(width) for width in (EVERYTHING, 8.0, 3.5))
-    expected = [bits(whole.run(part, seed=1)) for part in parts]
+    expected = [all_bits(whole.run(part, seed=1)) for part in parts]
     assert expected[0][3]["falls"] != expected[1][3]["falls"]
     assert "pushed" in expected[0][3] and "pushed" in expected[0][4][1]
     for one in (large, small):
         assert still(one) < still(whole)
-        assert [bits(one.run(part, seed=1)) for part in parts] == expected
+        assert [all_bits(one.run(part, seed=1)) for part in parts] == expected
 
 
 def test_a_run_that_leaves_the_region_is_made_again_from_its_start_in_a_larger_one(variants, world):
     names = frozenset(world.elements())
-    expected = bits(variants(EVERYTHING).run(names, seed=1))
+    expected = all_bits(variants(EVERYTHING).run(names, seed=1))
     small = variants(0.5)
     before = still(small)
-    assert bits(small.run(names, seed=1)) == expected
+    assert all_bits(small.run(names, seed=1)) == expected
     after = still(small)
     assert before < after
     # The larger plant stays: the next run need not begin twice.
-    assert bits(small.run(names, seed=1)) == expected
+    assert all_bits(small.run(names, seed=1)) == expected
     assert still(small) == after
 
 
@@ -98,7 +87,7 @@ def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
         variants(width)
         one = Variants(world, husky, scenario)
         assert ("stop" in one._whole._context.built.static) is (width == EVERYTHING)
-        results += [bits(one.run(frozenset(keep), 1)) for keep in (["ramp", "slides", "stop"], ["ramp", "slides"])]
+        results += [all_bits(one.run(frozenset(keep), 1)) for keep in (["ramp", "slides", "stop"], ["ramp", "slides"])]
         assert "stop" in one._whole._context.built.static
     assert found == expected
     assert expected[0][3] != expected[1][3]

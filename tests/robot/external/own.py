@@ -4,10 +4,9 @@ import sys
 import textwrap
 from pathlib import Path
 
-from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle, Scenario
-from tests.conftest import DATA
 from tests.waiting import PATIENCE
+from tests.wall import wall
 
 TOKEN = "DDENV_TEST_TOKEN"
 
@@ -29,14 +28,11 @@ subprocess.Popen([sys.executable, "-c", {STUBBORN!r}])
 def own_scenario(folder: Path, code: str, words: str = "", wall_timeout: float = PATIENCE, **reduction) -> Scenario:
     """The scenario of the small world with the Python program `code`, kept in `folder`."""
     (folder / "robot.py").write_text(textwrap.dedent(code))
-    scenario = load_scenario(DATA / "wall.yaml")
-    return scenario.model_copy(
-        update={
-            "oracle": Oracle(command=f"{sys.executable} robot.py {words}"),
-            "folder": folder,
-            "simulation": scenario.simulation.model_copy(update={"wall_timeout": wall_timeout}),
-            "reduction": scenario.reduction.model_copy(update=reduction),
-        }
+    return wall(
+        oracle=Oracle(command=f"{sys.executable} robot.py {words}"),
+        folder=folder,
+        simulation={"wall_timeout": wall_timeout},
+        reduction=reduction,
     )
 
 

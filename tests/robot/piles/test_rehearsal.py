@@ -9,7 +9,8 @@ from ddenv.robot.piles import rehearsal
 from ddenv.robot.piles.motion import Motion
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire, Script
 from ddenv.robot.simulation.template import Template
-from tests.robot.piles.test_sleep import SECTIONS, bits, cube, run
+from tests.robot.conftest import bits, cube, run
+from tests.robot.piles.test_sleep import SECTIONS
 
 ROWS = 10
 

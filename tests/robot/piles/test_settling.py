@@ -12,8 +12,8 @@ from ddenv.robot.settled import Settled, moved, notes_on
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, World
 from ddenv.world.pose import Pose
-from tests.robot.conftest import box_model, link_of, model_of
-from tests.robot.piles.test_sleep import SECTIONS, cube
+from tests.robot.conftest import box_model, cube, link_of, model_of
+from tests.robot.piles.test_sleep import SECTIONS
 
 TABLE = box_model("table", "6 3 0.2 0 0 0", "1 1 0.4")
 

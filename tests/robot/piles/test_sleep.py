@@ -9,26 +9,15 @@ import pytest
 
 from ddenv.robot.drake.plant import MANY
 from ddenv.robot.piles import rehearsal
-from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.whole import FALL
-from tests.robot.conftest import box_model, joint_of, link_of, model_of, wedge
+from tests.robot.conftest import bits, box_model, cube, door, joint_of, link_of, model_of, run, wedge
 from tests.tiers import slow
 
 BOARD = "0.9 0.09 0.04"
 SECTIONS = {"failure": {"timeout": 4.0}, "goal": {"x": 9, "y": 0}}
-
-
-def cube(name: str, x: float, y: float, z: float, side: float = 0.3, mass: float = 1.0) -> Model:
-    return model_of(name, link_of("link", Box((side, side, side)), Pose((x, y, z)), mass))
-
-
-def door(name: str, x: float, y: float, **changes: object) -> Model:
-    """A door leaf of 1 m whose hinge stands on its left."""
-    leaf = link_of("leaf", Box((0.05, 1.0, 0.8)), Pose((x, y, 0.6)), mass=3.0)
-    return model_of(name, leaf, joints=(joint_of("revolute", "world", "leaf", (x, y + 0.5, 0.6), **changes),))
 
 
 def flap(name: str, x: float, y: float, lower: float = -0.3, damping: float = 0.3) -> Model:
@@ -91,15 +80,6 @@ def template(world_of, add, husky, scenario_of):
         return Template(add(world_of(), *models), husky, scenario_of(**SECTIONS | sections))
 
     return make
-
-
-def run(template: Template, *names: str, seed: int = 1) -> RunResult:
-    return template.run(frozenset(names), seed)
-
-
-def bits(result: RunResult, *left_out: str) -> tuple:
-    motions = {name: rows.tobytes() for name, rows in result.motions.items() if name not in left_out}
-    return result.outcome, result.trajectory.tobytes(), motions
 
 
 @pytest.mark.parametrize("far", slow(pytest.mark.rates, FAR, but=["in the air", "colliding with itself"]))

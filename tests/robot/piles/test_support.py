@@ -11,8 +11,8 @@ from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
 from tests.conftest import ROOT
-from tests.robot.conftest import box_model, link_of, model_of, wedge
-from tests.robot.piles.test_sleep import SECTIONS, bits, cube, run
+from tests.robot.conftest import bits, box_model, cube, link_of, model_of, run, wedge
+from tests.robot.piles.test_sleep import SECTIONS
 
 SHELF = box_model("shelf", "1 3 0.4 0 0 0", "1 1 0.8")
 REAL = ROOT.parent / "shared" / "worlds" / "rough_terrain_gap.world"

@@ -46,9 +46,7 @@ shapes = st.one_of(
 turned = st.builds(Pose.from_rpy, of(-8, 8), of(-8, 8), of(-1, 1), angle, angle, angle)
 # Much in the real world is parallel or at right angles to all else.
 upright = st.builds(
-    Pose.from_rpy,
-    *[st.sampled_from([-3.0, 0.0, 0.5, 2.0])] * 3,
-    *[st.sampled_from([0.0, math.pi / 2, math.pi])] * 3,
+    Pose.from_rpy, *[st.sampled_from([-3.0, 0.0, 0.5, 2.0])] * 3, *[st.sampled_from([0.0, math.pi / 2, math.pi])] * 3
 )
 poses = turned | upright
 lidars = st.builds(

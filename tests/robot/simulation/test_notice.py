@@ -13,23 +13,10 @@ from ddenv.robot.simulation.taking_part import ENDLESS, Hull
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
-from tests.robot.conftest import box_model, joint_of, link_of, model_of
+from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, noticed, run
 
 WALL = box_model("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")
 FRONT = 0.4937  # m, from the robot's frame to the foremost point of its box
-
-
-def run(template: Template, *names: str, seed: int = 1) -> RunResult:
-    return template.run(frozenset(names), seed)
-
-
-def bits(result: RunResult) -> tuple:
-    motions = {name: rows.tobytes() for name, rows in result.motions.items()}
-    return result.outcome, result.failure, result.trajectory.tobytes(), motions
-
-
-def noticed(result: RunResult) -> tuple[dict[str, float], dict[str, float]]:
-    return result.first_sensed, result.first_touched
 
 
 def x_at(result: RunResult, seconds: float) -> float:

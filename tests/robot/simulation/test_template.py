@@ -1,4 +1,4 @@
-"""One template, many runs: how they end, and that no run leaves a trace in the next."""
+"""One template, many runs: how they end, who may listen, and that no run leaves a trace in the next."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddenv.engine.mcap_file import Streams
 from ddenv.errors import UserError
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Sphere
@@ -163,3 +164,16 @@ def test_models_that_move_in_a_loop_are_the_users(world_of, add, husky, scenario
     loop = model_of("loop", *links, joints=tuple(joint_of("ball", *pair, (0.0, 3.0, 1.0)) for pair in pairs))
     with pytest.raises(UserError, match="cannot be simulated"):
         Template(add(world_of(), loop), husky, scenario_of())
+
+
+def test_a_listener_hears_every_step_and_changes_no_bit(world_of, husky, scenario_of):
+    template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
+    streams = Streams()
+    quiet, heard = template.run(frozenset(), 3), template.run(frozenset(), 3, listener=streams)
+    assert heard.trajectory.tobytes() == quiet.trajectory.tobytes()
+    times = [reading.time for reading, _ in streams.heard]
+    assert times == sorted(times) and times[0] == 0.0
+    assert len(times) * streams.setup.period >= quiet.simulated_seconds
+    # A run that is made again is heard from its start.
+    template.run(frozenset(), 3, listener=streams)
+    assert [reading.time for reading, _ in streams.heard] == times

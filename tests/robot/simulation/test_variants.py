@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from ddenv.robot.piles.rehearsal import Rehearsals
-from ddenv.robot.result import RunResult
 from ddenv.robot.simulation import template as variants
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.runs.subject import load_parts
@@ -13,20 +12,10 @@ from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
-from tests.robot.conftest import joint_of, link_of, model_of
+from tests.robot.conftest import all_bits, cube, joint_of, link_of, model_of
 from tests.tiers import slow
 
 ALL = frozenset({"a", "b", "c", "d"})
-
-
-def cube(name: str, x: float, y: float, z: float = 0.15) -> Model:
-    return model_of(name, link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, y, z))))
-
-
-def bits(result: RunResult) -> tuple:
-    motions = {name: rows.tobytes() for name, rows in result.motions.items()}
-    noticed = result.first_sensed, result.first_touched
-    return result.outcome, result.failure, result.trajectory.tobytes(), motions, noticed
 
 
 @pytest.fixture
@@ -69,14 +58,14 @@ def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_
     names = world.elements()
     parts = [frozenset(part) for part in (names[:11], names[:6] + names[16:21], names[::6])]
     whole = Template(world, robot, scenario)
-    expected = [bits(whole.run(part, seed=2)) for part in parts]
+    expected = [all_bits(whole.run(part, seed=2)) for part in parts]
     touched = {name for *_, (_, first_touched) in expected for name in first_touched}
     # That plant does not know what takes part, so it has times of scans that nobody read, too.
     times = [sensed for *_, (sensed, _) in expected]
     assert touched & whole.removable
     smaller = Variants(world, robot, scenario)
     for number in (2, 0, 1, 2, 0):
-        *run, (sensed, first_touched) = bits(smaller.run(parts[number], seed=2))
+        *run, (sensed, first_touched) = all_bits(smaller.run(parts[number], seed=2))
         assert sensed.items() <= times[number].items()
         assert (*run, (times[number], first_touched)) == expected[number]
 
@@ -96,7 +85,7 @@ def test_what_a_pile_does_is_worked_out_once_for_all_plants(cubes, husky, scenar
     assert len(built) == 3
     assert sorted(rehearsed) == [["a"], ["b"], ["b", "c"], ["d"]]
     whole = Template(cubes, husky, scenario)
-    assert bits(results[1]) == bits(whole.run(ALL - {"a"}, 1))
+    assert all_bits(results[1]) == all_bits(whole.run(ALL - {"a"}, 1))
 
 
 def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_was_left_out(
@@ -143,7 +132,7 @@ def test_no_plant_is_built_that_costs_more_than_it_saves(cubes, husky, scenario,
     monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
     result = Variants(cubes, husky, scenario).run(ALL - {"d"}, 1)
     assert not built
-    assert bits(result) == bits(Template(cubes, husky, scenario).run(ALL - {"d"}, 1))
+    assert all_bits(result) == all_bits(Template(cubes, husky, scenario).run(ALL - {"d"}, 1))
 
 
 def test_what_is_protected_stays(cubes, husky, scenario, built):
@@ -159,7 +148,9 @@ def test_the_floor_is_that_of_the_whole_world(world_of, husky, scenario_of, box)
     world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), cellar, ground=False)
     scenario = scenario_of(goal={"x": 50, "y": 0})
     table = frozenset({"table"})
-    assert bits(Variants(world, husky, scenario).run(table, 1)) == bits(Template(world, husky, scenario).run(table, 1))
+    assert all_bits(Variants(world, husky, scenario).run(table, 1)) == all_bits(
+        Template(world, husky, scenario).run(table, 1)
+    )
 
 
 def test_unknown_models_are_refused(cubes, husky, scenario):

@@ -50,10 +50,7 @@ def test_dae_instances_with_transforms(tmp_path):
         ("<polygons count='2'>{}<p>0 1 2</p><ph><p>0 1 2 3</p><h>0 1 2</h></ph></polygons>", 3),
         ("<tristrips count='1'>{}<p>0 1 2 3</p></tristrips>", 2),
         ("<trifans count='1'>{}<p>0 1 2 3</p></trifans>", 2),
-        (
-            "<triangles>{}<p/></triangles><lines>{}<p>0 1</p></lines><triangles>{}<p>0 1 2</p></triangles>",
-            1,
-        ),
+        ("<triangles>{}<p/></triangles><lines>{}<p>0 1</p></lines><triangles>{}<p>0 1 2</p></triangles>", 1),
     ],
 )
 def test_dae_primitives(tmp_path, shapes, faces):

@@ -6,15 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.access import Missing, Unusable, read
-from ddenv.world.files.resources import ENVIRONMENT, PACKAGES, PREFIXES, find, model_file, model_named, search_folders
+from ddenv.world.files.resources import find, model_file, model_named, search_folders
 from tests.tiers import examples
 
-
-@pytest.fixture(autouse=True)
-def _no_environment(monkeypatch, tmp_path):
-    for variable in (*ENVIRONMENT, PACKAGES, PREFIXES, "GZ_FUEL_CACHE_PATH"):
-        monkeypatch.delenv(variable, raising=False)
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+pytestmark = pytest.mark.usefixtures("no_gazebo")
 
 
 @pytest.fixture

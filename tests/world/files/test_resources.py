@@ -16,9 +16,7 @@ CUBE = "\n".join(
 
 
 @pytest.fixture
-def world(tmp_path, monkeypatch):
-    for variable in ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH"):
-        monkeypatch.delenv(variable, raising=False)
+def world(tmp_path, no_gazebo):
     folder = tmp_path / "world"
     (folder / "box").mkdir(parents=True)
     (folder / "cube.obj").write_text(CUBE)

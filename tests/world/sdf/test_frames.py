@@ -6,7 +6,6 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from ddenv.errors import UserError
 from ddenv.world.pose import Pose
 from tests.world.sdf.conftest import BOX, world_text
 
@@ -81,40 +80,6 @@ def test_collisions_follow_frames_of_their_model(read):
     assert model.collisions[0].pose.position == pytest.approx(there.position)
 
 
-WRONG = {
-    "circle": (
-        "<model name='m'><link name='a'><pose relative_to='b'/></link><link name='b'><pose relative_to='a'/></link></model>",
-        r"/pose: the frames form a cycle: b -> a -> b",
-    ),
-    "circle of attachments": (
-        "<model name='m'><link name='l'/><link name='k'/><frame name='f' attached_to='g'/><frame name='g' attached_to='f'/>"
-        "<joint name='j' type='fixed'><parent>f</parent><child>l</child></joint></model>",
-        "attachments of frames form a cycle",
-    ),
-    "models on each other": (
-        "<model name='m'><pose relative_to='n'/><link name='a'/></model>"
-        "<model name='n'><pose relative_to='m'/><link name='a'/></model>",
-        "form a cycle",
-    ),
-    "typing mistake": (
-        "<model name='m'><link name='chassis'/><link name='b'><pose relative_to='chasis'/></link></model>",
-        r"no frame 'chasis' here \(did you mean chassis\?\)",
-    ),
-    "far away": ("<model name='m'><pose>1e300 0 0 0 0 0</pose><link name='a'/></model>", "farther than 1e"),
-    "no turn": (
-        "<model name='m'><pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose><link name='a'/></model>",
-        "quaternion has no usable length",
-    ),
-}
-
-
-@pytest.mark.parametrize(("inside", "words"), WRONG.values(), ids=WRONG.keys())
-def test_what_has_no_place_is_refused(read, inside, words):
-    with pytest.raises(UserError, match=words) as caught:
-        read(inside)
-    assert "here.sdf:1: /sdf/world/" in str(caught.value)
-
-
 def test_models_that_others_stand_on_are_never_removed(read):
     world = read(
         "<frame name='f' attached_to='base'/><model name='base'><link name='a'/></model>"
@@ -140,11 +105,6 @@ def test_old_joint_axes_are_in_the_frame_of_the_model(read):
 def test_booleans_of_attributes_are_read_in_any_case(read):
     model = read("<model name='m'><pose degrees='True'>0 0 0 0 0 90</pose><link name='a'/></model>").models[0]
     assert model.pose.yaw() == pytest.approx(math.pi / 2)
-
-
-def test_an_unknown_way_to_write_turns_is_refused(read):
-    with pytest.raises(UserError, match="rotation_format 'rpy' is unknown"):
-        read("<model name='m'><pose rotation_format='rpy'>0 0 0 0 0 0</pose><link name='a'/></model>")
 
 
 def test_the_old_frame_attribute_means_nothing_in_new_files(read):

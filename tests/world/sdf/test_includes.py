@@ -100,34 +100,16 @@ def test_a_stand_in_for_a_whole_model(read):
     assert read(included(), ignore=("include",)).models == ()
 
 
-def test_files_that_include_each_other_are_refused(read, table):
-    (table / "a.sdf").write_text(f"<sdf version='1.9'><model name='a'>{included(uri='b.sdf')}</model></sdf>")
-    (table / "b.sdf").write_text(f"<sdf version='1.9'><model name='b'>{included(uri='a.sdf')}</model></sdf>")
-    with pytest.raises(UserError, match=r"b\.sdf:1: /sdf/model.*form a cycle: a\.sdf includes b\.sdf includes a\.sdf"):
-        read(included(uri="models/a.sdf"))
-
-
 def test_what_is_wrong_in_an_included_file_is_told_of_that_file(read, table):
     (table / "table" / "model.sdf").write_text(TABLE.replace("0 0 5", "0 0 nan"))
     with pytest.raises(UserError, match=r"table/model\.sdf:1: /sdf/model\[@name='table'\]/pose: expected 6 finite"):
         read(included(), model_path=(table,))
 
 
-WRONG = {
-    "no uri": ("<include/>", "include: has no <uri>"),
-    "climbing out": (included(uri="model://../../secret"), "leaves its folder"),
-    "hidden climbing": (included(uri="model://%2e%2e/%2e%2e/secret"), "leaves its folder"),
-    "merge": ("<include merge='true'><uri>model://table</uri></include>", "merge='true' is not supported"),
-    "world in a world": (included(uri="models/world.sdf"), "holds no <model>"),
-}
-
-
-@pytest.mark.parametrize(("inside", "words"), WRONG.values(), ids=WRONG.keys())
-def test_includes_that_cannot_be(read, table, inside, words):
+def test_a_world_in_a_world_is_refused(read, table):
     (table / "world.sdf").write_bytes(world_text(""))
-    with pytest.raises(UserError, match=words) as caught:
-        read(inside, model_path=(table,))
-    assert "here.sdf:1: /sdf/world/include" in str(caught.value)
+    with pytest.raises(UserError, match=r"here\.sdf:1: /sdf/world/include.* holds no <model>"):
+        read(included(uri="models/world.sdf"), model_path=(table,))
 
 
 def test_lights_and_actors_are_passed_over(read, table):

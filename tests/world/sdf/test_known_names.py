@@ -4,19 +4,13 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.world.extent import model_bounds
-from ddenv.world.files.resources import ENVIRONMENT, PACKAGES, PREFIXES, Resources
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import Box, Cylinder, Plane
 from ddenv.world.sdf.read import parse_world
 from ddenv.world.sdf.standin import KNOWN_SIZES
 from tests.world.sdf.conftest import world_text
 
-
-@pytest.fixture(autouse=True)
-def _no_gazebo(monkeypatch, tmp_path):
-    for variable in (*ENVIRONMENT, PACKAGES, PREFIXES, "GZ_FUEL_CACHE_PATH"):
-        monkeypatch.delenv(variable, raising=False)
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-
+pytestmark = pytest.mark.usefixtures("no_gazebo")
 
 FUEL = "https://fuel.gazebosim.org/1.0/OpenRobotics/models"
 USUAL = [("model://sun", "model://ground_plane"), (f"{FUEL}/Sun", f"{FUEL}/Ground Plane/2")]

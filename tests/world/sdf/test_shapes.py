@@ -170,31 +170,6 @@ def test_visuals_keep_their_colours(read, material, color):
     assert world.models[0].links[0].visuals[0].color == color
 
 
-WRONG = {
-    "zero": ("<box><size>1 0 1</size></box>", "size: sizes must be from 1e-06"),
-    "negative": ("<cylinder><radius>-1</radius><length>1</length></cylinder>", "radius: sizes must be from"),
-    "no size": ("<sphere/>", "sphere: has no <radius>"),
-    "huge": ("<box><size>1e300 1 1</size></box>", r"to 1e\+06 m, found '1e300 1 1'"),
-    "nothing": ("", "has no <geometry>"),
-    "unknown": ("<torus><radius>1</radius></torus>", "<torus> is not a known shape"),
-    "flat polyline": ("<polyline><point>0 0</point><point>1 1</point><height>1</height></polyline>", "three <point>s"),
-    "low polyline": (
-        "<polyline><point>0 0</point><point>1 1</point><point>1 0</point><height>0</height></polyline>",
-        "height",
-    ),
-    "no uri": ("<mesh/>", "mesh: has no <uri>"),
-    "climbing": ("<mesh><uri>../../etc/passwd</uri></mesh>", r"leaves its folder"),
-    "scale": ("<mesh><uri>a.obj</uri><scale>1 0 1</scale></mesh>", "a scale must be from 1e-09"),
-}
-
-
-@pytest.mark.parametrize(("geometry", "words"), WRONG.values(), ids=WRONG.keys())
-def test_shapes_that_cannot_be_are_refused_with_their_place(read, geometry, words):
-    with pytest.raises(UserError, match=words) as caught:
-        read(model(geometry))
-    assert "here.sdf:1: /sdf/world/model[@name='m']/link[@name='l']/collision[@name='c']" in str(caught.value)
-
-
 def test_one_coefficient_of_friction_alone_does_not_hide_the_other(read):
     surface = "<surface><friction><ode><mu>50</mu></ode></friction></surface>"
     assert read(model("<box><size>1 1 1</size></box>", surface)).models[0].collisions[0].mu == 1

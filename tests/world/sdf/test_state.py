@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from ddenv.errors import UserError
 from ddenv.world.model import Box
 from tests.world.sdf.conftest import BOX
 
@@ -74,22 +73,6 @@ def test_joint_limits_count_from_where_the_state_has_the_links(read, kind, turne
     saved = f"<model name='m'><link name='a'><pose>0 0 0 0 0 0</pose></link><link name='b'><pose>{turned}</pose></link></model>"
     (joint,) = read(door + state(saved), "1.6").models[0].joints
     assert (joint.lower, joint.upper) == pytest.approx((lower, upper))
-
-
-WRONG = {
-    "two states": (state("") * 2, "a second <state>"),
-    "insertions": (state("<insertions><model name='x'/></insertions>"), "insertions"),
-    "zero scale": (state("<model name='m'><scale>1 0 1</scale></model>"), "scale must be from"),
-    "nan": (state("<model name='m'><link name='l'><pose>nan 0 0 0 0 0</pose></link></model>"), "6 finite numbers"),
-    "nameless": (state("<model/>"), "has no name"),
-}
-
-
-@pytest.mark.parametrize(("inside", "words"), WRONG.values(), ids=WRONG.keys())
-def test_what_cannot_be_is_refused_with_its_place(read, inside, words):
-    with pytest.raises(UserError, match=words) as caught:
-        read(MODEL + inside, "1.6")
-    assert "here.sdf:1: /sdf/world/state" in str(caught.value)
 
 
 def test_what_moved_when_it_was_saved_begins_at_rest(read):
