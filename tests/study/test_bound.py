@@ -8,9 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.study.results import least_to_find, least_to_show
+from ddenv.study.results import least_tests
 
 MANY = st.integers(1, 2000)
+
+
+def least_to_show(*known):
+    return least_tests(*known)[0]
+
+
+def least_to_find(*known):
+    return least_tests(*known)[1]
 
 
 def subsets(models, sizes):

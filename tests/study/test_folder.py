@@ -7,11 +7,11 @@ import pytest
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.study.plan import RUNS
-from ddenv.study.work import ABOUT, Sitting, machine, opened, sittings, versions, write_sittings
+from ddenv.study.work import ABOUT, Session, machine, opened, sessions, versions, write_sessions
 
 TIMES = (
-    Sitting(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),
-    Sitting(1.6e9, 0.0, 4, 0, "ddenv 2", "\u05e9"),
+    Session(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),
+    Session(1.6e9, 0.0, 4, 0, "ddenv 2", "\u05e9"),
 )
 
 
@@ -66,9 +66,9 @@ def test_a_second_study_in_it_is_refused_until_the_first_one_is_over(tmp_path):
 
 
 def test_times_are_read_as_they_were_written(tmp_path):
-    assert sittings(tmp_path) == ()
-    write_sittings(tmp_path, TIMES)
-    assert sittings(tmp_path) == TIMES
+    assert sessions(tmp_path) == ()
+    write_sessions(tmp_path, TIMES)
+    assert sessions(tmp_path) == TIMES
 
 
 RIGHT = {"begun": 1.0, "seconds": 1.0, "jobs": 1, "tests": 1, "versions": "", "machine": ""}
@@ -89,7 +89,7 @@ DAMAGED = {
 def test_a_damaged_list_of_times_is_one_line(tmp_path, text):
     (tmp_path / ABOUT).write_text(text)
     with pytest.raises(UserError, match=rf"{ABOUT}: is damaged; delete it \(the runs are not affected\)"):
-        sittings(tmp_path)
+        sessions(tmp_path)
 
 
 def test_what_made_the_numbers_has_a_name():

@@ -6,6 +6,7 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.study.conduct import seconds_left, sizes
 from ddenv.study.plan import RUNS, run_path
@@ -26,7 +27,7 @@ def made(tmp_path):
     with RunFile(path) as file:
         state = fold(file.events())
         tests = PersistentTuple.of(replace(test, wall_seconds=2.0) for test in state.tests)
-        yield plan, Work(plan.cells[0], path, 2, file, state.changed(tests=tests))
+        yield plan, Work(plan.cells[0], path, 2, file, RunState(), state.changed(tests=tests))
 
 
 def left(plan, ended, jobs=2, running=()):

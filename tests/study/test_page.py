@@ -12,20 +12,20 @@ import yaml
 
 from ddenv.study.plan import run_path
 from ddenv.study.study_page import write_study
-from ddenv.study.work import Sitting
+from ddenv.study.work import Session
 from tests.report.test_report import EVIL, Page
 from tests.study.made import LONGEST, crates, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_run
 
-SITTINGS = (
-    Sitting(1.6e9, 90.0, 2, 30, "ddenv 1", "<b>first</b> machine"),
-    Sitting(1.7e9, 30.0, 4, 9, "ddenv 2", "second machine"),
+SESSIONS = (
+    Session(1.6e9, 90.0, 2, 30, "ddenv 1", "<b>first</b> machine"),
+    Session(1.7e9, 30.0, 4, 9, "ddenv 2", "second machine"),
 )
 
 
-def written(plan, folder, sittings=SITTINGS):
+def written(plan, folder, sessions=SESSIONS):
     """The page, the Markdown and the rows of the table."""
-    page, _ = write_study(plan, folder, sittings)
+    page, _ = write_study(plan, folder, sessions)
     rows = list(csv.DictReader(io.StringIO((folder / "study.csv").read_text())))
     return Page(page.read_text()), (folder / "study.md").read_text(), rows
 
@@ -154,7 +154,7 @@ def test_where_and_when_it_was_made_is_told(study):
 def test_written_again_it_is_the_same(study):
     *_, folder, plan = study
     before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-    write_study(plan, folder, SITTINGS)
+    write_study(plan, folder, SESSIONS)
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
 
 

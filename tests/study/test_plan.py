@@ -11,7 +11,7 @@ from ddenv.reduction.procedure import MOST_STEPS_BACK
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.study.plan import PAIRS, make_plan, run_path
-from ddenv.study.results import theirs
+from ddenv.study.results import paper_row
 from tests.study.made import LONGEST, crates, plan_of
 
 LONGEST_FILE_NAME = 255
@@ -31,9 +31,9 @@ def test_by_default_it_is_the_papers_three_by_three_in_its_order():
     # Each is made with slices, too, which the paper does not have.
     assert [cell.label for cell in sliced] == [f"{cell.label} with slices" for cell in cells]
     assert not any(cell.slices for cell in cells)
-    assert {theirs(cell) for cell in sliced} == {None}
+    assert {paper_row(cell) for cell in sliced} == {None}
     # Tests, % reduction and minutes of each row of Tables II to IV.
-    paper = [theirs(cell) for cell in cells]
+    paper = [paper_row(cell) for cell in cells]
     assert [(each.tests, round(100 * each.smaller), each.minutes) for each in paper] == [
         *((268, 84, 420), (82, 95, 108), (359, 84, 487)),
         *((179, 81, 274), (178, 78, 277), (162, 89, 231)),

@@ -11,7 +11,7 @@ import pytest
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from ddenv.study.plan import run_path
-from ddenv.study.work import sittings
+from ddenv.study.work import sessions
 from tests.study.made import plan_of, wall
 from tests.study.quick import Lab
 from tests.study.test_work import fails, study, told
@@ -102,7 +102,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     said, complained = third.communicate(timeout=PATIENCE)
     assert (third.returncode, complained) == (0, "")
     assert "1 of 1 cell certified; wrote study/study.html" in said
-    assert len(sittings(folder)) == 3
+    assert len(sessions(folder)) == 3
 
     # Of the tests that were in flight nothing is left, and no other one was made twice.
     (row,) = csv.DictReader((folder / "study.csv").read_text().splitlines())

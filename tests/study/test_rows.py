@@ -10,7 +10,7 @@ from ddenv.page.blocks import Paragraph, Strong, Table
 from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.results import Found, groups, spread
+from ddenv.study.results import Result, rows_of, spread
 from ddenv.study.study_page import content
 from ddenv.study.tables import behind, best, chart, numbers, section
 from tests.study.made import crates, plan_of
@@ -51,7 +51,7 @@ def found(cell, tests, left=1, **other):
         "whole_runs": 20,
         "misses": 4,
     }
-    return Found(cell, **(values | other))
+    return Result(cell, **(values | other))
 
 
 def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
@@ -60,10 +60,10 @@ def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
     """
     plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
     made = [
-        Found(cell) if each is None else found(cell, abs(each)) for cell, each in zip(plan.cells, tests, strict=True)
+        Result(cell) if each is None else found(cell, abs(each)) for cell, each in zip(plan.cells, tests, strict=True)
     ]
     made = [uncertified(each) if tests[place] and tests[place] < 0 else each for place, each in enumerate(made)]
-    return plan, made, groups(plan, made)
+    return plan, made, rows_of(plan, made)
 
 
 def page(folder, group):
@@ -79,7 +79,7 @@ def uncertified(each, verdict="not shown"):
 
 def test_the_papers_numbers_stand_beside_ours():
     plan = make_plan(("ditch",), slice=False)
-    (group,) = groups(plan, [found(cell, 60, left=2) for cell in plan.cells])
+    (group,) = rows_of(plan, [found(cell, 60, left=2) for cell in plan.cells])
     table = numbers(group)
     assert table.head == (
         *("partitioning, prioritization", "certified", "search tests", "paper", "certificate tests"),
@@ -94,7 +94,7 @@ def test_what_slices_save_stands_beside_the_papers_way():
     numbers_of = {False: {"simulated": 60}, True: {"simulated": 21, "certificate_simulated": 12}}
     made = [found(cell, 60, left=2, **numbers_of[cell.slices]) for cell in plan.cells]
     made[-1] = replace(made[-1], left=MODELS[:3], minimal=False, problem="it is not shown")
-    (group,) = groups(plan, made)
+    (group,) = rows_of(plan, made)
     table = numbers(group)
     assert table.head == (
         *("partitioning, prioritization", "certified", "search tests", "paper", "with slices"),
@@ -108,7 +108,7 @@ def test_what_slices_save_stands_beside_the_papers_way():
 
 def test_what_the_paper_does_not_have_stands_alone():
     plan = make_plan(("ditch",), f"timeseg/random,{PAIRS[0]}", "ddenv,ddmin", slice=False)
-    (group,) = groups(plan, [found(cell, 60) for cell in plan.cells])
+    (group,) = rows_of(plan, [found(cell, 60) for cell in plan.cells])
     table = numbers(group)
     assert [(row[0], row[3]) for row in table.rows] == [("timeseg/random", "–"), (PAIRS[0], "268"), ("ddmin", "–")]
 
@@ -238,12 +238,12 @@ def test_the_figure_has_a_line_for_each_method(tmp_path):
     words = [text.text for text in root.iter(f"{SVG}text")]
     assert "model2model/sequential: 1 model left after 20 tests" in words
     assert not any("timeseg/sequential" in word for word in words)
-    assert not two.minimal
+    assert not any(row.minimal for row in two)
 
 
 def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
     plan = make_plan(("ditch",), "all", slice=False)
-    (group,) = groups(plan, [found(cell, 100 - number) for number, cell in enumerate(plan.cells)])
+    (group,) = rows_of(plan, [found(cell, 100 - number) for number, cell in enumerate(plan.cells)])
     words = [text.text for text in ElementTree.fromstring(chart(group)).iter(f"{SVG}text")]
     named = [word.partition(":")[0] for word in words if "left after" in word]
     labels = [method.label for method in plan.methods]
@@ -254,7 +254,7 @@ def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
 def test_a_world_of_which_all_is_needed_is_drawn_too(tmp_path):
     plan, made, _ = cells(tmp_path, 20, 20, pairs="model2model/random")
     made = [replace(each, elements=("m0",), left=("m0",), sizes=((10, 1), (14, 1))) for each in made]
-    for group in groups(plan, made):
+    for group in rows_of(plan, made):
         text = chart(group)
         ElementTree.fromstring(text)
         assert "nan" not in text and "inf" not in text

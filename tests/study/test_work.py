@@ -19,7 +19,7 @@ from ddenv.runs.creation import create_run
 from ddenv.study.conduct import Progress, conduct
 from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
-from ddenv.study.work import sittings
+from ddenv.study.work import sessions
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
 from tests.waiting import PATIENCE, wait_until
@@ -79,8 +79,8 @@ def test_a_study_runs_to_its_end(undisturbed, two_by_two):
         assert f"{row['tests']} tests and {row['certificate_tests']} for the certificate" in line
     assert [row["names"] for row in told(folder)] == ["deck wall"] * 4
     assert all(row["left_f"] == row["left_runs"] > "0" and row["without_most"] == "0.0" for row in told(folder))
-    (sitting,) = sittings(folder)
-    assert (sitting.jobs, sitting.tests) == (2, lab.made)
+    (session,) = sessions(folder)
+    assert (session.jobs, session.tests) == (2, lab.made)
     assert len(lab.started) == 4
 
 
@@ -101,7 +101,7 @@ def test_run_again_it_makes_no_test(undisturbed, two_by_two, lab, tmp_path):
     code, words = study(folder, two_by_two)
     assert (code, words) == (0, f"4 of 4 cells certified; wrote {folder}/study.html\n")
     assert (lab.made, lab.started) == (0, [])
-    assert (folder / "study.html").exists() and len(sittings(folder)) == 1
+    assert (folder / "study.html").exists() and len(sessions(folder)) == 1
 
 
 def test_what_is_missing_is_made(undisturbed, two_by_two, lab, tmp_path):
@@ -161,7 +161,7 @@ def test_terminated_it_writes_what_it_has_and_goes_on(tmp_path, lab, two_by_two,
     lab.before = lambda run, made: None
     assert study(tmp_path, two_by_two)[0] == 0
     assert told(tmp_path) == told(undisturbed[0])
-    assert sum(each.tests for each in sittings(tmp_path)) == lab.made
+    assert sum(each.tests for each in sessions(tmp_path)) == lab.made
 
 
 def test_cells_that_come_to_no_end_are_told_and_the_others_are_made(tmp_path, lab):

@@ -22,19 +22,17 @@ from ddenv.study.results import read_cell
 from ddenv.study.study_page import write_study
 from ddenv.study.work import (
     PER_CELL,
-    Sitting,
+    Session,
     Work,
     is_done,
     machine,
+    make_cells,
     opened,
-    sittings,
-    tests_made,
+    sessions,
     versions,
-    work,
-    write_sittings,
+    write_sessions,
 )
 from ddenv.text import count, duration, printable
-from ddenv.world.scenario import Scenario
 
 # The cost of a dynamic model in a test, relative to a static one: about what piles of boards cost when measured.
 MOVES = 4
@@ -51,54 +49,47 @@ class Size(NamedTuple):
 
 def sizes(plan: Plan) -> dict[str, Size]:
     """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
-    return {scenario.name: _size(scenario) for scenario in plan.scenarios}
-
-
-def _size(scenario: Scenario) -> Size:
-    world, _ = load_parts(scenario)
-    elements = set(world.elements(frozenset(scenario.protected)))
-    moving = sum(not model.static for model in world.models if model.name in elements)
-    return Size(len(elements), len(elements) + MOVES * moving)
+    known: dict[str, Size] = {}
+    for scenario in plan.scenarios:
+        world, _ = load_parts(scenario)
+        elements = set(world.elements(frozenset(scenario.protected)))
+        moving = sum(not model.static for model in world.models if model.name in elements)
+        known[scenario.name] = Size(len(elements), len(elements) + MOVES * moving)
+    return known
 
 
 def seconds_left(
     running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
 ) -> float | None:
     """Time until the last cell ends, s; None if unknown."""
-    alone = [_of_running(each) for each in running]
-    times = [*alone, *(_of_waiting(cell, (*running, *ended), worlds) for cell in waiting)]
-    known = [each for each in times if each is not None]
-    if len(known) < len(times):
+    tested = [work for work in (*running, *ended) if work.state.finished_tests]
+    alone: list[float] = []
+    for work in running:
+        left = remaining(work.state, True)
+        if left is None or left.seconds is None:
+            return None
+        alone.append(left.seconds[1] * max(1, work.state.jobs))
+    if waiting and not tested:
         return None
-    return max(sum(known) / jobs, *(seconds / each.workers for seconds, each in zip(known, running, strict=False)), 0)
+    rest = sum(_of_waiting(cell, tested, worlds) for cell in waiting)
+    return max((sum(alone) + rest) / jobs, *(time / work.workers for time, work in zip(alone, running, strict=True)), 0)
 
 
-def _of_running(each: Work) -> float | None:
-    """What one worker still needs, s; None if unknown."""
-    left = remaining(each.state, True)
-    return None if left is None or left.seconds is None else left.seconds[1] * max(1, each.state.jobs)
-
-
-def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
+def _of_waiting(cell: Cell, tested: Sequence[Work], worlds: dict[str, Size]) -> float:
     """What one worker would need, s: the time of other cells of the scenario, or an estimate by the time of a test."""
-    same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
+    same = [work for work in tested if work.cell.scenario.name == cell.scenario.name]
     # Tests reused from another cell cost nothing.
-    if over := [
-        sum(test.wall_seconds for test in each.state.finished_tests if not test.taken)
-        for each in same
-        if each.state.status == "finished"
-    ]:
-        return mean(over)
-    tested = [each for each in same if each.state.finished_tests] or [
-        each for each in others if each.state.finished_tests
+    over = [
+        sum(test.wall_seconds for test in work.state.finished_tests if not test.taken)
+        for work in same
+        if work.state.status == "finished"
     ]
-    if not tested:
-        return None
+    if over:
+        return mean(over)
     size = worlds[cell.scenario.name]
     a_test = mean(
-        mean(test.wall_seconds for test in each.state.finished_tests)
-        * (size.cost / worlds[each.cell.scenario.name].cost)
-        for each in tested
+        mean(test.wall_seconds for test in work.state.finished_tests) * size.cost / worlds[work.cell.scenario.name].cost
+        for work in same or tested
     )
     return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
 
@@ -121,28 +112,30 @@ class Progress:
     """
 
     def __init__(self, plan: Plan, folder: Path, done: int, worlds: dict[str, Size], jobs: int, out: TextIO) -> None:
-        self._in_all, self._before = len(plan.cells), done
-        self._folder, self._seeds = folder, plan.seeds
-        self._worlds, self._jobs = worlds, jobs
+        self._plan, self._folder, self._done, self._worlds, self._jobs = plan, folder, done, worlds, jobs
         self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
-        self._earlier, self._begun = sittings(folder), Sitting(time.time(), 0.0, jobs, 0, versions(), machine())
+        self._earlier, self._session = sessions(folder), Session(time.time(), 0.0, jobs, 0, versions(), machine())
         self._began = self._next_look = time.monotonic()
         self._next_line = self._began + QUIET
-        self._cells: tuple[Work, ...] = ()
+        self._known: tuple[Work, ...] = ()
         self._reported = 0
         self._left: float | None = None
 
+    @property
+    def _share(self) -> str:
+        return f"{self._done + self._reported}/{len(self._plan.cells)}"
+
     def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
         """Reports what is new."""
-        self._cells = (*running, *ended)
-        for each in ended[self._reported :]:
+        self._known = (*running, *ended)
+        for work in ended[self._reported :]:
             self._reported += 1
-            seed = f", seed {each.cell.seed}" if self._seeds > 1 else ""
-            self._say(f"{self._done}  {each.cell.label}{seed}: {self._ending(each)}")
+            seed = f", seed {work.cell.seed}" if self._plan.seeds > 1 else ""
+            self._say(f"{self._share}  {work.cell.label}{seed}: {self._ending(work)}")
         now = time.monotonic()
         if now >= self._next_look:
             self._left = seconds_left(running, waiting, ended, self._worlds, self._jobs) if running else None
-            self._write()
+            self._record()
             self._next_look = now + LOOK_PERIOD
         if self._live:
             line = self._now(running, shutil.get_terminal_size().columns - 1)
@@ -151,53 +144,50 @@ class Progress:
             self._next_line = now + QUIET
             self._say(self._now(running))
 
-    @property
-    def _done(self) -> str:
-        return f"{self._before + self._reported}/{self._in_all}"
-
     def close(self) -> None:
         """Records the whole session, and clears the last line."""
-        self._write()
+        self._record()
         if self._live:
             # The terminal may be gone.
             with contextlib.suppress(OSError):
                 print(CLEAR, end="", file=self._out, flush=True)
 
-    def _write(self) -> None:
-        tests = sum(tests_made(each.state) - each.made_before for each in self._cells)
-        session = replace(self._begun, seconds=time.monotonic() - self._began, tests=tests)
-        write_sittings(self._folder, (*self._earlier, session))
+    def _record(self) -> None:
+        seconds, tests = time.monotonic() - self._began, sum(work.tests for work in self._known)
+        write_sessions(self._folder, (*self._earlier, replace(self._session, seconds=seconds, tests=tests)))
 
     def _say(self, line: str) -> None:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
 
     def _now(self, running: Sequence[Work], columns: int = 200) -> str:
         """The current state, as detailed as fits."""
+        if not running:
+            return ""
         left = "" if self._left is None or self._left < LEAST else f" · about {duration(self._left)} left"
-        for names in ([each.cell.label for each in running], [each.cell.scenario.name for each in running]):
-            doing = (f"{name}: {_doing(each)}" for name, each in zip(names, running, strict=True))
-            line = " · ".join((f"{self._done}{left}", *doing))
+        for names in ([work.cell.label for work in running], [work.cell.scenario.name for work in running]):
+            doing = (f"{name}: {_doing(work)}" for name, work in zip(names, running, strict=True))
+            line = " · ".join((f"{self._share}{left}", *doing))
             if cell_len(line) <= columns:
                 break
-        return set_cell_size(line, columns).rstrip() if running else ""
+        return set_cell_size(line, columns).rstrip()
 
-    def _ending(self, each: Work) -> str:
+    def _ending(self, work: Work) -> str:
         """How a cell ended, in one line."""
-        if each.problem:
-            return each.problem
-        found = read_cell(self._folder, each.cell)
-        if found.baseline is None:
-            return found.problem
-        sizes = f"{len(found.elements)} → {count(len(found.left), 'model')}"
-        tests = f"{count(found.tests, 'test')} and {found.certificate_tests} for the certificate"
-        doubt = "" if found.minimal else f"; not certified: {found.problem}"
-        return f"{sizes}, {tests}, {duration(each.state.working_seconds)}{doubt}"
+        if work.problem:
+            return work.problem
+        result = read_cell(self._folder, work.cell)
+        if result.baseline is None:
+            return result.problem
+        sizes = f"{len(result.elements)} → {count(len(result.left), 'model')}"
+        tests = f"{count(result.tests, 'test')} and {result.certificate_tests} for the certificate"
+        doubt = "" if result.minimal else f"; not certified: {result.problem}"
+        return f"{sizes}, {tests}, {duration(work.state.working_seconds)}{doubt}"
 
 
-def _doing(each: Work) -> str:
-    state = each.state
+def _doing(work: Work) -> str:
+    state = work.state
     if state.baseline is None:
-        return f"{state.tests_done} of {each.cell.scenario.reduction.baseline_runs} baseline runs"
+        return f"{state.tests_done} of {work.cell.scenario.reduction.baseline_runs} baseline runs"
     models = f"{len(state.environment)} of {len(state.elements)} models"
     return f"{models}, {'certificate, ' if state.confirming else ''}{state.tests_done} tests"
 
@@ -209,27 +199,24 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
     """
     worlds, interrupted = sizes(plan), False
     with opened(folder):
-        names = {cell.name for cell in plan.cells if is_done(folder, cell)}
-        open_ones = [cell for cell in plan.cells if cell.name not in names]
+        done = {cell.name for cell in plan.cells if is_done(folder, cell)}
+        cells = [cell for cell in plan.cells if cell.name not in done]
+        if jobs > PER_CELL:
+            # The cells that take longest come first.
+            cells.sort(key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW)))
         try:
-            if open_ones:
-                progress = Progress(plan, folder, len(names), worlds, jobs, out)
-                if jobs > PER_CELL:
-                    # The cells that take longest come first.
-                    open_ones.sort(
-                        key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW))
-                    )
-                with contextlib.closing(progress):
-                    work(folder, open_ones, jobs, progress.look)
+            if cells:
+                with contextlib.closing(Progress(plan, folder, len(done), worlds, jobs, out)) as progress:
+                    make_cells(folder, cells, jobs, progress.look)
         except KeyboardInterrupt:
             interrupted = True
-        page, found = write_study(plan, folder, sittings(folder))
-    for each in found:
-        if each.problem and each.cell.name in names:
-            print(printable(f"{each.cell.label}, seed {each.cell.seed}: {each.problem}"), file=out)
-    minimal = sum(each.minimal for each in found)
-    print(printable(f"{minimal} of {count(len(found), 'cell')} certified; wrote {page}"), file=out, flush=True)
+        page, results = write_study(plan, folder, sessions(folder))
+    for result in results:
+        if result.problem and result.cell.name in done:
+            print(printable(f"{result.cell.label}, seed {result.cell.seed}: {result.problem}"), file=out)
+    minimal = sum(result.minimal for result in results)
+    print(printable(f"{minimal} of {count(len(results), 'cell')} certified; wrote {page}"), file=out, flush=True)
     if interrupted:
         print("interrupted; the same command continues", file=sys.stderr)
         return 130
-    return 0 if minimal == len(found) else 1
+    return 0 if minimal == len(results) else 1

@@ -10,7 +10,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -61,7 +61,7 @@ def opened(folder: Path) -> Iterator[None]:
 
 
 @dataclass(frozen=True, slots=True)
-class Sitting:
+class Session:
     """One session of work on the study. `begun` is Unix time, s; `seconds` and `tests` count this session so far."""
 
     begun: float
@@ -72,32 +72,32 @@ class Sitting:
     machine: str
 
 
-_SITTINGS = TypeAdapter(dict[str, tuple[Sitting, ...]])
+_SESSIONS = TypeAdapter(dict[str, tuple[Session, ...]])
 
 
-def sittings(folder: Path) -> tuple[Sitting, ...]:
+def sessions(folder: Path) -> tuple[Session, ...]:
     """The sessions of work on the study so far. Raises UserError for a damaged file."""
     path = folder / ABOUT
     if not path.exists():
         return ()
     try:
-        return _SITTINGS.validate_json(read_bytes(path))["sittings"]
+        return _SESSIONS.validate_json(read_bytes(path))["sittings"]
     except (ValueError, KeyError):
         raise UserError(f"{path}: is damaged; delete it (the runs are not affected)") from None
 
 
-def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:
+def write_sessions(folder: Path, all_of_them: tuple[Session, ...]) -> None:
     """Writes them as a whole or not at all."""
-    write_file(folder / ABOUT, _SITTINGS.dump_json({"sittings": all_of_them}, indent=1))
+    write_file(folder / ABOUT, _SESSIONS.dump_json({"sittings": all_of_them}, indent=1))
 
 
 def versions() -> str:
     """The versions of ddenv, Python and the packages that compute; imports none of them."""
-    found = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
+    known = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
     for name in PACKAGES:
         with contextlib.suppress(PackageNotFoundError):
-            found.append(f"{name} {version(name)}")
-    return ", ".join(found)
+            known.append(f"{name} {version(name)}")
+    return ", ".join(known)
 
 
 def machine() -> str:
@@ -109,25 +109,44 @@ def machine() -> str:
 
 @dataclass
 class Work:
-    """A cell in work, with this number of `workers`. `engine` is None while an engine of another study works on it.
+    """A cell in work by so many `workers`, since its run was as `before`.
 
-    `problem` says why it did not end this time. Earlier studies made `made_before` tests, and its last event was number
-    `known`.
+    `engine` is None while an engine of another study works on it. `problem` says why it did not end this time.
     """
 
     cell: Cell
     path: Path
     workers: int
     file: RunFile
-    state: RunState = field(default_factory=RunState)
+    before: RunState
+    state: RunState
     engine: subprocess.Popen[bytes] | None = None
     problem: str = ""
-    made_before: int = 0
-    known: int = 0
+
+    @property
+    def tests(self) -> int:
+        """How many tests this session has made, and not reused from another cell."""
+        return _made(self.state) - _made(self.before)
 
     def catch_up(self) -> None:
         """Reads the new events."""
         self.state = fold(self.file.events(self.state.revision), self.state)
+
+    def has_ended(self) -> bool:
+        """Whether no engine works on it any more."""
+        # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours,
+        # and then ours gave up.
+        at_work = (self.engine is not None and self.engine.poll() is None) or engine_is_alive(self.path)
+        self.catch_up()
+        if not at_work and self.state.status != "finished":
+            # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
+            said = self.state.ended and self.state.revision > self.before.revision
+            self.problem = self.state.reason if said else last_words(self.path)
+        return not at_work
+
+
+def _made(state: RunState) -> int:
+    return state.made - sum(test.taken for test in state.tests)
 
 
 Look = Callable[[Sequence[Work], Sequence[Cell], Sequence[Work]], None]
@@ -156,7 +175,13 @@ def _is_over(state: RunState) -> bool:
     return state.status == "finished" and not broke
 
 
-def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
+def _all_broke(state: RunState) -> bool:
+    """Whether the simulator broke in all baseline runs: it may work now."""
+    broke = all(test.outcome in BROKEN for test in state.finished_tests)
+    return state.status == "finished" and state.baseline is None and broke
+
+
+def make_cells(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
     """Makes `cells` with `jobs` workers in all; cells that take long should come first.
 
     `look(running, waiting, ended)` is called several times a second. On KeyboardInterrupt the engines are stopped, and it
@@ -166,19 +191,19 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
     running: list[Work] = []
     ended: list[Work] = []
     # Ignored signals stay ignored: a study under nohup outlives its terminal.
-    asked = [each for each in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) != signal.SIG_IGN]
-    before = [(each, signal.signal(each, _interrupt)) for each in asked]
+    asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) != signal.SIG_IGN]
+    handlers = [(number, signal.signal(number, _interrupt)) for number in asked]
     try:
         while waiting or running:
-            while waiting and (free := jobs - sum(each.workers for each in running)) > 0:
+            while waiting and (free := jobs - sum(work.workers for work in running)) > 0:
                 # Free workers are shared among the waiting cells.
                 workers = max(min(PER_CELL, free), free // len(waiting))
                 running.append(_begin(folder, waiting.pop(0), workers))
-            for each in tuple(running):
-                if _has_ended(each):
-                    running.remove(each)
-                    ended.append(each)
-                    each.file.close()
+            for work in tuple(running):
+                if work.has_ended():
+                    running.remove(work)
+                    ended.append(work)
+                    work.file.close()
             look(running, waiting, ended)
             if running:
                 time.sleep(POLL)
@@ -187,9 +212,9 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
         # The terminal may be gone.
         with contextlib.suppress(OSError):
             look(running, waiting, ended)
-        for each in running:
-            each.file.close()
-        for number, handler in before:
+        for work in running:
+            work.file.close()
+        for number, handler in handlers:
             signal.signal(number, handler)
 
 
@@ -200,56 +225,30 @@ def _interrupt(*_: object) -> None:
 def _begin(folder: Path, cell: Cell, workers: int) -> Work:
     path = run_path(folder, cell)
     if path.exists():
-        with RunFile(path) as file:
-            all_broke = _all_broke(fold(file.events()))
+        with RunFile(path) as old:
+            all_broke = _all_broke(fold(old.events()))
         if all_broke:
             path.unlink()
     if not path.exists():
         create_run(cell.scenario, path)
-    each = Work(cell, path, workers, RunFile(path))
-    each.catch_up()
-    each.made_before = tests_made(each.state)
-    each.known = each.state.revision
-    if not engine_is_alive(path) and not _is_over(each.state):
-        each.engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
-    return each
-
-
-def _has_ended(each: Work) -> bool:
-    # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours, and
-    # then ours gave up.
-    at_work = (each.engine is not None and each.engine.poll() is None) or engine_is_alive(each.path)
-    each.catch_up()
-    if at_work:
-        return False
-    if each.state.status != "finished":
-        # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
-        ended = each.state.ended and each.state.revision > each.known
-        each.problem = each.state.reason if ended else last_words(each.path)
-    return True
-
-
-def _all_broke(state: RunState) -> bool:
-    """Whether the simulator broke in all baseline runs: it may work now."""
-    broke = all(test.outcome in BROKEN for test in state.finished_tests)
-    return state.status == "finished" and state.baseline is None and broke
-
-
-def tests_made(state: RunState) -> int:
-    """How many tests were made in a run, and not reused from another one."""
-    return state.made - sum(test.taken for test in state.tests)
+    file = RunFile(path)
+    state = fold(file.events())
+    engine = None
+    if not engine_is_alive(path) and not _is_over(state):
+        engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
+    return Work(cell, path, workers, file, state, state, engine)
 
 
 def _stop(running: Sequence[Work]) -> None:
     """Stops engines, which record it."""
     # On cells without an engine of ours, the engine of an earlier, killed study works.
-    left = [each for each in running if each.engine is None and engine_is_alive(each.path)]
-    for each in left:
+    left = [work for work in running if work.engine is None and engine_is_alive(work.path)]
+    for work in left:
         with contextlib.suppress(UserError):
-            each.file.send("stop")
-    stop_engines([(each.file, each.engine) for each in running if each.engine is not None])
+            work.file.send("stop")
+    stop_engines([(work.file, work.engine) for work in running if work.engine is not None])
     deadline = time.monotonic() + STOP_WAIT
-    while time.monotonic() < deadline and any(engine_is_alive(each.path) for each in left):
+    while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in left):
         time.sleep(POLL)
-    for each in running:
-        each.catch_up()
+    for work in running:
+        work.catch_up()
