@@ -61,7 +61,7 @@ def screen() -> Screen:
 
 
 def test_a_model_is_one_mesh(small_world):
-    assert [len(item.surface.faces) for model in small_world.models[1:] for item in paint(model)] == [12] * 4
+    assert [len(item.faces) for model in small_world.models[1:] for item in paint(model)] == [12] * 4
     assert len(paint(ROBOT)) == 1
 
 
@@ -69,7 +69,7 @@ def test_a_link_without_visuals_shows_its_collisions():
     cube, ball = Collision("c", Box((1, 1, 1)), Pose(), 1.0), Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1))
     links = (Link("seen", Pose(), None, (cube,), (ball,)), Link("lost", Pose(), None, (cube,), ()))
     (painted,) = paint(Model("m", Pose(), True, links, (), (), 1))
-    assert len(painted.surface.faces) == len(sphere(0.1).faces) + 12
+    assert len(painted.faces) == len(sphere(0.1).faces) + 12
 
 
 def test_the_ditch_is_few_and_small_messages(screen):
@@ -273,4 +273,4 @@ def test_the_camera_sees_the_robot_go_to_the_right():
 
 
 def test_all_meshes_of_the_robot_are_finite():
-    assert np.isfinite(merge([item.surface for item in paint(ROBOT)]).vertices).all()
+    assert np.isfinite(merge(paint(ROBOT)).vertices).all()

@@ -10,7 +10,7 @@ from meshcat.geometry import Object
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
-from ddenv.scene.mesh import Painted, Surface, edges_of, joined, lines, outline, paint, plain
+from ddenv.scene.mesh import Surface, edges_of, lines, merge, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels
@@ -78,12 +78,12 @@ class Scenery:
         self._movable = {model.name for model in world.models if not model.static and model.name in elements}
         self._is_large = len(elements) > MOST_SINGLE
         # The surfaces of elements that are drawn together, and the edges of all elements.
-        self._painted: dict[str, list[Painted]] = {}
+        self._painted: dict[str, list[Surface]] = {}
         self._edges: dict[str, np.ndarray] = {}
         surfaces = [
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
-        self.surface = mesh.merge(surfaces)
+        self.surface = merge(surfaces)
         self.ground = _ground(world)
         self._draw_ground()
         self.wheels = wheels
@@ -113,7 +113,7 @@ class Scenery:
         items = [item for name, items in self._painted.items() if name in shot.models for item in items]
         for name, solid in (("still", True), ("still clear", False)):
             some = [item for item in items if (item.alpha == 1) == solid]
-            yield (*MODELS, name), joined(some).thing() if some else None
+            yield (*MODELS, name), merge(some).thing() if some else None
         for group, names, color in (
             (LEFT_OUT, shot.left_out, colors.LEFT_OUT),
             (REMOVED, shot.removed, colors.REMOVED),
@@ -194,7 +194,7 @@ class Scenery:
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
-        shape = mesh.merge([item.surface for item in painted])
+        shape = merge(painted)
         if element and len(shape.vertices):
             self._edges[model.name] = outline(model, shape)
         if self._is_large and element and model.static:
@@ -225,15 +225,14 @@ class Scenery:
     def _draw_robot(self) -> float:
         body = self.wheels.body
         to_first = body.links[0].pose.inverse()
-        pieces: list[tuple[Path, Pose, list[Painted]]]
-        pieces = [((), Pose(), [Painted(item.surface.at(to_first), item.tints, item.alpha) for item in paint(body)])]
+        pieces: list[tuple[Path, Pose, list[Surface]]] = [((), Pose(), [item.at(to_first) for item in paint(body)])]
         pieces += [((wheel.key,), Pose(wheel.position), [wheel.painted]) for wheel in self.wheels.all]
         lowest = 0.0
         for place, pose, painted in pieces:
             for part, item in enumerate(painted):
-                lowest = min(lowest, float(item.surface.at(pose).vertices[:, 2].min()))
+                lowest = min(lowest, float(item.at(pose).vertices[:, 2].min()))
                 self._stage.draw((*ROBOT, *place, str(part)), item.thing())
-                ghost = plain(item.surface, colors.GHOST, glow=0.2)
+                ghost = plain(item, colors.GHOST, glow=0.2)
                 self._stage.draw((*GHOST, *place, str(part)), ghost, shadow=False)
             if place:
                 self._stage.move((*ROBOT, *place), pose)
@@ -290,5 +289,5 @@ def mark(
 ) -> None:
     """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
     path = (*WORLD, name)
-    stage.draw(path, plain(mesh.merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
+    stage.draw(path, plain(merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))
