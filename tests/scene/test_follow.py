@@ -20,25 +20,23 @@ def state_of(writer):
     return fold(writer.run.events())
 
 
-def test_before_the_first_run_the_robot_is_at_its_start(writer):
-    found = shot(state_of(writer), [])
-    assert (found.kind, found.test) == ("start", None)
-    assert len(found.models) == 4
-    assert not found.left_out | found.removed
+def test_before_the_first_round_the_whole_world_is_shown(writer):
+    def shown(*rows):
+        found = shot(state_of(writer), rows)
+        assert len(found.models) == 4 and not found.left_out | found.removed
+        return found.kind, found.test, found.title
 
-
-def test_a_running_baseline_shows_the_whole_world(writer):
+    assert shown() == ("start", None, "the robot at its start")
     writer.start_engine()
     writer.start_test(1)
-    found = shot(state_of(writer), [live(1)])
-    assert (found.kind, found.test, len(found.models)) == ("live", 1, 4)
-    assert found.title == "baseline · test 1 · runs now"
+    assert shown(live(1)) == ("live", 1, "baseline · test 1 · runs now")
 
 
-def test_the_failure_is_shown_again_when_nothing_runs(writer):
+def test_rows_of_unknown_and_finished_tests_are_ignored_and_the_failure_is_shown_again(writer):
     writer.baseline()
-    found = shot(state_of(writer), [])
-    assert (found.kind, found.test, len(found.models)) == ("replay", 1, 4)
+    for rows in ([], [live(1), live(7), live(0), live(-1)]):
+        found = shot(state_of(writer), rows)
+        assert (found.kind, found.test, len(found.models)) == ("replay", 1, 4)
 
 
 def test_a_running_candidate_shows_its_own_environment(writer):
@@ -106,18 +104,7 @@ def test_a_fresh_run_shows_its_own_environment(writer, together):
     assert shown(environment=left, without=0) == (everything - gone, f"the whole world without {elements[0]}{more}")
 
 
-def test_after_a_reduction_the_evidence_is_shown_in_what_is_left(writer):
-    writer.baseline()
-    writer.round()
-    writer.reduce()
-    found = shot(state_of(writer), [])
-    assert (found.kind, found.test) == ("replay", 2)
-    assert found.models == {"left wall", "tile/é <b>1</b>"}
-    assert found.removed == {"board", "asphalt"}
-    assert not found.left_out
-
-
-def test_a_reduction_that_waits_is_shown(writer):
+def test_a_reduction_is_shown_while_it_waits_and_in_what_is_left(writer):
     writer.baseline()
     writer.round()
     writer.start_test(2, candidate=0)
@@ -125,8 +112,11 @@ def test_a_reduction_that_waits_is_shown(writer):
     writer.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
     writer.append("waiting", {"candidate": 0})
     found = shot(state_of(writer), [])
-    assert (found.kind, found.test) == ("replay", 2)
-    assert found.left_out == {"board", "asphalt"}
+    assert (found.kind, found.test, found.left_out) == ("replay", 2, {"board", "asphalt"})
+    writer.append("reduced", {"candidate": 0, "environment": [0, 1], "evidence_test": 2})
+    found = shot(state_of(writer), [])
+    assert (found.kind, found.test, found.models) == ("replay", 2, {"left wall", "tile/é <b>1</b>"})
+    assert found.removed == {"board", "asphalt"} and not found.left_out
 
 
 def test_a_test_is_shown_to_its_end(writer):
@@ -152,10 +142,5 @@ def test_between_two_tests_the_last_one_stays_for_a_while(writer):
     assert shot(replace(state, status="paused"), [], running, 0.0).kind == "replay"
 
 
-def test_rows_of_unknown_and_finished_tests_are_ignored(writer):
-    writer.baseline()
-    assert shot(state_of(writer), [live(1), live(7), live(0), live(-1)]).kind == "replay"
-
-
-def test_live_pose():
-    assert pose_of(Live(0, 1, 0.0, (1.0, 2.0, 3.0, 2.0, 0.0, 0.0, 0.0)).pose).quaternion == (1, 0, 0, 0)
+def test_a_running_robots_pose_is_made_a_rotation():
+    assert pose_of((1.0, 2.0, 3.0, 2.0, 0.0, 0.0, 0.0)).quaternion == (1, 0, 0, 0)
