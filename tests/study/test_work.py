@@ -95,20 +95,18 @@ def test_what_another_cell_has_tested_is_not_tested_again(undisturbed, two_by_tw
     assert [each.taken_over >= each.certificate_tests for each in found] == [False, True, False, True]
 
 
-def test_run_again_it_makes_no_test(undisturbed, two_by_two, lab, tmp_path):
+def test_run_again_it_makes_only_what_is_missing(undisturbed, two_by_two, lab, tmp_path):
+    """Also in another place: where files are does not matter, what they hold does."""
     shutil.copytree(undisturbed[0], folder := tmp_path / "study")
     (folder / "study.html").unlink()
-    code, words = study(folder, two_by_two)
-    assert (code, words) == (0, f"4 of 4 cells certified; wrote {folder}/study.html\n")
+    moved = plan_of(wall(tmp_path, "one"), wall(tmp_path, "two", seed=50), **METHODS)
+    assert moved.scenarios != two_by_two.scenarios
+    assert study(folder, moved) == (0, f"4 of 4 cells certified; wrote {folder}/study.html\n")
     assert (lab.made, lab.started) == (0, [])
     assert (folder / "study.html").exists() and len(sessions(folder)) == 1
-
-
-def test_what_is_missing_is_made(undisturbed, two_by_two, lab, tmp_path):
-    shutil.copytree(undisturbed[0], folder := tmp_path / "study")
-    one = two_by_two.cells[1]
+    one = moved.cells[1]
     run_path(folder, one).unlink()
-    assert study(folder, two_by_two)[0] == 0
+    assert study(folder, moved)[0] == 0
     assert [name for name, _ in lab.started] == [one.name]
     assert told(folder) == told(undisturbed[0])
 
@@ -281,37 +279,27 @@ def test_an_engine_that_was_left_is_stopped_with_the_study(alone, lab, monkeypat
     assert engine.poll() == 1
 
 
-def other(folder, plan, **options):
-    """The cells of another study in the same folder."""
-    with pytest.raises(UserError) as error:
-        study(folder, plan_of(plan.scenarios[0].world.parent / "wall.yaml", **ONE, **options))
-    return str(error.value)
-
-
 def test_a_run_of_something_else_is_refused_in_one_line(tmp_path, lab):
-    (tmp_path / "wall.sdf").write_bytes((wall_world := plan_of(wall(tmp_path), **ONE).scenarios[0].world).read_bytes())
-    file = tmp_path / "wall.yaml"
-    file.write_text(file.read_text().replace(str(wall_world), "wall.sdf"))
-    plan, folder = plan_of(file, **ONE), tmp_path / "study"
-    run = run_path(folder, plan.cells[0])
-    create_run(plan.cells[0].scenario, run)
+    file = wall(tmp_path)
+    world = plan_of(file, **ONE).scenarios[0].world
+    (tmp_path / "wall.sdf").write_bytes(world.read_bytes())
+    file.write_text(file.read_text().replace(str(world), "wall.sdf"))
+    folder, (cell,) = tmp_path / "study", plan_of(file, **ONE).cells
+    create_run(cell.scenario, run := run_path(folder, cell))
     (folder / "study.lock").touch()
-    told = "delete that file, or choose another folder with -o"
-    leave = f"choose another folder with -o, or delete {folder}/runs"
-    assert other(folder, plan, epsilon=0.5) == f"{run}: was made with another scenario, or with other options; {leave}"
+
+    def refused(**options):
+        with pytest.raises(UserError) as error:
+            study(folder, plan_of(file, **ONE, **options))
+        return str(error.value)
+
+    told, leave = f"{run}: was made with another", f"choose another folder with -o, or delete {folder}/runs"
+    assert refused(epsilon=0.5) == f"{told} scenario, or with other options; {leave}"
     (tmp_path / "wall.sdf").write_text((tmp_path / "wall.sdf").read_text().replace("far_box", "far_bin"))
-    assert other(folder, plan) == f"{run}: was made with another world; {leave}"
+    assert refused() == f"{told} world; {leave}"
     with sqlite3.connect(run) as db:
         db.execute("DELETE FROM event")
-    assert told in other(folder, plan)
-    run.write_text("no run file")
-    assert told in other(folder, plan)
+    for _ in range(2):
+        assert "delete that file, or choose another folder with -o" in refused()
+        run.write_text("no run file")
     assert lab.started == []
-
-
-def test_a_study_goes_on_in_another_place(undisturbed, two_by_two, lab, tmp_path):
-    """The scenarios were copied as well: where files are does not matter, what they hold does."""
-    shutil.copytree(undisturbed[0], folder := tmp_path / "study")
-    moved = plan_of(wall(tmp_path, "one"), wall(tmp_path, "two", seed=50), **METHODS)
-    assert moved.scenarios != two_by_two.scenarios
-    assert study(folder, moved)[0] == 0 and lab.started == []
