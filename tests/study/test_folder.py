@@ -6,8 +6,8 @@ import pytest
 
 from ddenv import __version__
 from ddenv.errors import UserError
+from ddenv.study.folder import ABOUT, Session, machine, opened, sessions, versions, write_sessions
 from ddenv.study.plan import RUNS
-from ddenv.study.work import ABOUT, Session, machine, opened, sessions, versions, write_sessions
 
 SESSIONS = (
     Session(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),

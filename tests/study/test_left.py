@@ -8,9 +8,8 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.study.conduct import seconds_left, sizes
+from ddenv.study.conduct import Work, seconds_left, sizes
 from ddenv.study.plan import RUNS, run_path
-from ddenv.study.work import Work
 from tests.study.made import FRESH, TESTS, crates, plan_of, reduced
 
 # One test was ahead of time.

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from ddenv import __version__
+from ddenv.study.folder import Session
 from ddenv.study.plan import run_path
 from ddenv.study.study_page import write_study
-from ddenv.study.work import Session
 from tests.report.test_report import EVIL, Page
 from tests.study.made import LONGEST, crates, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_run

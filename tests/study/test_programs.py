@@ -10,11 +10,11 @@ import pytest
 
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
+from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
-from ddenv.study.work import sessions
 from tests.study.made import plan_of, wall
 from tests.study.quick import Lab
-from tests.study.test_work import fails, study, told
+from tests.study.test_conduct import fails, study, told
 from tests.waiting import PATIENCE, wait_until
 
 # Counts its runs, and waits before each unless it may go on: so many at a time.

@@ -30,10 +30,10 @@ from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.repeat import value_words
 from ddenv.settings import SETTINGS
+from ddenv.study.folder import Session
 from ddenv.study.plan import RUNS, Plan, run_path
 from ddenv.study.results import Result, paper_row, read_cell, rows_of
 from ddenv.study.tables import best, section
-from ddenv.study.work import Session
 from ddenv.text import count, plain
 from ddenv.world.access import write_file
 

@@ -17,9 +17,9 @@ from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.study.conduct import Progress, conduct
+from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
-from ddenv.study.work import sessions
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
 from tests.waiting import PATIENCE, wait_until
@@ -221,9 +221,9 @@ def when_it_waits(monkeypatch, happens):
     """Something `happens` as soon as the study waits for its engines."""
     look, happened = Progress.look, []
 
-    def first(self, running, *others):
-        look(self, running, *others)
-        if running and not happened:
+    def first(self):
+        look(self)
+        if self.running and not happened:
             happened.append(True)
             happens()
 
@@ -244,21 +244,21 @@ def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, m
 
     look, mine, looks = Progress.look, [], []
 
-    def let_go(self, running, *others):
-        look(self, running, *others)
+    def let_go(self):
+        look(self)
         if mine and mine[0].poll() is not None:
-            looks.append(running)
+            looks.append(self)
         # The study has seen that the new one has given up.
         if len(looks) > 1:
             gate.set()
 
     def late(*words, **options):
-        monkeypatch.setattr("ddenv.study.work.start_engine", start)
+        monkeypatch.setattr("ddenv.study.conduct.start_engine", start)
         orphan(lab, *alone, gate)
         mine.append(start(*words, **options))
         return mine[0]
 
-    monkeypatch.setattr("ddenv.study.work.start_engine", late)
+    monkeypatch.setattr("ddenv.study.conduct.start_engine", late)
     monkeypatch.setattr(Progress, "look", let_go)
     code, words = study(*alone)
     gate.set()
