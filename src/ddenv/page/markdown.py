@@ -62,9 +62,7 @@ def _block(block: Block, stem: str) -> list[str]:
             return _table(block)
         case Picture():
             return [f"![{_text(block.alternative)}]({quote(_file(stem, block))})"]
-        case Code():
-            return _code(block)
-    raise TypeError(type(block).__name__)
+    return _code(block)
 
 
 def _table(table: Table) -> list[str]:

@@ -69,28 +69,27 @@ def picture(
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
     these models, in place of those that are left.
     """
-    frame = _frame(record.models, list(_places(record).values()), LEAST)
-    return _picture(record, frame, name, ways or _ways(record), named)
-
-
-def _ways(record: Record) -> Ways:
-    last = record.evidence if record.evidence is not record.original else None
-    return {"way": record.original, "last": last}
+    return _picture(record, _whole(record), name, ways, named)
 
 
 def close_up(record: Record) -> str:
     """A map of only what is left and f's end; "" if it would add little to the whole map."""
     kept = [each for each in record.models if each.model.name in record.kept]
-    places = _places(record)
-    if "end" not in places or not kept:
+    end = _places(record).get("end")
+    if end is None or not kept:
         return ""
-    frame = _frame(kept, [places["end"]], CLOSE, CLOSE_HIGH)
-    if frame.scale < CLOSER * _frame(record.models, list(places.values()), LEAST).scale:
-        return ""
-    return _picture(record, frame, "near", _ways(record), None)
+    frame = _frame(kept, [end], CLOSE, CLOSE_HIGH)
+    return _picture(record, frame, "near", None, None) if frame.scale >= CLOSER * _whole(record).scale else ""
 
 
-def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collection[str] | None) -> str:
+def _whole(record: Record) -> Frame:
+    return _frame(record.models, list(_places(record).values()), LEAST)
+
+
+def _picture(record: Record, frame: Frame, name: str, ways: Ways | None, named: Collection[str] | None) -> str:
+    if ways is None:
+        last = record.evidence if record.evidence is not record.original else None
+        ways = {"way": record.original, "last": last}
     models = record.models
     places = {sign: point for sign, point in _places(record).items() if frame.holds(point)}
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}

@@ -101,29 +101,19 @@ def guiding(record: Record) -> Section | None:
     state = record.state
     blocks: list[Block] = []
     if state.decisions:
-        blocks += _decisions(state)
+        rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
+        lead = "by hand, each with the number of tests and the environment at that time."
+        done = Table(("time", "tests", "at", "what the user did"), _cut(rows, 3), frozenset({1, 2}))
+        blocks += [say(f"{count(len(rows), 'decision')} {lead}"), done]
     elif state.baseline is not None:
         blocks.append(say("The user changed nothing: every reduction is the algorithm's own."))
-    blocks += _trials(state)
+    if state.trials:
+        trials = [_trial(state, each) for each in state.trials]
+        blocks.append(
+            Table(("tried by hand", "at", "models", "tests", "verdict"), _cut(trials, 4), frozenset({1, 2, 3}))
+        )
     blocks += _tree(state)
     return Section("Decisions and branches", tuple(blocks)) if blocks else None
-
-
-def _decisions(state: RunState) -> list[Block]:
-    rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
-    lead = say(
-        f"{count(len(rows), 'decision')} by hand, each with the number of tests and the environment at that time."
-    )
-    head = ("time", "tests", "at", "what the user did")
-    return [lead, Table(head, _cut(rows, 3), frozenset({1, 2}))]
-
-
-def _trials(state: RunState) -> list[Block]:
-    if not state.trials:
-        return []
-    rows = [_trial(state, each) for each in state.trials]
-    head = ("tried by hand", "at", "models", "tests", "verdict")
-    return [Table(head, _cut(rows, 4), frozenset({1, 2, 3}))]
 
 
 def _trial(state: RunState, trial: Trial) -> tuple[Cell, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,7 +18,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.nearest import Nearest, nearest
-from ddenv.runs.reasons import Parting, Reason, reasons
+from ddenv.runs.reasons import Reason, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.world.model import World
 
@@ -40,20 +40,20 @@ class Record:
 
     path: Path
     state: RunState
-    rounds: tuple[Round, ...] = ()
-    asked: dict[str, Any] = field(default_factory=dict)
-    started: float = 0.0
-    alive: bool = False
-    world: World | None = None
-    models: tuple[Drawn, ...] = ()
-    original: array[float] | None = None
-    evidence: array[float] | None = None
-    troubles: tuple[str, ...] = ()
-    elements: frozenset[str] = frozenset()
-    kept: frozenset[str] = frozenset()
-    reasons: tuple[Reason, ...] = ()
-    nearest: Nearest | None = None
-    ways: Mapping[int, array[float]] = field(default_factory=dict)
+    rounds: tuple[Round, ...]
+    asked: dict[str, Any]
+    started: float
+    alive: bool
+    world: World | None
+    models: tuple[Drawn, ...]
+    original: array[float] | None
+    evidence: array[float] | None
+    troubles: tuple[str, ...]
+    elements: frozenset[str]
+    kept: frozenset[str]
+    reasons: tuple[Reason, ...]
+    nearest: Nearest | None
+    ways: Mapping[int, array[float]]
 
 
 def read_run(path: Path) -> Record:
@@ -71,7 +71,7 @@ def read_run(path: Path) -> Record:
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = None if current(state) is None else _tried(lambda: reasons(file, state), troubles)
         passing = nearest(file, state)
-        partings: list[Parting | None] = [*(each.parting for each in why or ()), passing.parting if passing else None]
+        partings = [*(reason.parting for reason in why or ()), passing.parting if passing else None]
         compared = [test for one in partings if one for test in (one.with_test, one.without_test)]
         ways = {test: file.trajectory(test) for test in compared}
     return Record(
