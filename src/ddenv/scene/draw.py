@@ -71,7 +71,8 @@ class Scenery:
         """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
         self._first = {model.name: model.links[0].pose for model in world.models}
-        self._keys: dict[str, str] = {}
+        # What the browser calls the elements that are drawn one by one.
+        self.keys: dict[str, str] = {}
         self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
@@ -88,7 +89,12 @@ class Scenery:
         self._draw_ground()
         self.wheels = wheels
         self._lowest = self._draw_robot()
-        self._boxes = {each.name: _box_of(surface) for each, surface in zip(world.models, surfaces, strict=True)}
+        # The lowest and the highest corner of each model.
+        self._boxes = {
+            model.name: (surface.vertices.min(axis=0), surface.vertices.max(axis=0))
+            for model, surface in zip(world.models, surfaces, strict=True)
+            if len(surface.vertices)
+        }
 
     def height(self, x: float, y: float) -> float:
         """Height of the highest surface at (x, y), m."""
@@ -98,7 +104,7 @@ class Scenery:
 
     def show(self, shot: Shot) -> None:
         """Shows the environment of `shot`."""
-        for name, key in self._keys.items():
+        for name, key in self.keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
             if not self._is_large:
                 self._stage.show((*LEFT_OUT, key), name in shot.left_out)
@@ -130,14 +136,10 @@ class Scenery:
     def place_models(self, poses: Mapping[str, Pose]) -> None:
         """Puts the first links of these elements at their poses, and all others where they start."""
         for name in self._placed - set(poses):
-            self._stage.move((*MODELS, self._keys[name]), Pose())
-        self._placed = frozenset(name for name in poses if name in self._keys)
+            self._stage.move((*MODELS, self.keys[name]), Pose())
+        self._placed = frozenset(name for name in poses if name in self.keys)
         for name in sorted(self._placed):
-            self._stage.move((*MODELS, self._keys[name]), self.moved(name, poses[name]), newest_only=True)
-
-    def key(self, name: str) -> str | None:
-        """What the browser calls an element; None for what is no element."""
-        return self._keys.get(name)
+            self._stage.move((*MODELS, self.keys[name]), self.moved(name, poses[name]), newest_only=True)
 
     def moved(self, name: str, pose: Pose) -> Pose:
         """How far a moving model is from its start once its first link is at `pose`."""
@@ -149,7 +151,7 @@ class Scenery:
         return self._stage.drawn(path, _tube(path_on_ground(samples, self._lowest), color))
 
     def still(self, shot: Shot) -> list[bytes]:
-        """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`key`)."""
+        """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
         return [self._stage.drawn(path, thing) for path, thing in self._together(shot)]
 
     def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[Letter]:
@@ -162,7 +164,7 @@ class Scenery:
         for letter, color, names in groups:
             for name, (low, high) in [(name, box) for name in names if (box := self._boxes.get(name)) is not None]:
                 ends, (x, y), listed = edges_of(low, high), ((low + high) / 2)[:2], len(places) < MOST_LETTERS
-                key = self._keys[name] if listed and name in self._movable else ""
+                key = self.keys[name] if listed and name in self._movable else ""
                 if key:
                     self._stage.draw((*PARTS, key), lines(ends, color), shadow=False)
                 else:
@@ -204,7 +206,7 @@ class Scenery:
         for part, item in enumerate(painted):
             self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
         if element:
-            self._keys[model.name] = key
+            self.keys[model.name] = key
         if model.name in self._edges and not self._is_large:
             for group, color in ((LEFT_OUT, colors.LEFT_OUT), (REMOVED, colors.REMOVED)):
                 self._stage.draw((*group, key), lines(self._edges[model.name], color), shadow=False)
@@ -245,11 +247,6 @@ def _tube(points: np.ndarray, color: Color) -> Object | None:
     """A drawn trajectory; None for one without length."""
     tube = mesh.tube(points, LINE)
     return plain(tube, color, glow=0.4) if len(tube.faces) else None
-
-
-def _box_of(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
-    """The corners of the box around a surface along the world's axes, m; None for an empty one."""
-    return (surface.vertices.min(axis=0), surface.vertices.max(axis=0)) if len(surface.vertices) else None
 
 
 def _ground(world: World) -> Pose | None:

@@ -188,18 +188,17 @@ def of_shape(shape: Shape) -> Surface:
 
 def height_at(surface: Surface, x: float, y: float) -> float | None:
     """The height of the highest face at (x, y), m; None if there is none."""
-    corners = surface.triangles
-    if not len(corners):
-        return None
-    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
-    near = ((low <= (x, y)) & (high >= (x, y))).all(axis=1)
-    origin = corners[near, 0]
-    first, second = corners[near, 1] - origin, corners[near, 2] - origin
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    flat = np.abs(area) > 1e-12
-    origin, first, second, area = origin[flat], first[flat], second[flat], area[flat]
-    px, py = x - origin[:, 0], y - origin[:, 1]
-    u, v = (px * second[:, 1] - py * second[:, 0]) / area, (py * first[:, 0] - px * first[:, 1]) / area
+
+    def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        product: np.ndarray = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        return product
+
+    origin, second, third = np.moveaxis(surface.triangles, 1, 0)
+    first, second, place = second - origin, third - origin, (x, y) - origin[:, :2]
+    area = cross(first, second)
+    # A face on edge has no area.
+    area[np.abs(area) < 1e-12] = np.nan
+    u, v = cross(place, second) / area, cross(first, place) / area
     inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
     heights = (origin[:, 2] + u * first[:, 2] + v * second[:, 2])[inside]
     return float(heights.max()) if len(heights) else None

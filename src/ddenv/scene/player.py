@@ -100,7 +100,7 @@ class Player:
         moving = {
             key: [_row(row[0], scenery.moved(name, pose_of(row[1:]))) for row in rows]
             for name, rows in one.moving.items()
-            if (key := scenery.key(name)) is not None
+            if (key := scenery.keys.get(name)) is not None
         }
         sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
         return {
@@ -112,7 +112,7 @@ class Player:
             "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
             "moving": moving,
             "there": {
-                kind: [key for name in sorted(names) if (key := scenery.key(name))] for kind, names in sets.items()
+                kind: [key for name in sorted(names) if (key := scenery.keys.get(name))] for kind, names in sets.items()
             },
             "lacks": " ".join(one.lacks),
         }
