@@ -152,35 +152,31 @@ def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
 
 
 @pytest.mark.programs
-async def test_a_running_test_is_followed(writer, start_scene):
-    writer.baseline()
-    writer.round()
-    writer.start_test(2, candidate=1)
-    with engine_lock(writer.path):
-        writer.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
-        url = url_of(start_scene(writer.path))
+async def test_a_running_test_is_followed(in_round, start_scene):
+    in_round.start_test(2, candidate=1)
+    with engine_lock(in_round.path):
+        in_round.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
+        url = url_of(start_scene(in_round.path))
         words = captions(await messages(url, titled("round 1 · part B · test 2 · runs now")))[-1]
         assert words["time"] == "1.5 s of 45 s"
         # The board is pushed 0.5 m, and the robot drives 0.3 m, so far as its wheels roll.
         board = {"board": (1.5, -1.5, 0.1, 1.0, 0.0, 0.0, 0.0)}
-        writer.run.set_live([Live(0, 2, 1.8, (1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), board)])
+        in_round.run.set_live([Live(0, 2, 1.8, (1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), board)])
         found = await messages(url, lambda told: matrix_of(told, "/world/models/003 board")[0, 3])
         assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
         wheel = matrix_of(found, "/world/robot/wheel 0")
         assert math.atan2(wheel[0, 2], wheel[0, 0]) == pytest.approx(0.3 / 0.1651)
-        writer.run.set_live([])
-        writer.finish_test(2, "similar")
+        in_round.run.set_live([])
+        in_round.finish_test(2, "similar")
     # The engine is gone without an event: the scene goes back to the failure.
     await messages(url, titled("the failure f"))
 
 
 @pytest.mark.programs
-async def test_a_viewer_says_what_is_shown(writer):
-    writer.baseline()
-    writer.round()
-    begun = writer.run.events()[-1].id
-    writer.reduce()
-    process = programs.start_scene(writer.path)
+async def test_a_viewer_says_what_is_shown(in_round):
+    begun = in_round.run.events()[-1].id
+    in_round.reduce()
+    process = programs.start_scene(in_round.path)
     try:
         url = url_of(process)
         process.stdin.write("nonsense\n" + written(Wanted(begun, 1, 1)))
@@ -195,12 +191,10 @@ async def test_a_viewer_says_what_is_shown(writer):
 
 
 @pytest.mark.programs
-async def test_rows_of_a_killed_engine_are_not_live(writer, start_scene):
-    writer.baseline()
-    writer.round()
-    writer.start_test(2, candidate=1)
-    writer.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
-    url = url_of(start_scene(writer.path))
+async def test_rows_of_a_killed_engine_are_not_live(in_round, start_scene):
+    in_round.start_test(2, candidate=1)
+    in_round.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
+    url = url_of(start_scene(in_round.path))
     found = await messages(url, titled("the failure f"))
     assert not any("runs now" in words["title"] for words in captions(found))
 

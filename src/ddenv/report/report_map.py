@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ddenv.map.drawing import FAR, Frame, Point, at, badge, labels, path_of, plot, written
 from ddenv.map.footprints import Drawn
-from ddenv.page.blocks import section
 from ddenv.page.step_chart import opening
 from ddenv.report.run_data import Record
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import COLUMNS
 
 # Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.
@@ -115,19 +114,14 @@ def _picture(record: Record, frame: Frame, name: str, ways: Ways | None, named: 
 
 
 def _places(record: Record) -> dict[str, Point]:
-    """Where the start, the goal and f's end are, x, y (m), as far as they are known."""
-    scenario, position = record.state.scenario, record.state.f_position
-    places = {
-        "start": section(section(scenario, "robot"), "spawn"),
-        "goal": section(scenario, "goal"),
-        "end": {} if position is None else dict(zip("xy", position[:2], strict=True)),
-    }
-    return {sign: (float(place["x"]), float(place["y"])) for sign, place in places.items() if _is_near(place)}
-
-
-def _is_near(place: dict[str, Any]) -> bool:
-    """Whether it has an x and a y that are not far outside; a damaged file may have anything."""
-    return all(isinstance(value := place.get(axis), int | float) and abs(value) < FAR for axis in "xy")
+    """Where the start, the goal and f's end are, x, y (m), if they are known and not far outside."""
+    places: dict[str, Point] = {}
+    if record.scenario is not None:
+        spawn, goal = record.scenario.robot.spawn, record.scenario.goal
+        places = {"start": (spawn.x, spawn.y), "goal": (goal.x, goal.y)}
+    if record.state.f_position is not None:
+        places["end"] = record.state.f_position[:2]
+    return {sign: place for sign, place in places.items() if max(map(abs, place)) < FAR}
 
 
 def _sort(record: Record, name: str) -> str:
@@ -167,10 +161,9 @@ def _way(samples: array[float] | None, frame: Frame) -> str:
 
 def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator[str]:
     """Circles: where the goal counts as reached, and where similar runs end, from above."""
-    scenario = record.state.scenario
-    reach, around = section(scenario, "goal").get("tolerance", 0.5), section(scenario, "failure").get("epsilon", 0.33)
-    for sign, radius, name in (("goal", reach, "reach"), ("end", around, "around")):
-        if sign in places and isinstance(radius, int | float) and 0 < radius < FAR:
+    reach = record.scenario.goal.tolerance if record.scenario is not None else 0.0
+    for sign, radius, name in (("goal", reach, "reach"), ("end", settings(record.state).epsilon, "around")):
+        if sign in places and 0 < radius < FAR:
             x, y = frame.pixel(places[sign])
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
 

@@ -21,6 +21,7 @@ from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Reason, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.world.model import World
+from ddenv.world.scenario import Scenario
 
 T = TypeVar("T")
 # Of the polygon that stands for a circle.
@@ -29,7 +30,7 @@ CORNERS = 32
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A run: its `state`, its `rounds` as they ended, its first settings, and its world if that can be read.
+    """A run: its `state`, its `rounds` as they ended, its first settings, and its scenario and world if they can be read.
 
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
@@ -44,6 +45,7 @@ class Record:
     asked: dict[str, Any]
     started: float
     alive: bool
+    scenario: Scenario | None
     world: World | None
     models: tuple[Drawn, ...]
     original: array[float] | None
@@ -64,7 +66,7 @@ def read_run(path: Path) -> Record:
         if first is None or not isinstance(first.event, Created):
             raise UserError(trouble or f"{path}: damaged run file: it has no data for a report")
         troubles = [trouble] if trouble else []
-        world = _tried(lambda: read_parts(file)[1], troubles)
+        scenario, world, _ = _tried(lambda: read_parts(file), troubles) or (None, None, None)
         f = None if state.f_test is None else state.f_test.id
         original = _path(file, f, troubles)
         same = state.evidence_test == f
@@ -81,6 +83,7 @@ def read_run(path: Path) -> Record:
         asked=recorded_scenario(first.event.scenario),
         started=first.time,
         alive=alive,
+        scenario=scenario,
         world=world,
         models=() if world is None else plan(world, CORNERS),
         original=original,
