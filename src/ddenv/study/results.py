@@ -248,8 +248,15 @@ def rows_of(plan: Plan, results: Sequence[Result]) -> tuple[tuple[Row, ...], ...
     """The `results` of the plan's cells as rows, for each scenario a row for each method."""
 
     def row(scenario: Scenario, method: Method) -> Row:
-        own = [each for each in results if (each.cell.scenario.name, each.cell.method) == (scenario.name, method)]
-        without, sliced = (tuple(each for each in own if each.cell.slices == slices) for slices in (False, True))
+        without, sliced = (
+            tuple(
+                result
+                for result in results
+                if (result.cell.scenario.name, result.cell.method, result.cell.slices)
+                == (scenario.name, method, slices)
+            )
+            for slices in (False, True)
+        )
         return Row(scenario, method, without, sliced)
 
     return tuple(tuple(row(scenario, method) for method in plan.methods) for scenario in plan.scenarios)

@@ -215,12 +215,14 @@ def _settings(plan: Plan) -> Table:
     """The settings that any method uses, with a column for each scenario."""
     used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
     rows = [
-        (one.label, *(value_words(getattr(getattr(each, one.section), one.name)) for each in plan.scenarios))
-        for one in SETTINGS.values()
-        if one.section != "simulation" and one.name not in OF_A_CELL and (not one.used_by or used & set(one.used_by))
+        (item.label, *(value_words(getattr(getattr(scenario, item.section), item.name)) for scenario in plan.scenarios))
+        for item in SETTINGS.values()
+        if item.section != "simulation"
+        and item.name not in OF_A_CELL
+        and (not item.used_by or used & set(item.used_by))
     ]
     seeds = ({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name} for scenario in plan.scenarios)
-    rows.append(("seeds", *(", ".join(map(str, sorted(each))) for each in seeds)))
+    rows.append(("seeds", *(", ".join(map(str, sorted(numbers))) for numbers in seeds)))
     head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
     return Table(head, tuple(rows), frozenset(range(1, len(head))))
 

@@ -254,27 +254,21 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     if len(scenarios[0]) < FEWEST or not any(row.minimal for rows in scenarios for row in rows):
         return None
     fewest = [min((tests for row in rows if (tests := _certain(row)) is not None), default=None) for rows in scenarios]
-    bounds = [sorted({result.bounds for row in rows for result in row.minimal}) for rows in scenarios]
+    to_show, to_find = ([_bound(rows, which) for rows in scenarios] for which in (0, 1))
     names = tuple(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios)
     head = ("method", *names, "times the bound, mean")
     methods = [(_times(rows), rows) for rows in zip(*scenarios, strict=True)]
     table: list[tuple[Cell, ...]] = [
-        ("minimum for a search that ends there", *(_range([one for one, _ in each]) for each in bounds), "1.0"),
-        (
-            "minimum to find it, if all sets are equally likely",
-            *(_range([one for _, one in each]) for each in bounds),
-            "–",
-        ),
+        ("minimum for a search that ends there", *to_show, "1.0"),
+        ("minimum to find it, if all sets are equally likely", *to_find, "–"),
     ]
     # Methods that are not certified everywhere come last.
     for times, rows in sorted(methods, key=lambda method: method[0] or math.inf):
         cells = [_cell(row, least) for row, least in zip(rows, fewest, strict=True)]
         table.append((rows[0].method.label, *cells, "–" if times is None else f"{times:.1f}"))
     words = [paragraph for rows in scenarios for paragraph in _words(rows)]
-    return Section(
-        "Which is best where",
-        (*words, Table(head, tuple(table), frozenset(range(1, len(head)))), say(BOUNDS)),
-    )
+    ranking = Table(head, tuple(table), frozenset(range(1, len(head))))
+    return Section("Which is best where", (*words, ranking, say(BOUNDS)))
 
 
 def _certain(row: Row) -> float | None:
@@ -296,9 +290,10 @@ def _cell(row: Row, fewest: float | None) -> Cell:
     return Strong(f"{row.tests:g} ◂") if row.tests == fewest else f"{row.tests:g}"
 
 
-def _range(bounds: Sequence[int]) -> str:
-    """A range, since cells may differ in how many models are left."""
-    return " to ".join(map(str, dict.fromkeys((min(bounds), max(bounds))))) if bounds else "–"
+def _bound(rows: Sequence[Row], which: int) -> str:
+    """One of the bounds as a range, since cells may differ in how many models are left."""
+    bounds = [result.bounds[which] for row in rows for result in row.minimal]
+    return " to ".join(map(str, sorted({min(bounds), max(bounds)}))) if bounds else "–"
 
 
 def _words(rows: Sequence[Row]) -> Iterator[Paragraph]:
