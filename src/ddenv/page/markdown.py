@@ -20,7 +20,7 @@ def markdown(report: Report, stem: str) -> str:
     figures = Table(
         tuple(what for _, what in report.figures),
         (tuple(number for number, _ in report.figures),),
-        frozenset(range(len(report.figures))),
+        range(len(report.figures)),
     )
     lines = [f"# {_name(report.name)}: {_text(report.verdict)}", ""]
     opening = Section("", (*report.lead, figures))

@@ -201,7 +201,7 @@ def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], f
     head = ("worked on", "for", "workers", "tests made", "machine", "versions")
     blocks: list[Block] = [
         _settings(plan),
-        *([Table(head, tuple(worked), frozenset({1, 2, 3}))] if worked else []),
+        *([Table(head, tuple(worked), {1, 2, 3})] if worked else []),
         *_computed(results),
         say("What the columns mean:"),
         Table(("column", "meaning"), tuple(yaml.safe_load(COLUMNS.read_text()).items())),
@@ -224,7 +224,7 @@ def _settings(plan: Plan) -> Table:
     seeds = ({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name} for scenario in plan.scenarios)
     rows.append(("seeds", *(", ".join(map(str, sorted(numbers))) for numbers in seeds)))
     head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
-    return Table(head, tuple(rows), frozenset(range(1, len(head))))
+    return Table(head, tuple(rows), range(1, len(head)))
 
 
 def _computed(results: Sequence[Result]) -> Iterator[Block]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from html import escape
 from operator import itemgetter
 from pathlib import Path
@@ -137,10 +137,10 @@ def section(folder: Path, rows: Sequence[Row]) -> Section:
     return Section(title, tuple(blocks))
 
 
-def _table(rows: Sequence[Sequence[tuple[str, Cell]]], right: Sequence[int]) -> Table:
+def _table(rows: Sequence[Sequence[tuple[str, Cell]]], right: Collection[int]) -> Table:
     """A table of rows whose cells have titles."""
-    head, cells = (tuple(tuple(cell[part] for cell in row) for row in rows) for part in (0, 1))
-    return Table(tuple(map(str, head[0])), cells, frozenset(right))
+    head = tuple(title for title, _ in rows[0])
+    return Table(head, tuple(tuple(cell for _, cell in row) for row in rows), right)
 
 
 def numbers(rows: Sequence[Row]) -> Table:
@@ -267,7 +267,7 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
         cells = [_cell(row, least) for row, least in zip(rows, fewest, strict=True)]
         table.append((rows[0].method.label, *cells, "–" if times is None else f"{times:.1f}"))
     words = [paragraph for rows in scenarios for paragraph in _words(rows)]
-    ranking = Table(head, tuple(table), frozenset(range(1, len(head))))
+    ranking = Table(head, tuple(table), range(1, len(head)))
     return Section("Which is best where", (*words, ranking, say(BOUNDS)))
 
 
