@@ -166,10 +166,10 @@ async def test_a_running_test_is_followed(in_round, start_scene):
         assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
         wheel = matrix_of(found, "/world/robot/wheel 0")
         assert math.atan2(wheel[0, 2], wheel[0, 0]) == pytest.approx(0.3 / 0.1651)
-        in_round.run.set_live([])
-        in_round.finish_test(2, "similar")
-    # The engine is gone without an event: the scene goes back to the failure.
+    # The engine is gone without an event, and leaves its rows behind: the scene goes back to the failure.
     await messages(url, titled("the failure f"))
+    found = await messages(url_of(start_scene(in_round.path)), titled("the failure f"))
+    assert not any("runs now" in words["title"] for words in captions(found))
 
 
 @pytest.mark.programs
@@ -190,15 +190,6 @@ async def test_a_viewer_says_what_is_shown(in_round):
         process.wait()
 
 
-@pytest.mark.programs
-async def test_rows_of_a_killed_engine_are_not_live(in_round, start_scene):
-    in_round.start_test(2, candidate=1)
-    in_round.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
-    url = url_of(start_scene(in_round.path))
-    found = await messages(url, titled("the failure f"))
-    assert not any("runs now" in words["title"] for words in captions(found))
-
-
 async def test_pages_from_elsewhere_are_refused_and_own_ones_are_welcome_also_through_a_tunnel(url):
     evil = "http://evil.example"
     # The last one has a name that was made to lead here.
@@ -213,26 +204,18 @@ async def test_pages_from_elsewhere_are_refused_and_own_ones_are_welcome_also_th
         assert await messages(url, headers={"Origin": origin})
 
 
-@pytest.mark.programs
-async def test_browsers_come_and_go(writer, start_scene):
+@pytest.mark.parametrize(
+    "number", slow(pytest.mark.programs, [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], but=[signal.SIGINT])
+)
+async def test_browsers_come_and_go_and_it_ends_cleanly(writer, start_scene, number):
     writer.baseline()
-    process = start_scene(writer.path)
-    url = url_of(process)
-    for _ in range(3):
+    url = url_of(process := start_scene(writer.path))
+    for _ in range(2):
         assert await messages(url)
     connection = await websocket_connect(feed_of(url))
     connection.protocol.stream.close()
     assert await messages(url)
-    assert process.poll() is None
-
-
-@pytest.mark.parametrize(
-    "number", slow(pytest.mark.programs, [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], but=[signal.SIGINT])
-)
-async def test_ends_cleanly(writer, start_scene, number):
-    writer.baseline()
-    process = start_scene(writer.path)
-    connection = await websocket_connect(feed_of(url_of(process)))
+    connection = await websocket_connect(feed_of(url))
     process.send_signal(number)
     assert await asyncio.to_thread(process.wait, PATIENCE) == 0
     assert process.stderr.read() == ""

@@ -27,16 +27,8 @@ grep -q 'model name="deck"' $1 && grep -q 'model name="wall"' $1 && exit 1
 exit 0
 """
 WORDS = (
-    "--pairs",
-    "model2model/sequential",
-    "--algorithms",
-    "splitting",
-    "--jobs",
-    "1",
-    "-o",
-    "study",
-    "--keep-rate",
-    "0.5",
+    *("--pairs", "model2model/sequential", "--algorithms", "splitting", "--jobs", "1"),
+    *("-o", "study", "--keep-rate", "0.5"),
 )
 
 
