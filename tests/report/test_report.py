@@ -107,7 +107,8 @@ def test_it_begins_with_a_paragraph_for_everyone(run):
 def test_a_finished_run_in_a_few_words(run, tmp_path):
     fake_moments.finished(run)
     report = content(read_run(run.path))
-    assert "".join(words(part) for part in report.lead[0].parts) == (
+    # How long it took to write its events depends on the machine.
+    assert re.sub(r"\d+ s of", "0 s of", "".join(map(words, report.lead[0].parts))) == (
         "In short: The robot got stuck before it reached its goal. Of the 11 models of its world, 2 are enough to make it "
         "fail like that: crate_00 and crate_01. It failed so in 23 of 23 new drives with nothing else there (80 % to 100 % of "
         "all drives, with 95 % confidence); without any one of them in at most 1 of 12 (at most 48 %). This took 83 simulated "

@@ -16,7 +16,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
-from ddenv.study.conduct import Progress, conduct
+from ddenv.study.conduct import Runner, conduct
 from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
@@ -219,7 +219,7 @@ def alone(tmp_path):
 
 def when_it_waits(monkeypatch, happens):
     """Something `happens` as soon as the study waits for its engines."""
-    look, happened = Progress.look, []
+    look, happened = Runner.look, []
 
     def first(self):
         look(self)
@@ -227,7 +227,7 @@ def when_it_waits(monkeypatch, happens):
             happened.append(True)
             happens()
 
-    monkeypatch.setattr(Progress, "look", first)
+    monkeypatch.setattr(Runner, "look", first)
 
 
 def test_an_engine_that_a_killed_study_left_is_waited_for(alone, lab, monkeypatch):
@@ -242,7 +242,7 @@ def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, m
     gate = threading.Event()
     start = lab.start_engine
 
-    look, mine, looks = Progress.look, [], []
+    look, mine, looks = Runner.look, [], []
 
     def let_go(self):
         look(self)
@@ -259,7 +259,7 @@ def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, m
         return mine[0]
 
     monkeypatch.setattr("ddenv.study.conduct.start_engine", late)
-    monkeypatch.setattr(Progress, "look", let_go)
+    monkeypatch.setattr(Runner, "look", let_go)
     code, words = study(*alone)
     gate.set()
     assert code == 0, words

@@ -224,15 +224,12 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
             "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
         )
     if state.certified:
-        means = promise(state, found)
-        words += f" {as_sentence(means)}"
+        words += f" {as_sentence(promise(state, found))}"
     # Other certificates of the same environment: each stands for itself.
-    others = [
-        one for one in state.certificates if one.node == found.node and one.claims and one is not state.certificate
-    ]
     earlier = (
         say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
-        for one in others
+        for one in state.certificates
+        if one.node == found.node and one.claims and one is not state.certificate
     )
     return [table, say(words), *earlier]
 

@@ -193,7 +193,7 @@ def _of_waiting(cell: Cell, tested: Sequence[Work], worlds: dict[str, Size]) -> 
     return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
 
 
-class Progress:
+class Runner:
     """One session of work on the study `plan` in `folder`: makes `cells` with `jobs` workers in all, and says and records how far
     it is; those that take long should come first. Raises UserError if earlier sessions cannot be read.
     """
@@ -345,7 +345,7 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
             cells.sort(key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW)))
         try:
             if cells:
-                Progress(plan, folder, cells, worlds, jobs, out).run()
+                Runner(plan, folder, cells, worlds, jobs, out).run()
         except KeyboardInterrupt:
             interrupted = True
         page, results = write_study(plan, folder, sessions(folder))
