@@ -117,6 +117,21 @@ def writer(tmp_path, monkeypatch) -> Writer:
 
 
 @pytest.fixture
+def in_round(writer) -> Writer:
+    """The first round has begun."""
+    writer.baseline()
+    writer.round()
+    return writer
+
+
+@pytest.fixture
+def reduced(in_round) -> Writer:
+    """The first round has reduced the world."""
+    in_round.reduce()
+    return in_round
+
+
+@pytest.fixture
 def start_scene():
     """Starts the program with these words; what still runs at the end of the test is ended."""
     started = []

@@ -28,20 +28,9 @@ CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at")
 
 _FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-quic",
-    "--disable-dev-shm-usage",
-    "--hide-scrollbars",
-    "--remote-debugging-port=0",
+    *("--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader"),
+    *("--enable-unsafe-swiftshader", "--no-first-run", "--disable-background-networking", "--disable-component-update"),
+    *("--disable-sync", "--disable-quic", "--disable-dev-shm-usage", "--hide-scrollbars", "--remote-debugging-port=0"),
 )
 
 
@@ -135,11 +124,8 @@ def near(picture: np.ndarray, color: tuple[int, int, int], reach: int = 40) -> i
 
 @pytest.mark.browser
 @pytest.mark.witness
-async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
-    writer.baseline()
-    writer.round()
-    writer.reduce()
-    process = start_scene(writer.path)
+async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
+    process = start_scene(reduced.path)
     url = process.stdout.readline().strip()
     with chromium((900, 600)) as port:
         page = await Page.open(port)
@@ -158,7 +144,7 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
         process.wait(PATIENCE)
         await shows(page, "document.getElementById('lost').style.display === 'block'")
         # The page comes back to a scene that is started again.
-        assert start_scene(writer.path).stdout.readline().strip() == url
+        assert start_scene(reduced.path).stdout.readline().strip() == url
         await shows(
             page,
             "document.getElementById('lost').style.display !== 'block' && typeof play !== 'undefined' && play !== null",
@@ -175,11 +161,8 @@ def place_of(path: str) -> str:
 
 @pytest.mark.browser
 @pytest.mark.witness
-async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(writer, start_scene):
-    writer.baseline()
-    writer.round()
-    writer.reduce()
-    url = start_scene(writer.path).stdout.readline().strip()
+async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced, start_scene):
+    url = start_scene(reduced.path).stdout.readline().strip()
     with chromium((900, 600)) as port:
         page = await Page.open(port)
         await page.heed()
@@ -252,10 +235,7 @@ async def test_a_report_looks_as_it_should_and_runs_nothing(run_folder):
 
 
 @pytest.fixture
-def run_folder(writer, tmp_path):
-    writer.baseline()
-    writer.round()
-    writer.reduce()
+def run_folder(reduced, tmp_path):
     return tmp_path
 
 

@@ -13,7 +13,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runs.wanted import Wanted
 from ddenv.scene.camera import view
 from ddenv.scene.draw import MOST_LETTERS, Scenery, path_on_ground, safe_name
-from ddenv.scene.mesh import box, merge, outline, paint, sphere
+from ddenv.scene.mesh import box, outline, paint, sphere
 from ddenv.scene.player import Player
 from ddenv.scene.shot import Shot, shot
 from ddenv.scene.stage import Stage
@@ -60,16 +60,38 @@ def screen() -> Screen:
     return Screen()
 
 
-def test_a_model_is_one_mesh(small_world):
-    assert [len(item.surface.faces) for model in small_world.models[1:] for item in paint(model)] == [12] * 4
-    assert len(paint(ROBOT)) == 1
+@pytest.fixture
+def scenery(screen, small_world) -> Scenery:
+    return Scenery(Stage(screen.take), small_world, Wheels(ROBOT), small_world.elements())
+
+
+@pytest.fixture
+def stage(screen) -> Stage:
+    return Stage(screen.take)
+
+
+@pytest.fixture
+def words() -> dict:
+    """The last caption."""
+    return {}
+
+
+@pytest.fixture
+def player(writer, stage, words) -> Player:
+    """The scene of a run after its baseline."""
+    writer.baseline()
+    made = Player(writer.run, stage, lambda **given: words.update(given))
+    made.tick(10)
+    return made
 
 
 def test_a_link_without_visuals_shows_its_collisions():
     cube, ball = Collision("c", Box((1, 1, 1)), Pose(), 1.0), Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1))
     links = (Link("seen", Pose(), None, (cube,), (ball,)), Link("lost", Pose(), None, (cube,), ()))
     (painted,) = paint(Model("m", Pose(), True, links, (), (), 1))
-    assert len(painted.surface.faces) == len(sphere(0.1).faces) + 12
+    assert len(painted.faces) == len(sphere(0.1).faces) + 12
+    # The robot is one mesh, too.
+    assert np.isfinite(*[item.vertices for item in paint(ROBOT)]).all()
 
 
 def test_the_ditch_is_few_and_small_messages(screen):
@@ -96,12 +118,9 @@ def test_outline_is_turned_as_the_model():
     assert sorted(np.round(lengths, 6)) == [0.5] * 4 + [1] * 4 + [2] * 4
 
 
-def test_a_change_of_environment_only_shows_and_hides(writer, screen, small_world):
-    stage = Stage(screen.take)
+def test_a_change_of_environment_only_shows_and_hides(writer, screen, scenery):
     writer.baseline()
-    state = fold(writer.run.events())
-    scenery = Scenery(stage, small_world, Wheels(ROBOT), state.elements)
-    scenery.show(shot(state, []))
+    scenery.show(shot(fold(writer.run.events()), []))
     assert len(screen.shown("models")) == 4
     assert not screen.shown("removed") | screen.shown("left-out")
     things = dict(screen.things)
@@ -113,12 +132,10 @@ def test_a_change_of_environment_only_shows_and_hides(writer, screen, small_worl
     assert screen.things == things
 
 
-def test_a_finished_test_is_played_by_the_browser(writer, screen):
-    writer.baseline()
+def test_a_finished_test_is_played_by_the_browser(writer, screen, player):
     writer.round()
     writer.reduce()
-    player = Player(writer.run, Stage(screen.take), lambda **_: None)
-    player.tick(10)
+    player.tick(20)
     play = player.play(1)
     assert (play["test"], play["title"], play["models"]) == (1, "baseline · test 1 · similar", 4)
     assert play["robot"][0] == [0, 0, 0, 0.132, 0, 0, 0, 1] and play["robot"][-1][:2] == [8, 3]
@@ -141,11 +158,7 @@ def test_a_finished_test_is_played_by_the_browser(writer, screen):
     assert len(screen.things) == before + 1
 
 
-def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen):
-    writer.baseline()
-    words = {}
-    player = Player(writer.run, Stage(screen.take), lambda **given: words.update(given))
-    player.tick(10)
+def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen, player, words):
     assert words["parts"] == []
     writer.round()
     player.tick(20)
@@ -190,14 +203,12 @@ def _boxed(number):
     return Link("l", Pose((number, 0, 0)), None, (shape,), ())
 
 
-def test_heights_of_surfaces(screen, small_world):
-    scenery = Scenery(Stage(screen.take), small_world, Wheels(ROBOT), small_world.elements())
+def test_heights_of_surfaces(scenery):
     assert scenery.height(6, 0) == pytest.approx(0.5)
     assert scenery.height(-5, 0) == 0
 
 
-def test_trail_sends_only_its_last_piece_again(screen, small_world):
-    scenery = Scenery(Stage(screen.take), small_world, Wheels(ROBOT), small_world.elements())
+def test_trail_sends_only_its_last_piece_again(screen, scenery):
     rows = np.zeros((100, 8))
     rows[:, 1], rows[:, 4] = np.arange(100) * 0.1, 1.0
     scenery.trail(rows[:80])
@@ -216,15 +227,14 @@ def test_path_on_ground_is_below_a_tilted_robot():
     assert path_on_ground(on_its_side, -0.5)[0] == pytest.approx((0, 0.45, 1))
 
 
-def test_a_late_browser_gets_the_same(writer, screen):
-    writer.baseline()
+def test_a_late_browser_gets_the_same_and_the_stage_does_not_grow(writer, screen, stage, player, words):
     writer.round()
     writer.reduce()
-    stage = Stage(screen.take)
-    words = {}
-    player = Player(writer.run, stage, lambda **given: words.update(given))
-    for step in range(40):
-        player.tick(10 + 0.1 * step)
+    player.tick(15)
+    count = len(stage.messages())
+    for step in range(200):
+        player.tick(20 + 0.2 * step)
+    assert len(stage.messages()) <= count + 1
     late = Screen()
     for message in stage.messages():
         late.take(message)
@@ -235,34 +245,18 @@ def test_a_late_browser_gets_the_same(writer, screen):
     assert words["models"] == "2 of 4 models"
 
 
-def test_an_earlier_moment_and_a_row_of_it_are_shown_until_the_present_is_wanted_again(writer, screen):
-    writer.baseline()
+def test_an_earlier_moment_and_a_row_of_it_are_shown_until_the_present_is_wanted_again(writer, player, words):
     writer.round()
     begun = writer.run.events()[-1].id
     writer.reduce()
-    words = {}
-    player = Player(writer.run, Stage(screen.take), lambda **given: words.update(given))
-    player.tick(10)
-    player.show(Wanted(begun, 1, 1))
-    player.tick(20)
-    assert (words["title"], words["models"]) == ("part B · not tested yet", "2 of 4 models")
-    player.show(Wanted(begun))
-    player.tick(30)
-    assert words["title"].startswith("the failure f · test 1")
-    player.show(Wanted())
-    player.tick(40)
-    assert words["title"].startswith("the failure in what is left · test 2")
-
-
-def test_the_stage_does_not_grow(writer, screen):
-    writer.baseline()
-    stage = Stage(screen.take)
-    player = Player(writer.run, stage, lambda **_: None)
-    player.tick(10)
-    count = len(stage.messages())
-    for step in range(200):
-        player.tick(10 + 0.2 * step)
-    assert len(stage.messages()) <= count + 1
+    for wanted, title in (
+        (Wanted(begun, 1, 1), "part B · not tested yet"),
+        (Wanted(begun), "the failure f · test 1"),
+        (Wanted(), "the failure in what is left · test 2"),
+    ):
+        player.show(wanted)
+        player.tick(20)
+        assert words["title"].startswith(title)
 
 
 def test_the_camera_sees_the_robot_go_to_the_right():
@@ -270,7 +264,3 @@ def test_the_camera_sees_the_robot_go_to_the_right():
     assert seen.center == (5, 0, 0)
     assert seen.camera[1] < 0 < seen.camera[2]
     assert view((1.0, 1.0, 0.0), (1.0, 1.0, 0.0)).radius > 0
-
-
-def test_all_meshes_of_the_robot_are_finite():
-    assert np.isfinite(merge([item.surface for item in paint(ROBOT)]).vertices).all()

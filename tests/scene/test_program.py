@@ -89,6 +89,21 @@ def matrix_of(found: Told, path: str) -> np.ndarray:
     return np.array(matrices[-1]).reshape(4, 4).T if matrices else np.eye(4)
 
 
+@pytest.fixture
+def url(writer, start_scene) -> str:
+    """A scene of a run after its baseline."""
+    writer.baseline()
+    return url_of(start_scene(writer.path))
+
+
+def refusal(url: str, code: int) -> bytes:
+    """What the scene says to a page that it refuses with this code."""
+    with pytest.raises(HTTPError) as refused:
+        urlopen(url)
+    assert refused.value.code == code
+    return refused.value.read()
+
+
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="needs Linux's /proc/net/tcp")
 def test_listens_on_loopback_only(writer, start_scene):
     process = start_scene(writer.path)
@@ -96,95 +111,72 @@ def test_listens_on_loopback_only(writer, start_scene):
     assert listening(process.pid) == [f"0100007F:{port:04X}"]
 
 
-def test_page_and_viewer_are_served_and_nothing_else(writer, start_scene):
-    url = url_of(start_scene(writer.path))
-    with urlopen(url) as answer:
-        assert b"main.min.js" in answer.read()
-    with urlopen(url + "main.min.js") as answer:
-        assert len(answer.read()) > 100_000
-    for path in ("index.js", "../__init__.py", "%2e%2e/%2e%2e/visualizer.py", "main.js"):
-        with pytest.raises(HTTPError):
-            urlopen(url + path)
-
-
-async def test_nobody_watches_without_the_token(writer, start_scene):
-    url = url_of(start_scene(writer.path))
+async def test_nobody_watches_without_the_token(url):
     root, token = url.rsplit("/", 2)[:2]
     for path in ("", "static/", "feed", "main.min.js", f"{token[:-1]}/", f"{'x' * len(token)}/", f"{token[:-1]}/feed"):
-        with pytest.raises(HTTPError) as refused:
-            urlopen(f"{root}/{path}")
-        assert refused.value.code == 403
+        refusal(f"{root}/{path}", 403)
         with pytest.raises(HTTPClientError, match="403"):
             await websocket_connect(feed_of(f"{root}/{path}").removesuffix("feed"))
 
 
-async def test_a_browser_gets_the_scene_and_its_words(writer, start_scene):
-    writer.baseline()
-
+async def test_a_browser_gets_the_scene_and_its_words(url):
     def mention(found, words):
         return sum(isinstance(message, bytes) and words in message for message in found)
 
     def drawn_and_moving(found):
         return captions(found) and mention(found, b"set_object") > 10 and mention(found, b"/world/robot") > 2
 
-    words = captions(await messages(url_of(start_scene(writer.path)), drawn_and_moving))[-1]
+    words = captions(await messages(url, drawn_and_moving))[-1]
     assert (words["name"], words["models"]) == ("small", "4 of 4 models")
     assert (words["title"], words["kind"], words["test"]) == ("the failure f · test 1 · similar", "replay", 1)
 
 
-def test_a_page_may_ask_for_finished_tests_and_for_nothing_else(writer, start_scene):
-    writer.baseline()
-    url = url_of(start_scene(writer.path))
-    with urlopen(url + "playback.js") as answer:
-        assert b"requestAnimationFrame" in answer.read()
-    with urlopen(url + "play/1") as answer:
-        assert len(json.load(answer)["robot"]) == 81
-    with urlopen(url + "pairs") as answer:
-        assert json.load(answer) == {"tests": 1, "pairs": []}
-    with urlopen(url + "way/1") as answer:
-        drawn = answer.read()
-        assert int.from_bytes(drawn[:4], "big") == len(drawn) - 4
+def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
+    def told(path=""):
+        with urlopen(url + path) as answer:
+            return answer.read()
+
+    assert b"main.min.js" in told()
+    assert len(told("main.min.js")) > 100_000
+    assert b"requestAnimationFrame" in told("playback.js")
+    assert len(json.loads(told("play/1"))["robot"]) == 81
+    assert json.loads(told("pairs")) == {"tests": 1, "pairs": []}
+    drawn = told("way/1")
+    assert int.from_bytes(drawn[:4], "big") == len(drawn) - 4
     for path in ("play/2", "play/0", "play/999999999", "still/7", "ghost-way/7"):
-        with pytest.raises(HTTPError) as refused:
-            urlopen(url + path)
-        assert refused.value.code == 404
-        assert refused.value.read().count(b"\n") == 0
-    for path in ("play/-1", "play/1/2", "play/x", "play/1000000000"):
-        with pytest.raises(HTTPError) as refused:
-            urlopen(url + path)
-        assert refused.value.code == 403
+        assert refusal(url + path, 404).count(b"\n") == 0
+    for path in ("play/-1", "play/1/2", "play/x", "play/1000000000", "index.js", "main.js"):
+        refusal(url + path, 403)
+    for path in ("../__init__.py", "%2e%2e/%2e%2e/visualizer.py"):
+        refusal(url + path, 403)
 
 
 @pytest.mark.programs
-async def test_a_running_test_is_followed(writer, start_scene):
-    writer.baseline()
-    writer.round()
-    writer.start_test(2, candidate=1)
-    with engine_lock(writer.path):
-        writer.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
-        url = url_of(start_scene(writer.path))
+async def test_a_running_test_is_followed(in_round, start_scene):
+    in_round.start_test(2, candidate=1)
+    with engine_lock(in_round.path):
+        in_round.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
+        url = url_of(start_scene(in_round.path))
         words = captions(await messages(url, titled("round 1 · part B · test 2 · runs now")))[-1]
         assert words["time"] == "1.5 s of 45 s"
         # The board is pushed 0.5 m, and the robot drives 0.3 m, so far as its wheels roll.
         board = {"board": (1.5, -1.5, 0.1, 1.0, 0.0, 0.0, 0.0)}
-        writer.run.set_live([Live(0, 2, 1.8, (1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), board)])
+        in_round.run.set_live([Live(0, 2, 1.8, (1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), board)])
         found = await messages(url, lambda told: matrix_of(told, "/world/models/003 board")[0, 3])
         assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
         wheel = matrix_of(found, "/world/robot/wheel 0")
         assert math.atan2(wheel[0, 2], wheel[0, 0]) == pytest.approx(0.3 / 0.1651)
-        writer.run.set_live([])
-        writer.finish_test(2, "similar")
-    # The engine is gone without an event: the scene goes back to the failure.
+    # The engine is gone without an event, and leaves its rows behind: the scene goes back to the failure.
     await messages(url, titled("the failure f"))
+    found = await messages(url_of(start_scene(in_round.path)), titled("the failure f"))
+    assert not any("runs now" in words["title"] for words in captions(found))
 
 
 @pytest.mark.programs
-async def test_a_viewer_says_what_is_shown(writer):
-    writer.baseline()
-    writer.round()
-    begun = writer.run.events()[-1].id
-    writer.reduce()
-    process = programs.start_scene(writer.path)
+async def test_a_viewer_says_what_is_shown(in_round):
+    begun = in_round.run.events()[-1].id
+    in_round.reduce()
+    process = programs.start_scene(in_round.path)
     try:
         url = url_of(process)
         process.stdin.write("nonsense\n" + written(Wanted(begun, 1, 1)))
@@ -198,59 +190,32 @@ async def test_a_viewer_says_what_is_shown(writer):
         process.wait()
 
 
-@pytest.mark.programs
-async def test_rows_of_a_killed_engine_are_not_live(writer, start_scene):
-    writer.baseline()
-    writer.round()
-    writer.start_test(2, candidate=1)
-    writer.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
-    url = url_of(start_scene(writer.path))
-    found = await messages(url, titled("the failure f"))
-    assert not any("runs now" in words["title"] for words in captions(found))
-
-
-async def test_pages_from_elsewhere_are_refused(writer, start_scene):
-    url = url_of(start_scene(writer.path))
-    for origin in ("http://evil.example", "http://127.0.0.1.evil.example", "null", "http://[", "file://", ""):
+async def test_pages_from_elsewhere_are_refused_and_own_ones_are_welcome_also_through_a_tunnel(url):
+    evil = "http://evil.example"
+    # The last one has a name that was made to lead here.
+    for origin, host in (
+        *((origin, None) for origin in (evil, "http://127.0.0.1.evil.example", "null", "http://[", "file://", "")),
+        (f"{evil}:7000", "evil.example:7000"),
+    ):
         with pytest.raises(HTTPClientError) as error:
-            await messages(url, headers={"Origin": origin})
+            await messages(url, headers={"Origin": origin} | ({"Host": host} if host else {}))
         assert error.value.code == 403, origin
-
-
-@pytest.mark.programs
-async def test_a_name_made_to_lead_here_is_refused(writer, start_scene):
-    url = url_of(start_scene(writer.path))
-    with pytest.raises(HTTPClientError) as error:
-        await messages(url, headers={"Origin": "http://evil.example:7000", "Host": "evil.example:7000"})
-    assert error.value.code == 403
-
-
-async def test_own_pages_are_welcome_also_through_a_tunnel(writer, start_scene):
-    url = url_of(start_scene(writer.path))
     for origin in ("http://localhost:8123", "http://127.0.0.1:7000", "http://[::1]:7000"):
         assert await messages(url, headers={"Origin": origin})
-
-
-@pytest.mark.programs
-async def test_browsers_come_and_go(writer, start_scene):
-    writer.baseline()
-    process = start_scene(writer.path)
-    url = url_of(process)
-    for _ in range(3):
-        assert await messages(url)
-    connection = await websocket_connect(feed_of(url))
-    connection.protocol.stream.close()
-    assert await messages(url)
-    assert process.poll() is None
 
 
 @pytest.mark.parametrize(
     "number", slow(pytest.mark.programs, [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], but=[signal.SIGINT])
 )
-async def test_ends_cleanly(writer, start_scene, number):
+async def test_browsers_come_and_go_and_it_ends_cleanly(writer, start_scene, number):
     writer.baseline()
-    process = start_scene(writer.path)
-    connection = await websocket_connect(feed_of(url_of(process)))
+    url = url_of(process := start_scene(writer.path))
+    for _ in range(2):
+        assert await messages(url)
+    connection = await websocket_connect(feed_of(url))
+    connection.protocol.stream.close()
+    assert await messages(url)
+    connection = await websocket_connect(feed_of(url))
     process.send_signal(number)
     assert await asyncio.to_thread(process.wait, PATIENCE) == 0
     assert process.stderr.read() == ""
@@ -290,30 +255,30 @@ def test_a_scene_that_is_started_again_has_its_address_and_proves_it(writer, sta
     server.remember(writer.path, port, token)
     assert url_of(start_scene(writer.path)) == url
     challenge, root = "0" * 32, f"http://127.0.0.1:{port}/alive"
-    with urlopen(f"{root}/{server.name_of(token)}/{challenge}") as answer:
-        assert (
-            answer.read().decode() == server.proof(token, challenge, port) != server.proof(token, challenge, port + 1)
-        )
-    for path in (
-        f"{root}/{server.name_of('x')}/{challenge}",
-        f"{root}/{token}/{challenge}",
-        f"{root}/{server.name_of(token)}/1",
-    ):
-        with pytest.raises(HTTPError):
-            urlopen(path)
+    name, other = server.name_of(token), server.name_of("x")
+    with urlopen(f"{root}/{name}/{challenge}") as answer:
+        proof = answer.read().decode()
+    assert proof == server.proof(token, challenge, port) != server.proof(token, challenge, port + 1)
+    for path in (f"{other}/{challenge}", f"{token}/{challenge}", f"{name}/1"):
+        refusal(f"{root}/{path}", 403)
     kept.write_text('{"x": [1, 2, 3]')
     assert server.last_address(writer.path)[0] == 0
 
 
+def one_line(process: subprocess.Popen) -> str:
+    """What a scene says that ends with a user's error."""
+    assert process.wait(PATIENCE) == 2
+    error = process.stderr.read()
+    assert error.startswith("ddenv.scene: ") and error.count("\n") == 1
+    return error
+
+
 @pytest.mark.programs
 def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
-    first = url_of(start_scene(writer.path))
-    second = url_of(start_scene(writer.path))
+    first, second = (url_of(start_scene(writer.path)) for _ in range(2))
     assert first != second
-    taken = first.split(":")[2].split("/")[0]
-    process = start_scene(writer.path, "--port", taken)
-    assert process.wait(PATIENCE) == 2
-    assert process.stderr.read().count("\n") == 1
+    for port in (first.split(":")[2].split("/")[0], "-1", "70000", "99999999999"):
+        assert "--port" in one_line(start_scene(writer.path, "--port", port))
 
 
 @pytest.mark.parametrize(
@@ -325,37 +290,15 @@ def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
     ),
 )
 def test_user_errors_are_one_line(start_scene, words):
-    process = start_scene(*words)
-    assert process.wait(PATIENCE) == 2
-    error = process.stderr.read()
-    assert error.startswith("ddenv.scene: ")
-    assert error.count("\n") == 1
+    one_line(process := start_scene(*words))
     assert process.stdout.read() == ""
 
 
 @pytest.mark.programs
-@pytest.mark.parametrize("port", ["-1", "70000", "99999999999"])
-def test_ports_that_do_not_exist(writer, start_scene, port):
-    process = start_scene(writer.path, "--port", port)
-    assert process.wait(PATIENCE) == 2
-    assert process.stderr.read().count("\n") == 1
-
-
-@pytest.mark.programs
-def test_a_damaged_run_file_is_one_line(writer, start_scene):
-    writer.append("nonsense", {})
-    process = start_scene(writer.path)
-    assert process.wait(PATIENCE) == 2
-    error = process.stderr.read()
-    assert "unknown kind" in error
-    assert error.count("\n") == 1
-
-
-@pytest.mark.programs
-async def test_a_run_file_that_is_damaged_while_shown(writer, start_scene):
+async def test_a_run_file_that_is_damaged_before_or_while_it_is_shown_is_one_line(writer, start_scene):
     process = start_scene(writer.path)
     connection = await websocket_connect(feed_of(url_of(process)))
     writer.append("nonsense", {})
-    assert await asyncio.to_thread(process.wait, PATIENCE) == 2
-    assert process.stderr.read().count("\n") == 1
+    for damaged in (process, start_scene(writer.path)):
+        assert "unknown kind" in await asyncio.to_thread(one_line, damaged)
     connection.close()

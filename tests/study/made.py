@@ -11,7 +11,7 @@ import yaml
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.fold import fold
 from ddenv.study.plan import Cell, Plan, make_plan, run_path
-from ddenv.study.results import Found, read_cell
+from ddenv.study.results import Result, read_cell
 from ddenv.words.claims import verdict_on
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
@@ -93,7 +93,7 @@ def reduced(
     vain: int = 2,
     world: bytes | None = None,
     claims: Claims | None = None,
-) -> Found:
+) -> Result:
     """A cell that came to `left`, with so many `vain` candidates of four tests each at the end, as it is read. Its certificate
     holds, or has these `claims`.
     """
@@ -112,7 +112,7 @@ def reduced(
     return read_cell(folder, cell)
 
 
-def never_failed(folder: Path, cell: Cell, reason: str = "there is no failure to reduce") -> Found:
+def never_failed(folder: Path, cell: Cell, reason: str = "there is no failure to reduce") -> Result:
     """A cell whose robot reached its goal."""
     run = begun(folder, cell)
     run.created().test(None, "pass")

@@ -12,7 +12,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import ENGINE_SAYS
-from ddenv.study import work
+from ddenv.study import conduct
 from tests.engine.fake import FakePool
 
 Oracle = Callable[[str, frozenset[str], int], str]
@@ -66,8 +66,8 @@ class Lab:
         self.before: Callable[[Path, int], None] = lambda run, made: None
         self.started: list[tuple[str, int]] = []
         self.made = 0
-        monkeypatch.setattr(work, "POLL", 0.002)
-        monkeypatch.setattr(work, "start_engine", self.start_engine)
+        monkeypatch.setattr(conduct, "POLL", 0.002)
+        monkeypatch.setattr(conduct, "start_engine", self.start_engine)
         monkeypatch.setattr(program, "Pool", self._pool)
         monkeypatch.setattr(program, "read_parts", self._parts)
         # No program starts.

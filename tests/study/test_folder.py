@@ -6,12 +6,12 @@ import pytest
 
 from ddenv import __version__
 from ddenv.errors import UserError
+from ddenv.study.folder import ABOUT, Session, machine, opened, sessions, versions, write_sessions
 from ddenv.study.plan import RUNS
-from ddenv.study.work import ABOUT, Sitting, machine, opened, sittings, versions, write_sittings
 
-TIMES = (
-    Sitting(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),
-    Sitting(1.6e9, 0.0, 4, 0, "ddenv 2", "\u05e9"),
+SESSIONS = (
+    Session(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),
+    Session(1.6e9, 0.0, 4, 0, "ddenv 2", "\u05e9"),
 )
 
 
@@ -22,30 +22,20 @@ def refused(folder):
     return str(error.value)
 
 
-def test_it_is_made_with_all_above_it_and_opened_again(tmp_path):
+def test_it_is_made_with_all_above_it_and_opened_again_by_one_study_at_a_time(tmp_path):
     folder = tmp_path / "a" / "b"
+    # Also after one that was killed before it wrote anything.
     for _ in range(2):
         with opened(folder):
-            assert (folder / RUNS).is_dir()
+            assert [path.name for path in folder.iterdir() if path.is_dir()] == [RUNS]
+            assert "another study is running in this folder; wait for it" in refused(folder)
 
 
-def test_one_that_was_killed_before_it_wrote_anything_is_opened_again(tmp_path):
-    with opened(tmp_path / "study"):
-        assert not (tmp_path / "study" / ABOUT).exists()
-    with opened(tmp_path / "study"):
-        pass
-
-
-def test_a_file_is_refused(tmp_path):
+def test_what_is_something_else_is_refused_and_not_touched(tmp_path):
     (tmp_path / "study").write_text("mine")
     assert refused(tmp_path / "study") == f"{tmp_path}/study: is a file; give the name of a folder"
-    assert (tmp_path / "study").read_text() == "mine"
-
-
-def test_a_folder_of_something_else_is_refused_and_not_touched(tmp_path):
-    (tmp_path / "thesis.tex").touch()
     assert "contains other files; give the name of a new or empty folder" in refused(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("study", "mine")]
 
 
 def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
@@ -58,38 +48,31 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     assert "cannot be written: no permission; choose another folder with -o" in refused(tmp_path / "study")
 
 
-def test_a_second_study_in_it_is_refused_until_the_first_one_is_over(tmp_path):
-    with opened(tmp_path / "study"):
-        assert "another study is running in this folder; wait for it" in refused(tmp_path / "study")
-    with opened(tmp_path / "study"):
-        pass
-
-
 def test_times_are_read_as_they_were_written(tmp_path):
-    assert sittings(tmp_path) == ()
-    write_sittings(tmp_path, TIMES)
-    assert sittings(tmp_path) == TIMES
+    assert sessions(tmp_path) == ()
+    write_sessions(tmp_path, SESSIONS)
+    assert sessions(tmp_path) == SESSIONS
 
 
 RIGHT = {"begun": 1.0, "seconds": 1.0, "jobs": 1, "tests": 1, "versions": "", "machine": ""}
-DAMAGED = {
-    "empty": "",
-    "cut short": '{"sittings": [',
-    "no object": "[]",
-    "nested": "[" * 100_000,
-    "no list": '{"sittings": 3}',
-    "no sitting": '{"sittings": ["begun"]}',
-    "no machine": json.dumps({"sittings": [{key: RIGHT[key] for key in RIGHT if key != "machine"}]}),
-    "no number": json.dumps({"sittings": [RIGHT | {"begun": "noon"}]}),
-    "no end": json.dumps({"sittings": [RIGHT | {"jobs": float("inf")}]}),
-}
+DAMAGED = (
+    "",
+    '{"sittings": [',
+    "[]",
+    "[" * 100_000,
+    '{"sittings": 3}',
+    '{"sittings": ["begun"]}',
+    json.dumps({"sittings": [{key: RIGHT[key] for key in RIGHT if key != "machine"}]}),
+    json.dumps({"sittings": [RIGHT | {"begun": "noon"}]}),
+    json.dumps({"sittings": [RIGHT | {"jobs": float("inf")}]}),
+)
 
 
-@pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED.keys())
+@pytest.mark.parametrize("text", DAMAGED, ids=lambda text: text[:12])
 def test_a_damaged_list_of_times_is_one_line(tmp_path, text):
     (tmp_path / ABOUT).write_text(text)
     with pytest.raises(UserError, match=rf"{ABOUT}: is damaged; delete it \(the runs are not affected\)"):
-        sittings(tmp_path)
+        sessions(tmp_path)
 
 
 def test_what_made_the_numbers_has_a_name():

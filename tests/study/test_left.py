@@ -6,10 +6,10 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.study.conduct import seconds_left, sizes
+from ddenv.study.conduct import Work, seconds_left, sizes
 from ddenv.study.plan import RUNS, run_path
-from ddenv.study.work import Work
 from tests.study.made import FRESH, TESTS, crates, plan_of, reduced
 
 # One test was ahead of time.
@@ -26,34 +26,26 @@ def made(tmp_path):
     with RunFile(path) as file:
         state = fold(file.events())
         tests = PersistentTuple.of(replace(test, wall_seconds=2.0) for test in state.tests)
-        yield plan, Work(plan.cells[0], path, 2, file, state.changed(tests=tests))
+        yield plan, Work(plan.cells[0], path, 2, file, RunState(), state.changed(tests=tests))
 
 
 def left(plan, ended, jobs=2, running=()):
     return seconds_left(running, plan.cells[1:], ended, sizes(plan), jobs)
 
 
-def test_another_pair_takes_what_the_first_one_took(made):
+def with_tests(work, tests, **changes):
+    return replace(work, state=work.state.changed(tests=PersistentTuple.of(tests), **changes))
+
+
+def test_another_pair_takes_what_the_first_one_took_itself(made):
     plan, first = made
     assert left(plan, [first]) == pytest.approx(MADE * 2.0 / 2)
     assert left(plan, [first], jobs=1) == pytest.approx(MADE * 2.0)
+    taken = with_tests(first, (replace(test, taken=number < 4) for number, test in enumerate(first.state.tests)))
+    assert left(plan, [taken]) == pytest.approx((MADE - 4) * 2.0 / 2)
 
 
-def test_tests_that_were_taken_over_took_no_time(made):
+def test_without_a_test_nothing_tells_and_one_that_failed_only_what_a_test_takes(made):
     plan, first = made
-    tests = PersistentTuple.of(replace(test, taken=number < 4) for number, test in enumerate(first.state.tests))
-    assert left(plan, [replace(first, state=first.state.changed(tests=tests))]) == pytest.approx((MADE - 4) * 2.0 / 2)
-
-
-def test_without_a_test_nothing_tells(made):
-    plan, first = made
-    assert (
-        left(plan, [], running=[replace(first, state=first.state.changed(tests=PersistentTuple(), status="running"))])
-        is None
-    )
-
-
-def test_one_that_failed_tells_only_what_a_test_takes(made):
-    plan, first = made
-    broken = replace(first, state=first.state.changed(status="failed"))
-    assert left(plan, [broken], jobs=1) > MADE * 2.0
+    assert left(plan, [], running=[with_tests(first, (), status="running")]) is None
+    assert left(plan, [with_tests(first, first.state.tests, status="failed")], jobs=1) > MADE * 2.0

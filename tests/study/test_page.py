@@ -10,22 +10,23 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
+from ddenv import __version__
+from ddenv.study.folder import Session
 from ddenv.study.plan import run_path
 from ddenv.study.study_page import write_study
-from ddenv.study.work import Sitting
 from tests.report.test_report import EVIL, Page
 from tests.study.made import LONGEST, crates, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_run
 
-SITTINGS = (
-    Sitting(1.6e9, 90.0, 2, 30, "ddenv 1", "<b>first</b> machine"),
-    Sitting(1.7e9, 30.0, 4, 9, "ddenv 2", "second machine"),
+SESSIONS = (
+    Session(1.6e9, 90.0, 2, 30, "ddenv 1", "<b>first</b> machine"),
+    Session(1.7e9, 30.0, 4, 9, "ddenv 2", "second machine"),
 )
 
 
-def written(plan, folder, sittings=SITTINGS):
+def written(plan, folder, sessions=SESSIONS):
     """The page, the Markdown and the rows of the table."""
-    page, _ = write_study(plan, folder, sittings)
+    page, _ = write_study(plan, folder, sessions)
     rows = list(csv.DictReader(io.StringIO((folder / "study.csv").read_text())))
     return Page(page.read_text()), (folder / "study.md").read_text(), rows
 
@@ -79,53 +80,27 @@ def test_what_went_wrong_is_told_with_its_seed(study):
 def test_the_table_for_programs_has_a_row_for_each_cell(study):
     *_, rows, folder, plan = study
     assert len(rows) == len(plan.cells)
-    told = {
-        "scenario": "crates",
-        "algorithm": "ddenv",
-        "partitioning": "model2model",
-        "seed": "0",
-        "prioritization": "failure-proximal",
-        "certified": "True",
-        "models": "11",
-        "left": "2",
-        "names": "crate_00 crate_01",
-        "tests": "13",
-        "reruns": "6",
-        "certificate_tests": "15",
-        "ahead": "1",
-        "seconds": "26.0",
-        "certificate_seconds": "30.0",
-        "reduction": "0.8182",
-        "steps_back": "0",
-        "baseline_runs": "4",
-        "baseline_f": "3",
-        "least_to_show": "13",
-        "least_to_find": "17",
-        "keep_rate": "0.8",
-        "whole_runs": "4",
-        "whole_f": "3",
-        "left_runs": "5",
-        "left_f": "5",
-        "left_low": "0.415",
-        "left_high": "1.0",
-        "without_most": "0.0",
-        "paper_tests": "",
-    }
-    assert {key: rows[0][key] for key in told} == told
+    told = (
+        *("crates", "ddenv", "model2model", "failure-proximal", "0", "False", "True", "", "11", "2", "0.8182"),
+        "crate_00 crate_01",
+        # The tests, their time, the baseline, the bounds, the certificate, and the paper.
+        *("13", "13", "6", "15", "15", "1", "0", "26.0", "30.0", "0", "4", "3", "13", "17"),
+        *("0.8", "4", "3", "5", "5", "0.415", "1.0", "0.0", "", "", "", __version__),
+    )
+    assert tuple(rows[0].values())[: len(told)] == told
+    assert list(rows[0])[len(told) - 4 :] == [f"paper_{name}" for name in ("tests", "reduction", "minutes")] + [
+        *("ddenv", "simulator", "run")
+    ]
     assert (rows[4]["certified"], rows[4]["without_most"], rows[4]["least_to_show"]) == ("False", "0.5", "")
     assert all((folder / row["run"]).is_file() for row in rows[:5])
     assert (rows[3]["certified"], rows[3]["baseline_runs"], rows[3]["left_runs"]) == ("False", "", "")
 
 
-def test_the_page_needs_nothing_else_and_runs_nothing(study):
-    page, *_ = study
+def test_the_page_needs_nothing_else_and_the_markdown_shows_files_that_are_there(study):
+    page, text, _, folder, _ = study
     assert not page.tags & {"script", "link", "img", "iframe", "a", "object"}
     assert not page.attributes & {"src", "href", "onload", "onclick"}
     assert {"svg", "table"} <= page.tags
-
-
-def test_the_markdown_shows_files_that_are_there(study):
-    _, text, _, folder, _ = study
     shown = [unquote(name) for name in re.findall(r"\]\((.*?)\)", text)]
     # The models by test, and a map of each world that is left.
     assert len(shown) == len(set(shown)) == 4
@@ -144,17 +119,13 @@ def test_each_minimal_world_is_drawn_once_those_found_most_first(study):
     assert page.text.index(first) < second < page.text.index(unsure)
 
 
-def test_where_and_when_it_was_made_is_told(study):
-    page, *_ = study
+def test_where_and_when_it_was_made_is_told_and_written_again_it_is_the_same(study):
+    page, *_, folder, plan = study
     assert "2020-09-13 12:26:40 UTC 1 min 30 s 2 30 <b>first</b> machine ddenv 1" in page.text
     assert "with 2 to 4 workers, 39 made 2 min 00 s" in page.text
     assert "seeds 0, 100000, 200000" in page.text
-
-
-def test_written_again_it_is_the_same(study):
-    *_, folder, plan = study
     before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-    write_study(plan, folder, SITTINGS)
+    write_study(plan, folder, SESSIONS)
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
 
 
@@ -201,20 +172,13 @@ def test_names_are_shown_as_they_are_and_do_nothing(tmp_path):
     assert len(list(tmp_path.glob("*.svg"))) == text.count(".svg)") == 2
 
 
-def test_the_longest_names_make_files(tmp_path):
-    plan = plan_of(crates(tmp_path, LONGEST), pairs="model2model/random")
-    reduced(tmp_path, *plan.cells)
-    page, *_ = written(plan, tmp_path)
-    assert LONGEST in page.text
-
-
-def test_no_figure_takes_the_place_of_another(tmp_path):
+def test_the_longest_names_make_files_and_no_figure_takes_the_place_of_another(tmp_path):
     """One scenario left two worlds; another one is called as the first of them might be."""
-    plan = plan_of(crates(tmp_path, "crates"), crates(tmp_path, "crates-1"))
-    one, two, three, _ = plan.cells
-    reduced(tmp_path, one)
-    reduced(tmp_path, two, ["crate_03"])
-    reduced(tmp_path, three)
-    _, text, _ = written(plan, tmp_path)
+    plan = plan_of(*(crates(tmp_path, name) for name in ("crates", "crates-1", LONGEST)))
+    for cell, left in zip(plan.cells[::2], (["crate_00"], *[["crate_00", "crate_01"]] * 2), strict=True):
+        reduced(tmp_path, cell, left)
+    reduced(tmp_path, plan.cells[1], ["crate_03"])
+    page, text, _ = written(plan, tmp_path)
+    assert LONGEST in page.text
     shown = re.findall(r"\]\((.*?\.svg)\)", text)
-    assert len(shown) == len(set(shown)) == 5
+    assert len(shown) == len(set(shown)) == 7

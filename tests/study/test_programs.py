@@ -10,11 +10,11 @@ import pytest
 
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
+from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
-from ddenv.study.work import sittings
 from tests.study.made import plan_of, wall
 from tests.study.quick import Lab
-from tests.study.test_work import fails, study, told
+from tests.study.test_conduct import fails, study, told
 from tests.waiting import PATIENCE, wait_until
 
 # Counts its runs, and waits before each unless it may go on: so many at a time.
@@ -27,16 +27,8 @@ grep -q 'model name="deck"' $1 && grep -q 'model name="wall"' $1 && exit 1
 exit 0
 """
 WORDS = (
-    "--pairs",
-    "model2model/sequential",
-    "--algorithms",
-    "splitting",
-    "--jobs",
-    "1",
-    "-o",
-    "study",
-    "--keep-rate",
-    "0.5",
+    *("--pairs", "model2model/sequential", "--algorithms", "splitting", "--jobs", "1"),
+    *("-o", "study", "--keep-rate", "0.5"),
 )
 
 
@@ -102,7 +94,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     said, complained = third.communicate(timeout=PATIENCE)
     assert (third.returncode, complained) == (0, "")
     assert "1 of 1 cell certified; wrote study/study.html" in said
-    assert len(sittings(folder)) == 3
+    assert len(sessions(folder)) == 3
 
     # Of the tests that were in flight nothing is left, and no other one was made twice.
     (row,) = csv.DictReader((folder / "study.csv").read_text().splitlines())

@@ -1,4 +1,4 @@
-"""The tables of a study from what its cells came to: the paper's numbers, medians and ranges, and which method is best where."""
+"""The tables of a study from its results: the paper's numbers, medians and ranges, and which method is best where."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,13 +10,14 @@ from ddenv.page.blocks import Paragraph, Strong, Table
 from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.results import Found, groups, spread
+from ddenv.study.results import Result, rows_of, spread
 from ddenv.study.study_page import content
 from ddenv.study.tables import behind, best, chart, numbers, section
 from tests.study.made import crates, plan_of
 
 MODELS = tuple(f"m{number}" for number in range(16))
 FIVE = "model2model/random,model2model/sequential,model2model/timestep,timeseg/random,timeseg/sequential"
+FOUR = FIVE.rpartition(",")[0]
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -31,55 +32,47 @@ def certificate(left, *verdicts):
     return Certificate(1, 1, 10_000, 0.8, 0.95, 0.03, 10, 2 / 3, tuple(claims))
 
 
-def found(cell, tests, left=1, **other):
+def result_of(cell, tests, left=1, **other):
     """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each; 40 more of its certificate."""
-    values = {
-        "ended": True,
-        "minimal": True,
-        "problem": "",
-        "elements": MODELS,
-        "left": MODELS[:left],
-        "tests": tests,
-        "reruns": tests // 2,
-        "seconds": 3.0 * tests,
-        "baseline": BaselineFinished(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1, Outcomes({}, {})),
-        "sizes": ((10, 16), (tests, left)),
-        "certificate": certificate(left),
-        "certificate_tests": 40,
-        "certificate_seconds": 120.0,
-        "whole_f": 19,
-        "whole_runs": 20,
-        "misses": 4,
-    }
-    return Found(cell, **(values | other))
+    baseline = BaselineFinished(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1, Outcomes({}, {}))
+    values = {"ended": True, "minimal": True, "problem": "", "elements": MODELS, "left": MODELS[:left]}
+    values |= {"tests": tests, "reruns": tests // 2, "seconds": 3.0 * tests, "baseline": baseline, "misses": 4}
+    values |= {"certificate": certificate(left), "certificate_tests": 40, "certificate_seconds": 120.0}
+    values |= {"whole_f": 19, "whole_runs": 20, "sizes": ((10, 16), (tests, left))}
+    return Result(cell, **(values | other))
 
 
 def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
-    """The groups of two scenarios; `tests` are those of each cell in the order of the tables: None where there is no end, below
+    """The rows of two scenarios; `tests` are those of each cell in the order of the tables: None where there is no end, below
     zero where the certificate fails.
     """
     plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
     made = [
-        Found(cell) if each is None else found(cell, abs(each)) for cell, each in zip(plan.cells, tests, strict=True)
+        Result(cell) if each is None else result_of(cell, abs(each), **(UNCERTIFIED if each < 0 else {}))
+        for cell, each in zip(plan.cells, tests, strict=True)
     ]
-    made = [uncertified(each) if tests[place] and tests[place] < 0 else each for place, each in enumerate(made)]
-    return plan, made, groups(plan, made)
+    return plan, made, rows_of(plan, made)
 
 
-def page(folder, group):
+def words_of(folder, group):
     """All words of a scenario's section."""
     blocks = (block for block in section(folder, group).blocks if isinstance(block, Paragraph))
     return " ".join(part for block in blocks for part in block.parts if isinstance(part, str))
 
 
-def uncertified(each, verdict="not shown"):
-    """The same cell with a certificate that does not show that the rate is kept."""
-    return replace(each, minimal=False, problem="it is not shown", certificate=certificate(len(each.left), verdict))
+# Its certificate does not show that the rate is kept.
+UNCERTIFIED = {"minimal": False, "problem": "it is not shown", "certificate": certificate(1, "not shown")}
+
+
+def ranking(both):
+    """The rows of the comparison below the bounds, by method, in their order; and these bounds."""
+    (table,) = (block for block in best(both).blocks if isinstance(block, Table))
+    return {row[0]: row[1:] for row in table.rows[2:]}, table.rows[:2]
 
 
 def test_the_papers_numbers_stand_beside_ours():
     plan = make_plan(("ditch",), slice=False)
-    (group,) = groups(plan, [found(cell, 60, left=2) for cell in plan.cells])
+    (group,) = rows_of(plan, [result_of(cell, 60, left=2) for cell in plan.cells])
     table = numbers(group)
     assert table.head == (
         *("partitioning, prioritization", "certified", "search tests", "paper", "certificate tests"),
@@ -92,23 +85,23 @@ def test_the_papers_numbers_stand_beside_ours():
 def test_what_slices_save_stands_beside_the_papers_way():
     plan = make_plan(("ditch",), PAIRS[0], seeds=2)
     numbers_of = {False: {"simulated": 60}, True: {"simulated": 21, "certificate_simulated": 12}}
-    made = [found(cell, 60, left=2, **numbers_of[cell.slices]) for cell in plan.cells]
+    made = [result_of(cell, 60, left=2, **numbers_of[cell.slices]) for cell in plan.cells]
     made[-1] = replace(made[-1], left=MODELS[:3], minimal=False, problem="it is not shown")
-    (group,) = groups(plan, made)
+    (group,) = rows_of(plan, made)
     table = numbers(group)
     assert table.head == (
         *("partitioning, prioritization", "certified", "search tests", "paper", "with slices"),
         *("certificate tests", "with slices", "% reduction", "paper", "search minutes", "paper", "certificate minutes"),
     )
     assert table.rows[0][1:8] == ("2 of 2", "60", "268", "21", "40", "12", "88 %")
-    told = page(Path("nowhere"), group)
+    told = words_of(Path("nowhere"), group)
     assert "With slices 1 of 2 cells end at the same models as without them, and 1 are certified." in told
     assert f"Not certified: {PAIRS[0]}, seed 100000, with slices: it is not shown." in told
 
 
 def test_what_the_paper_does_not_have_stands_alone():
     plan = make_plan(("ditch",), f"timeseg/random,{PAIRS[0]}", "ddenv,ddmin", slice=False)
-    (group,) = groups(plan, [found(cell, 60) for cell in plan.cells])
+    (group,) = rows_of(plan, [result_of(cell, 60) for cell in plan.cells])
     table = numbers(group)
     assert [(row[0], row[3]) for row in table.rows] == [("timeseg/random", "–"), (PAIRS[0], "268"), ("ddmin", "–")]
 
@@ -116,7 +109,7 @@ def test_what_the_paper_does_not_have_stands_alone():
 def test_the_claim_counts_what_is_better_than_the_paper():
     plan = make_plan(("ditch",), slice=False)
     # Of 84, 95 and 84 % and of 268, 82 and 359 tests.
-    made = [found(cell, tests, left=2) for cell, tests in zip(plan.cells, (269, 82, 30), strict=True)]
+    made = [result_of(cell, tests, left=2) for cell, tests in zip(plan.cells, (269, 82, 30), strict=True)]
     report = content(plan, made, (), Path("nowhere"))
     told = " ".join(part for each in report.lead for part in each.parts)
     assert (
@@ -148,15 +141,14 @@ def test_the_rate_of_what_is_left_stands_beside_the_whole_worlds(tmp_path):
 
 def test_what_is_not_certified_is_shown_and_is_no_success(tmp_path):
     """The cell with the fewest tests has lost the rate."""
-    pairs = FIVE.rpartition(",")[0]
-    plan, made, both = cells(tmp_path, *(-10, 20, 30, 90), *(40, 50, 60, 70), pairs=pairs)
+    plan, made, both = cells(tmp_path, *(-10, 20, 30, 90), *(40, 50, 60, 70), pairs=FOUR)
     assert [row[1] for row in numbers(both[0]).rows] == ["no", "yes", "yes", "yes"]
     assert numbers(both[0]).rows[0][2] == "10"
-    section = best(both)
-    rows = ranking(section)
-    assert rows[-1] == ("model2model/random", "not certified", Strong("40 ◂"), "–")
-    assert rows[2][:2] == ("model2model/sequential", Strong("20 ◂"))
-    assert "with the fewest tests, 20;" in section.blocks[0].parts[1]
+    rows, _ = ranking(both)
+    assert next(iter(rows)) == "model2model/sequential" and rows["model2model/sequential"][0] == Strong("20 ◂")
+    assert list(rows)[-1] == "model2model/random"
+    assert rows["model2model/random"] == ("not certified", Strong("40 ◂"), "–")
+    assert "with the fewest tests, 20;" in best(both).blocks[0].parts[1]
     report = content(plan, made, (), tmp_path)
     assert report.verdict == "7 of 8 worlds are minimal: 94 % smaller on average"
     assert report.figures[0] == ("7 of 8", "certified")
@@ -165,13 +157,14 @@ def test_what_is_not_certified_is_shown_and_is_no_success(tmp_path):
     assert "model2model/random: 1 model left after 10 tests, not certified" in words
 
 
-def test_half_a_success_is_none(tmp_path):
-    pairs = FIVE.rpartition(",")[0]
-    _, _, both = cells(tmp_path, *(10, -12), *(20, 22), *(30, 30), *(90, 90), *([50] * 8), pairs=pairs, seeds=2)
+@pytest.mark.parametrize("second", [-12, None])
+def test_half_a_success_is_none(tmp_path, second):
+    tests = (*(10, second), *(20, 22), *(30, 30), *(90, 90), *([50] * 8))
+    _, _, both = cells(tmp_path, *tests, pairs=FOUR, seeds=2)
     assert numbers(both[0]).rows[0][1] == "1 of 2"
-    rows = ranking(best(both))
-    assert rows[-1][:2] == ("model2model/random", "10 (1 of 2 certified)")
-    assert rows[2][1] == Strong("21 ◂")
+    rows, _ = ranking(both)
+    assert list(rows)[-1] == "model2model/random" and rows["model2model/random"][0] == "10 (1 of 2 certified)"
+    assert rows["model2model/sequential"][0] == Strong("21 ◂")
 
 
 @pytest.mark.parametrize(
@@ -182,42 +175,20 @@ def test_one_value_or_the_median_with_the_range(values, told):
     assert spread(values, lambda value: f"{value:.0f}") == told
 
 
-def ranking(section):
-    (table,) = (block for block in section.blocks if isinstance(block, Table))
-    return table.rows
-
-
 def test_which_is_best_where(tmp_path):
     """In the first scenario the last method needs the fewest tests, on the whole the second one does."""
     _, _, both = cells(tmp_path, 40, 20, 30, 90, 19, *(40, 20, 30, 90, 80))
-    rows = ranking(best(both))
+    rows, bounds = ranking(both)
     # The baseline's four, f once, and the model left out without success; log2(16) bits: a candidate that costs 1 or 4 gives 0.46.
-    assert [row[1:] for row in rows[:2]] == [("9", "9", "1.0"), ("13", "13", "–")]
-    assert [row[0] for row in rows[2:]] == [
-        *(
-            "model2model/sequential",
-            "model2model/timestep",
-            "timeseg/sequential",
-            "model2model/random",
-            "timeseg/random",
-        )
+    assert [row[1:] for row in bounds] == [("9", "9", "1.0"), ("13", "13", "–")]
+    assert list(rows) == [f"model2model/{name}" for name in ("sequential", "timestep")] + [
+        *("timeseg/sequential", "model2model/random", "timeseg/random")
     ]
-    assert rows[2][1:] == ("20", Strong("20 ◂"), "2.2")
-    assert rows[4][1:] == (Strong("19 ◂"), "80", "4.3")
-
-
-def test_what_is_not_minimal_everywhere_comes_last(tmp_path):
-    _, _, both = cells(tmp_path, 40, 20, 30, 90, 10, *(40, 20, 30, 90, None))
-    rows = ranking(best(both))
-    assert rows[-1] == ("timeseg/sequential", Strong("10 ◂"), "not made yet", "–")
-
-
-def test_seeds_without_an_end_are_told_in_the_ranking(tmp_path):
-    pairs = FIVE.rpartition(",")[0]
-    _, _, both = cells(tmp_path, *(40, None), *(20, 22), *(30, 30), *(90, 90), *([50] * 8), pairs=pairs, seeds=2)
-    rows = {row[0]: row for row in ranking(best(both))}
-    assert rows["model2model/random"][1] == "40 (1 of 2 certified)"
-    assert rows["model2model/sequential"][1] == Strong("21 ◂")
+    assert rows["model2model/sequential"] == ("20", Strong("20 ◂"), "2.2")
+    assert rows["timeseg/sequential"] == (Strong("19 ◂"), "80", "4.3")
+    # What is not minimal everywhere comes last.
+    *_, both = cells(tmp_path, 40, 20, 30, 90, 10, *(40, 20, 30, 90, None))
+    assert list(ranking(both)[0].items())[-1] == ("timeseg/sequential", (Strong("10 ◂"), "not made yet", "–"))
 
 
 def test_of_few_methods_or_none_with_an_end_nothing_is_ranked(tmp_path):
@@ -238,12 +209,12 @@ def test_the_figure_has_a_line_for_each_method(tmp_path):
     words = [text.text for text in root.iter(f"{SVG}text")]
     assert "model2model/sequential: 1 model left after 20 tests" in words
     assert not any("timeseg/sequential" in word for word in words)
-    assert not two.minimal
+    assert not any(row.minimal for row in two)
 
 
 def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
     plan = make_plan(("ditch",), "all", slice=False)
-    (group,) = groups(plan, [found(cell, 100 - number) for number, cell in enumerate(plan.cells)])
+    (group,) = rows_of(plan, [result_of(cell, 100 - number) for number, cell in enumerate(plan.cells)])
     words = [text.text for text in ElementTree.fromstring(chart(group)).iter(f"{SVG}text")]
     named = [word.partition(":")[0] for word in words if "left after" in word]
     labels = [method.label for method in plan.methods]
@@ -254,7 +225,7 @@ def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
 def test_a_world_of_which_all_is_needed_is_drawn_too(tmp_path):
     plan, made, _ = cells(tmp_path, 20, 20, pairs="model2model/random")
     made = [replace(each, elements=("m0",), left=("m0",), sizes=((10, 1), (14, 1))) for each in made]
-    for group in groups(plan, made):
+    for group in rows_of(plan, made):
         text = chart(group)
         ElementTree.fromstring(text)
         assert "nan" not in text and "inf" not in text

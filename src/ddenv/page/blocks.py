@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -42,9 +42,9 @@ class Table:
     """Rows of cells below a `head`. Columns with a number in `right` are aligned to the right; `strong` rows stand out."""
 
     head: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    right: frozenset[int] = frozenset()
-    strong: frozenset[int] = frozenset()
+    rows: Sequence[tuple[Cell, ...]]
+    right: Collection[int] = ()
+    strong: Collection[int] = ()
 
 
 @dataclass(frozen=True, slots=True)

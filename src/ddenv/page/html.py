@@ -44,9 +44,7 @@ def _block(block: Block) -> str:
         case Picture():
             words = escape(plain(block.alternative))
             return f'<figure class="{block.name}" aria-label="{words}">\n{block.svg}\n</figure>'
-        case Code():
-            return _code(block)
-    raise TypeError(type(block).__name__)
+    return _code(block)
 
 
 def _paragraph(block: Paragraph) -> str:

@@ -20,7 +20,7 @@ def markdown(report: Report, stem: str) -> str:
     figures = Table(
         tuple(what for _, what in report.figures),
         (tuple(number for number, _ in report.figures),),
-        frozenset(range(len(report.figures))),
+        range(len(report.figures)),
     )
     lines = [f"# {_name(report.name)}: {_text(report.verdict)}", ""]
     opening = Section("", (*report.lead, figures))
@@ -62,9 +62,7 @@ def _block(block: Block, stem: str) -> list[str]:
             return _table(block)
         case Picture():
             return [f"![{_text(block.alternative)}]({quote(_file(stem, block))})"]
-        case Code():
-            return _code(block)
-    raise TypeError(type(block).__name__)
+    return _code(block)
 
 
 def _table(table: Table) -> list[str]:

@@ -25,14 +25,8 @@ from ddenv.text import count, printable
 from ddenv.words.claims import meaning, rate, seeds_of, uncertified
 from ddenv.world.access import write_file
 
-RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (
-    BUNDLED_RUN,
-    "world.sdf",
-    "scenario.yaml",
-    "report.html",
-    "ISSUE.md",
-    "repro.py",
-)
+RUN, WORLD, SCENARIO = BUNDLED_RUN, "world.sdf", "scenario.yaml"
+REPORT, ISSUE, AGAIN = "report.html", "ISSUE.md", "repro.py"
 MOST_NAMES = 20
 NEEDS = f"needs ddenv {__version__}: {how_to_install()}"
 # What is written of each bundle; `$words` are filled in.

@@ -101,13 +101,13 @@ def _baseline(state: RunState) -> list[Block]:
         blocks.append(say(as_sentence(missed(state))))
     if base.others:
         rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
-        f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
+        f = {row for row, one in enumerate(base.seen) if one.test == base.failure_test}
         words = (
             "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces "
             "another one."
         )
         words += f" The first {count(base.chose, 'run')} only chose it, and are not in its rate." if base.chose else ""
-        blocks += [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
+        blocks += [say(words), Table(("number", "failure", "runs"), rows, {0, 2}, f)]
     return blocks
 
 
@@ -122,7 +122,7 @@ def _tests(state: RunState) -> list[Block]:
         if number
     )
     head = ("outcome", "tests", "share", *(words for _, words in phases), "which means")
-    table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
+    table = Table(head, rows, range(1, 3 + len(phases)))
     # Before the end of the run, anything may still come to be needed.
     slices, ahead = _slices(state), state.ahead if state.status == "finished" else 0
     if not state.deflake_runs and not state.cut_tests and not state.tally["lost"] and not ahead:
@@ -177,7 +177,7 @@ def others_met(record: Record) -> Section | None:
         "The workbench reduces any of them in a branch of the run (key f)."
     )
     head = ("failure", "from f's end, m", "tests", "smallest environment", "its models")
-    table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), frozenset({1, 2}))
+    table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), {1, 2})
     more = len(found) - MOST
     rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []
     return Section("Other failures met", (lead, table, *rest))
@@ -208,16 +208,14 @@ def _without(state: RunState) -> list[Block]:
     first = as_sentence(f"{words}: {claimed}")
     block = say(first, f" From all runs so far: {so_far[0]}." if so_far else "")
     shown = ((_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows)
-    table = Table(("environment", "runs", "with f", "shown"), tuple(shown), frozenset({1, 2}))
+    table = Table(("environment", "runs", "with f", "shown"), tuple(shown), {1, 2})
     return [block, table] if rows else [block]
 
 
 def _with(state: RunState, found: Certificate) -> list[Block]:
     rows = fresh_runs(state)
     head = ("environment", "runs", "ended", "f shown", "95 % interval", "which means")
-    table = Table(
-        head, tuple(_fresh_row(state, each, found) for each in rows[:MOST_ROWS]), frozenset({1, 3, 4}), frozenset({0})
-    )
+    table = Table(head, tuple(_fresh_row(state, each, found) for each in rows[:MOST_ROWS]), {1, 3, 4}, {0})
     words = (
         "These runs have seeds that the search did not use, and none of them ended early. Rates leave broken runs out."
     )
@@ -226,15 +224,12 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
             "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
         )
     if state.certified:
-        promised = promise(state, found)
-        words += f" {as_sentence(promised)}"
+        words += f" {as_sentence(promise(state, found))}"
     # Other certificates of the same environment: each stands for itself.
-    others = [
-        one for one in state.certificates if one.node == found.node and one.claims and one is not state.certificate
-    ]
     earlier = (
         say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
-        for one in others
+        for one in state.certificates
+        if one.node == found.node and one.claims and one is not state.certificate
     )
     return [table, say(words), *earlier]
 

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ddenv.map.drawing import FAR, Frame, Point, at, badge, labels, path_of, plot, written
 from ddenv.map.footprints import Drawn
-from ddenv.page.blocks import section
 from ddenv.page.step_chart import opening
 from ddenv.report.run_data import Record
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import COLUMNS
 
 # Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.
@@ -69,28 +68,27 @@ def picture(
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
     these models, in place of those that are left.
     """
-    frame = _frame(record.models, list(_places(record).values()), LEAST)
-    return _picture(record, frame, name, ways or _ways(record), named)
-
-
-def _ways(record: Record) -> Ways:
-    last = record.evidence if record.evidence is not record.original else None
-    return {"way": record.original, "last": last}
+    return _picture(record, _whole(record), name, ways, named)
 
 
 def close_up(record: Record) -> str:
     """A map of only what is left and f's end; "" if it would add little to the whole map."""
     kept = [each for each in record.models if each.model.name in record.kept]
-    places = _places(record)
-    if "end" not in places or not kept:
+    end = _places(record).get("end")
+    if end is None or not kept:
         return ""
-    frame = _frame(kept, [places["end"]], CLOSE, CLOSE_HIGH)
-    if frame.scale < CLOSER * _frame(record.models, list(places.values()), LEAST).scale:
-        return ""
-    return _picture(record, frame, "near", _ways(record), None)
+    frame = _frame(kept, [end], CLOSE, CLOSE_HIGH)
+    return _picture(record, frame, "near", None, None) if frame.scale >= CLOSER * _whole(record).scale else ""
 
 
-def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collection[str] | None) -> str:
+def _whole(record: Record) -> Frame:
+    return _frame(record.models, list(_places(record).values()), LEAST)
+
+
+def _picture(record: Record, frame: Frame, name: str, ways: Ways | None, named: Collection[str] | None) -> str:
+    if ways is None:
+        last = record.evidence if record.evidence is not record.original else None
+        ways = {"way": record.original, "last": last}
     models = record.models
     places = {sign: point for sign, point in _places(record).items() if frame.holds(point)}
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
@@ -116,19 +114,14 @@ def _picture(record: Record, frame: Frame, name: str, ways: Ways, named: Collect
 
 
 def _places(record: Record) -> dict[str, Point]:
-    """Where the start, the goal and f's end are, x, y (m), as far as they are known."""
-    scenario, position = record.state.scenario, record.state.f_position
-    places = {
-        "start": section(section(scenario, "robot"), "spawn"),
-        "goal": section(scenario, "goal"),
-        "end": {} if position is None else dict(zip("xy", position[:2], strict=True)),
-    }
-    return {sign: (float(place["x"]), float(place["y"])) for sign, place in places.items() if _is_near(place)}
-
-
-def _is_near(place: dict[str, Any]) -> bool:
-    """Whether it has an x and a y that are not far outside; a damaged file may have anything."""
-    return all(isinstance(value := place.get(axis), int | float) and abs(value) < FAR for axis in "xy")
+    """Where the start, the goal and f's end are, x, y (m), if they are known and not far outside."""
+    places: dict[str, Point] = {}
+    if record.scenario is not None:
+        spawn, goal = record.scenario.robot.spawn, record.scenario.goal
+        places = {"start": (spawn.x, spawn.y), "goal": (goal.x, goal.y)}
+    if record.state.f_position is not None:
+        places["end"] = record.state.f_position[:2]
+    return {sign: place for sign, place in places.items() if max(map(abs, place)) < FAR}
 
 
 def _sort(record: Record, name: str) -> str:
@@ -168,10 +161,9 @@ def _way(samples: array[float] | None, frame: Frame) -> str:
 
 def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator[str]:
     """Circles: where the goal counts as reached, and where similar runs end, from above."""
-    scenario = record.state.scenario
-    reach, around = section(scenario, "goal").get("tolerance", 0.5), section(scenario, "failure").get("epsilon", 0.33)
-    for sign, radius, name in (("goal", reach, "reach"), ("end", around, "around")):
-        if sign in places and isinstance(radius, int | float) and 0 < radius < FAR:
+    reach = record.scenario.goal.tolerance if record.scenario is not None else 0.0
+    for sign, radius, name in (("goal", reach, "reach"), ("end", settings(record.state).epsilon, "around")):
+        if sign in places and 0 < radius < FAR:
             x, y = frame.pixel(places[sign])
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
 

@@ -39,7 +39,7 @@ def way(record: Record) -> Section | None:
 def _rounds(record: Record) -> list[Block]:
     state, rounds = record.state, record.rounds
     tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
-    undone = frozenset(node.round for node in state.nodes if node.rejected and node.how == "reduced")
+    undone = {node.round for node in state.nodes if node.rejected and node.how == "reduced"}
     # If there are too many, those that reduced have a row of their own, the first and the last of these.
     shown: set[int] = {each.number for each in rounds}
     if len(rounds) > MOST_ROUNDS:
@@ -56,7 +56,7 @@ def _rounds(record: Record) -> list[Block]:
     explained = "A round tries one set of models after the other; the first one that shows f becomes the environment."
     if any(_tried(each) and not tests[each.number] for each in rounds):
         explained += " Sets judged before are not tested again."
-    return [say(explained), Table(head, tuple(rows), frozenset({0, 1, 2, 4, 5}))]
+    return [say(explained), Table(head, tuple(rows), {0, 1, 2, 4, 5})]
 
 
 def _tried(round: Round) -> int:
@@ -101,29 +101,17 @@ def guiding(record: Record) -> Section | None:
     state = record.state
     blocks: list[Block] = []
     if state.decisions:
-        blocks += _decisions(state)
+        rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
+        lead = "by hand, each with the number of tests and the environment at that time."
+        done = Table(("time", "tests", "at", "what the user did"), _cut(rows, 3), {1, 2})
+        blocks += [say(f"{count(len(rows), 'decision')} {lead}"), done]
     elif state.baseline is not None:
         blocks.append(say("The user changed nothing: every reduction is the algorithm's own."))
-    blocks += _trials(state)
+    if state.trials:
+        trials = [_trial(state, each) for each in state.trials]
+        blocks.append(Table(("tried by hand", "at", "models", "tests", "verdict"), _cut(trials, 4), {1, 2, 3}))
     blocks += _tree(state)
     return Section("Decisions and branches", tuple(blocks)) if blocks else None
-
-
-def _decisions(state: RunState) -> list[Block]:
-    rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
-    lead = say(
-        f"{count(len(rows), 'decision')} by hand, each with the number of tests and the environment at that time."
-    )
-    head = ("time", "tests", "at", "what the user did")
-    return [lead, Table(head, _cut(rows, 3), frozenset({1, 2}))]
-
-
-def _trials(state: RunState) -> list[Block]:
-    if not state.trials:
-        return []
-    rows = [_trial(state, each) for each in state.trials]
-    head = ("tried by hand", "at", "models", "tests", "verdict")
-    return [Table(head, _cut(rows, 4), frozenset({1, 2, 3}))]
 
 
 def _trial(state: RunState, trial: Trial) -> tuple[Cell, ...]:
@@ -141,13 +129,11 @@ def _tree(state: RunState) -> list[Block]:
         return [say(f"From environment to environment, without branches: {_steps(nodes)}.")]
     drawn = branches.rows(nodes, state.node)
     rows = [_node(state, each.node, each.lines.replace("─", " ")) for each in drawn]
-    here = frozenset(place for place, each in enumerate(drawn) if each.node.number == state.node)
+    here = [place for place, each in enumerate(drawn) if each.node.number == state.node and len(drawn) <= MOST]
     head = ("environment", "models", "came by", "round", "tests", "f shown", "")
-    if len(rows) > MOST:
-        here = frozenset()
     return [
         say("The tree of reductions, each environment below the one it came from:"),
-        Table(head, _cut(rows, 2), frozenset({1, 3, 4, 5}), here),
+        Table(head, _cut(rows, 2), {1, 3, 4, 5}, here),
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,9 +18,10 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.nearest import Nearest, nearest
-from ddenv.runs.reasons import Parting, Reason, reasons
+from ddenv.runs.reasons import Reason, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.world.model import World
+from ddenv.world.scenario import Scenario
 
 T = TypeVar("T")
 # Of the polygon that stands for a circle.
@@ -29,7 +30,7 @@ CORNERS = 32
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A run: its `state`, its `rounds` as they ended, its first settings, and its world if that can be read.
+    """A run: its `state`, its `rounds` as they ended, its first settings, and its scenario and world if they can be read.
 
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
@@ -40,20 +41,21 @@ class Record:
 
     path: Path
     state: RunState
-    rounds: tuple[Round, ...] = ()
-    asked: dict[str, Any] = field(default_factory=dict)
-    started: float = 0.0
-    alive: bool = False
-    world: World | None = None
-    models: tuple[Drawn, ...] = ()
-    original: array[float] | None = None
-    evidence: array[float] | None = None
-    troubles: tuple[str, ...] = ()
-    elements: frozenset[str] = frozenset()
-    kept: frozenset[str] = frozenset()
-    reasons: tuple[Reason, ...] = ()
-    nearest: Nearest | None = None
-    ways: Mapping[int, array[float]] = field(default_factory=dict)
+    rounds: tuple[Round, ...]
+    asked: dict[str, Any]
+    started: float
+    alive: bool
+    scenario: Scenario | None
+    world: World | None
+    models: tuple[Drawn, ...]
+    original: array[float] | None
+    evidence: array[float] | None
+    troubles: tuple[str, ...]
+    elements: frozenset[str]
+    kept: frozenset[str]
+    reasons: tuple[Reason, ...]
+    nearest: Nearest | None
+    ways: Mapping[int, array[float]]
 
 
 def read_run(path: Path) -> Record:
@@ -64,14 +66,14 @@ def read_run(path: Path) -> Record:
         if first is None or not isinstance(first.event, Created):
             raise UserError(trouble or f"{path}: damaged run file: it has no data for a report")
         troubles = [trouble] if trouble else []
-        world = _tried(lambda: read_parts(file)[1], troubles)
+        scenario, world, _ = _tried(lambda: read_parts(file), troubles) or (None, None, None)
         f = None if state.f_test is None else state.f_test.id
         original = _path(file, f, troubles)
         same = state.evidence_test == f
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = None if current(state) is None else _tried(lambda: reasons(file, state), troubles)
         passing = nearest(file, state)
-        partings: list[Parting | None] = [*(each.parting for each in why or ()), passing.parting if passing else None]
+        partings = [*(reason.parting for reason in why or ()), passing.parting if passing else None]
         compared = [test for one in partings if one for test in (one.with_test, one.without_test)]
         ways = {test: file.trajectory(test) for test in compared}
     return Record(
@@ -81,6 +83,7 @@ def read_run(path: Path) -> Record:
         asked=recorded_scenario(first.event.scenario),
         started=first.time,
         alive=alive,
+        scenario=scenario,
         world=world,
         models=() if world is None else plan(world, CORNERS),
         original=original,

@@ -70,7 +70,7 @@ def _models(record: Record) -> list[Block]:
     test = state.evidence_test
     if test is not None and 0 < test <= len(state.tests) and (first := dict(state.tests[test - 1].first_touched)):
         columns["first touched, s"] = [f"{first[name]:.1f}" if name in first else "never" for name in names]
-    right = frozenset(range(2, len(columns)))
+    right = range(2, len(columns))
     carried = [drops_without(state, frozenset({name})) for name in names]
     if any(carried):
         columns["removing it drops"] = [named(fallen, MOST_DROPPED) for fallen in carried]
@@ -139,7 +139,7 @@ def _passing(record: Record, found: Nearest) -> list[Block]:
         for each in found.instants
     )
     head = ("time, s", "whole world: x, y, m", "nearest world that passes: x, y, m", "apart, m")
-    return [*blocks, Table(head, rows, frozenset({0, 1, 2, 3}))]
+    return [*blocks, Table(head, rows, {0, 1, 2, 3})]
 
 
 def _place(point: tuple[float, float]) -> str:

@@ -31,22 +31,18 @@ class _Parser(argparse.ArgumentParser):
 
 def main() -> int:
     parent = os.getppid()
+    parser = _Parser(prog="python -m ddenv.scene", description="Serves the 3-D scene of a run on this machine.")
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run file")
+    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 takes a free one from 7000 up")
+    parser.add_argument("--pointed", action="store_true", help="read from standard input what to show")
     try:
-        arguments = _arguments()
+        arguments = parser.parse_args()
         with RunFile(arguments.run) as run:
             asyncio.run(_serve(run, arguments.port, parent, arguments.pointed))
     except UserError as error:
         print(f"ddenv.scene: {error}", file=sys.stderr)
         return 2
     return 0
-
-
-def _arguments() -> argparse.Namespace:
-    parser = _Parser(prog="python -m ddenv.scene", description="Serves the 3-D scene of a run on this machine.")
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run file")
-    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 takes a free one from 7000 up")
-    parser.add_argument("--pointed", action="store_true", help="read from standard input what to show")
-    return parser.parse_args()
 
 
 async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:

@@ -52,41 +52,20 @@ def set_up(stage: Stage, view: View) -> None:
     # In the camera's frame y points upwards.
     for name, value in (("fov", FIELD_OF_VIEW), ("near", 0.1), ("far", 600.0), ("position", [east, up, -north])):
         stage.set(_CAMERA, name, value)
-    for name in ("Grid", "Axes"):
-        stage.show((name,), False)
-    for name in ("PointLightNegativeX", "PointLightPositiveX", "FillLight", "SpotLight"):
-        stage.show(("Lights", name), False)
+    lights = ("PointLightNegativeX", "PointLightPositiveX", "FillLight", "SpotLight")
+    for path in (("Grid",), ("Axes",), *(("Lights", name) for name in lights)):
+        stage.show(path, False)
     stage.set(("Lights", "AmbientLight", DRAWN), "intensity", 0.62)
     stage.draw_json(("Lights", "Sun"), _sun(view))
-    top, bottom = colors.SKY
-    stage.set(("Background",), "top_color", list(top))
-    stage.set(("Background",), "bottom_color", list(bottom))
+    for name, color in zip(("top_color", "bottom_color"), colors.SKY, strict=True):
+        stage.set(("Background",), name, list(color))
 
 
 def _sun(view: View) -> dict[str, Any]:
     reach = 1.7 * view.radius
-    shadow = {
-        "bias": -0.0004,
-        "normalBias": 0.01,
-        "radius": 2,
-        "mapSize": [2048, 2048],
-        "camera": {
-            "type": "OrthographicCamera",
-            "left": -reach,
-            "right": reach,
-            "top": reach,
-            "bottom": -reach,
-            "near": 0.1,
-            "far": 8 * view.radius,
-        },
-    }
-    x, y, z = view.sun
-    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]
-    return {
-        "type": "DirectionalLight",
-        "color": 0xFFFAF2,
-        "intensity": 0.62,
-        "matrix": matrix,
-        "castShadow": True,
-        "shadow": shadow,
-    }
+    sides = {"left": -reach, "right": reach, "top": reach, "bottom": -reach, "near": 0.1, "far": 8 * view.radius}
+    camera = {"type": "OrthographicCamera", **sides}
+    shadow = {"bias": -0.0004, "normalBias": 0.01, "radius": 2, "mapSize": [2048, 2048], "camera": camera}
+    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *view.sun, 1]
+    light = {"type": "DirectionalLight", "color": 0xFFFAF2, "intensity": 0.62, "matrix": matrix}
+    return {**light, "castShadow": True, "shadow": shadow}

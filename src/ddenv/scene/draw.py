@@ -10,7 +10,7 @@ from meshcat.geometry import Object
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
-from ddenv.scene.mesh import Painted, Surface, edges_of, joined, lines, outline, paint, plain
+from ddenv.scene.mesh import Surface, edges_of, lines, merge, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels
@@ -71,24 +71,30 @@ class Scenery:
         """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
         self._first = {model.name: model.links[0].pose for model in world.models}
-        self._keys: dict[str, str] = {}
+        # What the browser calls the elements that are drawn one by one.
+        self.keys: dict[str, str] = {}
         self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
         self._movable = {model.name for model in world.models if not model.static and model.name in elements}
         self._is_large = len(elements) > MOST_SINGLE
         # The surfaces of elements that are drawn together, and the edges of all elements.
-        self._painted: dict[str, list[Painted]] = {}
+        self._painted: dict[str, list[Surface]] = {}
         self._edges: dict[str, np.ndarray] = {}
         surfaces = [
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
-        self.surface = mesh.merge(surfaces)
+        self.surface = merge(surfaces)
         self.ground = _ground(world)
         self._draw_ground()
         self.wheels = wheels
         self._lowest = self._draw_robot()
-        self._boxes = {each.name: _box_of(surface) for each, surface in zip(world.models, surfaces, strict=True)}
+        # The lowest and the highest corner of each model.
+        self._boxes = {
+            model.name: (surface.vertices.min(axis=0), surface.vertices.max(axis=0))
+            for model, surface in zip(world.models, surfaces, strict=True)
+            if len(surface.vertices)
+        }
 
     def height(self, x: float, y: float) -> float:
         """Height of the highest surface at (x, y), m."""
@@ -98,7 +104,7 @@ class Scenery:
 
     def show(self, shot: Shot) -> None:
         """Shows the environment of `shot`."""
-        for name, key in self._keys.items():
+        for name, key in self.keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
             if not self._is_large:
                 self._stage.show((*LEFT_OUT, key), name in shot.left_out)
@@ -113,7 +119,7 @@ class Scenery:
         items = [item for name, items in self._painted.items() if name in shot.models for item in items]
         for name, solid in (("still", True), ("still clear", False)):
             some = [item for item in items if (item.alpha == 1) == solid]
-            yield (*MODELS, name), joined(some).thing() if some else None
+            yield (*MODELS, name), merge(some).thing() if some else None
         for group, names, color in (
             (LEFT_OUT, shot.left_out, colors.LEFT_OUT),
             (REMOVED, shot.removed, colors.REMOVED),
@@ -130,14 +136,10 @@ class Scenery:
     def place_models(self, poses: Mapping[str, Pose]) -> None:
         """Puts the first links of these elements at their poses, and all others where they start."""
         for name in self._placed - set(poses):
-            self._stage.move((*MODELS, self._keys[name]), Pose())
-        self._placed = frozenset(name for name in poses if name in self._keys)
+            self._stage.move((*MODELS, self.keys[name]), Pose())
+        self._placed = frozenset(name for name in poses if name in self.keys)
         for name in sorted(self._placed):
-            self._stage.move((*MODELS, self._keys[name]), self.moved(name, poses[name]), newest_only=True)
-
-    def key(self, name: str) -> str | None:
-        """What the browser calls an element; None for what is no element."""
-        return self._keys.get(name)
+            self._stage.move((*MODELS, self.keys[name]), self.moved(name, poses[name]), newest_only=True)
 
     def moved(self, name: str, pose: Pose) -> Pose:
         """How far a moving model is from its start once its first link is at `pose`."""
@@ -149,7 +151,7 @@ class Scenery:
         return self._stage.drawn(path, _tube(path_on_ground(samples, self._lowest), color))
 
     def still(self, shot: Shot) -> list[bytes]:
-        """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`key`)."""
+        """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
         return [self._stage.drawn(path, thing) for path, thing in self._together(shot)]
 
     def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[Letter]:
@@ -162,7 +164,7 @@ class Scenery:
         for letter, color, names in groups:
             for name, (low, high) in [(name, box) for name in names if (box := self._boxes.get(name)) is not None]:
                 ends, (x, y), listed = edges_of(low, high), ((low + high) / 2)[:2], len(places) < MOST_LETTERS
-                key = self._keys[name] if listed and name in self._movable else ""
+                key = self.keys[name] if listed and name in self._movable else ""
                 if key:
                     self._stage.draw((*PARTS, key), lines(ends, color), shadow=False)
                 else:
@@ -194,7 +196,7 @@ class Scenery:
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
-        shape = mesh.merge([item.surface for item in painted])
+        shape = merge(painted)
         if element and len(shape.vertices):
             self._edges[model.name] = outline(model, shape)
         if self._is_large and element and model.static:
@@ -204,7 +206,7 @@ class Scenery:
         for part, item in enumerate(painted):
             self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
         if element:
-            self._keys[model.name] = key
+            self.keys[model.name] = key
         if model.name in self._edges and not self._is_large:
             for group, color in ((LEFT_OUT, colors.LEFT_OUT), (REMOVED, colors.REMOVED)):
                 self._stage.draw((*group, key), lines(self._edges[model.name], color), shadow=False)
@@ -225,15 +227,14 @@ class Scenery:
     def _draw_robot(self) -> float:
         body = self.wheels.body
         to_first = body.links[0].pose.inverse()
-        pieces: list[tuple[Path, Pose, list[Painted]]]
-        pieces = [((), Pose(), [Painted(item.surface.at(to_first), item.tints, item.alpha) for item in paint(body)])]
+        pieces: list[tuple[Path, Pose, list[Surface]]] = [((), Pose(), [item.at(to_first) for item in paint(body)])]
         pieces += [((wheel.key,), Pose(wheel.position), [wheel.painted]) for wheel in self.wheels.all]
         lowest = 0.0
         for place, pose, painted in pieces:
             for part, item in enumerate(painted):
-                lowest = min(lowest, float(item.surface.at(pose).vertices[:, 2].min()))
+                lowest = min(lowest, float(item.at(pose).vertices[:, 2].min()))
                 self._stage.draw((*ROBOT, *place, str(part)), item.thing())
-                ghost = plain(item.surface, colors.GHOST, glow=0.2)
+                ghost = plain(item, colors.GHOST, glow=0.2)
                 self._stage.draw((*GHOST, *place, str(part)), ghost, shadow=False)
             if place:
                 self._stage.move((*ROBOT, *place), pose)
@@ -246,11 +247,6 @@ def _tube(points: np.ndarray, color: Color) -> Object | None:
     """A drawn trajectory; None for one without length."""
     tube = mesh.tube(points, LINE)
     return plain(tube, color, glow=0.4) if len(tube.faces) else None
-
-
-def _box_of(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
-    """The corners of the box around a surface along the world's axes, m; None for an empty one."""
-    return (surface.vertices.min(axis=0), surface.vertices.max(axis=0)) if len(surface.vertices) else None
 
 
 def _ground(world: World) -> Pose | None:
@@ -290,5 +286,5 @@ def mark(
 ) -> None:
     """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
     path = (*WORLD, name)
-    stage.draw(path, plain(mesh.merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
+    stage.draw(path, plain(merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))

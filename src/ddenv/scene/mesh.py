@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import meshcat.geometry as meshcat
@@ -27,14 +27,24 @@ SMOOTH = math.radians(30.0)
 
 @dataclass(frozen=True)
 class Surface:
-    """`vertices` (N, 3) in m; `faces` (M, 3) are vertex indices, counterclockwise seen from outside."""
+    """`vertices` (N, 3) in m; `faces` (M, 3) are vertex indices, counterclockwise seen from outside.
+
+    A painted one has the colours of its vertices, `tints` (N, 3), and one transparency.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
+    tints: np.ndarray | None = None
+    alpha: float = 1.0
 
     def at(self, pose: Pose) -> Surface:
         """This surface, given in the frame `pose`, seen from that frame's parent."""
-        return Surface(self.vertices @ pose.rotation().T + pose.position, self.faces)
+        return replace(self, vertices=self.vertices @ pose.rotation().T + pose.position)
+
+    def painted(self, color: Sequence[float]) -> Surface:
+        """This surface in one colour."""
+        *tint, alpha = color
+        return replace(self, tints=np.tile(tint, (len(self.vertices), 1)), alpha=alpha)
 
     @property
     def triangles(self) -> np.ndarray:
@@ -42,17 +52,29 @@ class Surface:
         corners: np.ndarray = self.vertices[self.faces]
         return corners
 
+    def thing(self) -> meshcat.Mesh:
+        """What a browser draws of a painted surface."""
+        geometry = meshcat.TriangularMeshGeometry(self.vertices, self.faces, color=self.tints)
+        # Only the outside is drawn: two-sided faces would cast shadows on themselves.
+        return meshcat.Mesh(geometry, meshcat.MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
+
 
 EMPTY = Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
 
 
 def merge(surfaces: Sequence[Surface]) -> Surface:
-    """One surface with the faces of all `surfaces`."""
+    """One surface with the faces of all `surfaces`, which are all painted, in one transparency, or not."""
     if not surfaces:
         return EMPTY
     starts = np.cumsum([0, *(len(one.vertices) for one in surfaces[:-1])])
     faces = [one.faces + start for one, start in zip(surfaces, starts, strict=True)]
-    return Surface(np.concatenate([one.vertices for one in surfaces]), np.concatenate(faces).astype(np.uint32))
+    tints = [one.tints for one in surfaces if one.tints is not None]
+    return Surface(
+        np.concatenate([one.vertices for one in surfaces]),
+        np.concatenate(faces).astype(np.uint32),
+        np.concatenate(tints) if tints else None,
+        surfaces[0].alpha,
+    )
 
 
 # Corners of a box around the origin with sides of 1, numbered by their bits x, y, z, and the edges that join them.
@@ -158,7 +180,7 @@ def of_shape(shape: Shape) -> Surface:
             return capsule(radius, length)
         case Ellipsoid(radii):
             ball = sphere(1.0)
-            return Surface(ball.vertices * radii, ball.faces)
+            return replace(ball, vertices=ball.vertices * radii)
         case Mesh():
             return creased(shape)
     return EMPTY
@@ -166,18 +188,17 @@ def of_shape(shape: Shape) -> Surface:
 
 def height_at(surface: Surface, x: float, y: float) -> float | None:
     """The height of the highest face at (x, y), m; None if there is none."""
-    corners = surface.triangles
-    if not len(corners):
-        return None
-    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
-    near = ((low <= (x, y)) & (high >= (x, y))).all(axis=1)
-    origin = corners[near, 0]
-    first, second = corners[near, 1] - origin, corners[near, 2] - origin
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    flat = np.abs(area) > 1e-12
-    origin, first, second, area = origin[flat], first[flat], second[flat], area[flat]
-    px, py = x - origin[:, 0], y - origin[:, 1]
-    u, v = (px * second[:, 1] - py * second[:, 0]) / area, (py * first[:, 0] - px * first[:, 1]) / area
+
+    def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        product: np.ndarray = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        return product
+
+    origin, second, third = np.moveaxis(surface.triangles, 1, 0)
+    first, second, place = second - origin, third - origin, (x, y) - origin[:, :2]
+    area = cross(first, second)
+    # A face on edge has no area.
+    area[np.abs(area) < 1e-12] = np.nan
+    u, v = cross(place, second) / area, cross(first, place) / area
     inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
     heights = (origin[:, 2] + u * first[:, 2] + v * second[:, 2])[inside]
     return float(heights.max()) if len(heights) else None
@@ -192,40 +213,18 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
     return faces.reshape(-1, 3).astype(np.uint32)
 
 
-@dataclass(frozen=True)
-class Painted:
-    """A surface of one transparency; `tints` (N, 3) are the colours of its vertices."""
-
-    surface: Surface
-    tints: np.ndarray
-    alpha: float
-
-    def thing(self) -> meshcat.Mesh:
-        geometry = meshcat.TriangularMeshGeometry(self.surface.vertices, self.surface.faces, color=self.tints)
-        # Only the outside is drawn: two-sided faces would cast shadows on themselves.
-        return meshcat.Mesh(geometry, meshcat.MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
-
-
-def paint(model: Model) -> list[Painted]:
-    """All visuals of a model, in the frame of its poses. A link without visuals shows its collisions."""
-    groups: dict[float, list[Painted]] = {}
+def paint(model: Model) -> list[Surface]:
+    """All visuals of a model, in the frame of its poses, by transparency. A link without visuals shows its collisions."""
+    groups: dict[float, list[Surface]] = {}
     default = colors.default_color(model)
     shown: list[Visual | Collision] = [item for link in model.links for item in link.visuals or link.collisions]
     vary = len(shown) > 20
     for number, item in enumerate(shown):
-        if isinstance(item.shape, Plane):
-            continue
         color = (item.color if isinstance(item, Visual) else None) or default
-        *tint, alpha = colors.varied(color, number) if vary else color
-        surface = of_shape(item.shape).at(item.pose)
-        groups.setdefault(alpha, []).append(Painted(surface, np.tile(tint, (len(surface.vertices), 1)), alpha))
-    return [joined(parts) for alpha, parts in groups.items() if alpha > 0]
-
-
-def joined(parts: Sequence[Painted]) -> Painted:
-    """All `parts`, at least one, which have one transparency."""
-    surface = merge([part.surface for part in parts])
-    return Painted(surface, np.concatenate([part.tints for part in parts]), parts[0].alpha)
+        if not isinstance(item.shape, Plane):
+            surface = of_shape(item.shape).at(item.pose).painted(colors.varied(color, number) if vary else color)
+            groups.setdefault(surface.alpha, []).append(surface)
+    return [merge(parts) for alpha, parts in groups.items() if alpha > 0]
 
 
 def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> meshcat.Mesh:

@@ -29,7 +29,6 @@ from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
-from ddenv.world.scenario import Goal, Spawn
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5
@@ -64,16 +63,15 @@ class Player:
         self._letters: list[Any] = []
         self._trail: list[tuple[float, ...]] = []
         self._evidence: int | None = None
-        self._set_scene(scenario.robot.spawn, scenario.goal)
-
-    def _set_scene(self, spawn: Spawn, goal: Goal) -> None:
-        start = (spawn.x, spawn.y, self._scenery.height(spawn.x, spawn.y))
-        end = (goal.x, goal.y, self._scenery.height(goal.x, goal.y))
-        set_up(self._stage, view(start, end))
-        mark(self._stage, "start", start, 0.6, colors.START)
-        mark(self._stage, "goal", end, goal.tolerance, colors.GOAL, FLAG)
-        mark(self._stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL, PIN)
-        self._stage.show(PARTING, False)
+        start, end = (
+            (place.x, place.y, self._scenery.height(place.x, place.y))
+            for place in (scenario.robot.spawn, scenario.goal)
+        )
+        set_up(stage, view(start, end))
+        mark(stage, "start", start, 0.6, colors.START)
+        mark(stage, "goal", end, scenario.goal.tolerance, colors.GOAL, FLAG)
+        mark(stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL, PIN)
+        stage.show(PARTING, False)
         self._scenery.place_robot(self._start)
 
     @property
@@ -100,7 +98,7 @@ class Player:
         moving = {
             key: [_row(row[0], scenery.moved(name, pose_of(row[1:]))) for row in rows]
             for name, rows in one.moving.items()
-            if (key := scenery.key(name)) is not None
+            if (key := scenery.keys.get(name)) is not None
         }
         sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
         return {
@@ -112,7 +110,7 @@ class Player:
             "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
             "moving": moving,
             "there": {
-                kind: [key for name in sorted(names) if (key := scenery.key(name))] for kind, names in sets.items()
+                kind: [key for name in sorted(names) if (key := scenery.keys.get(name))] for kind, names in sets.items()
             },
             "lacks": " ".join(one.lacks),
         }

@@ -109,8 +109,8 @@ class Server:
             raise UserError(f"--port: port {port} is in use or not allowed; use 0 for a free one")
         raise UserError(f"no free port from {FIRST_PORT} to {FIRST_PORT + TRIES - 1}")
 
-    def send(self, message: bytes, newest_only: bool = False) -> None:
-        """Sends a drawing message to every browser."""
+    def send(self, message: bytes | str, newest_only: bool = False) -> None:
+        """Sends a drawing message or a caption to every browser."""
         for viewer in tuple(self.viewers):
             viewer.pass_on(message, newest_only)
 
@@ -119,8 +119,7 @@ class Server:
         caption = json.dumps(words | {"port": self.port})
         if caption != self.caption:
             self.caption = caption
-            for viewer in tuple(self.viewers):
-                viewer.pass_on(caption)
+            self.send(caption)
 
     async def close(self) -> None:
         self._http.stop()
@@ -233,8 +232,7 @@ class _Feed(tornado.websocket.WebSocketHandler):
 
 def last_address(run: Path) -> tuple[int, str]:
     """The port, 0 for none, and the token with which the scene of `run` was served last; a new token if there was none."""
-    found = _known().get(str(run.resolve()))
-    match found:
+    match _known().get(str(run.resolve())):
         case [int(port), str(token)] if 0 < port <= 65535 and _TOKEN.fullmatch(token):
             return port, token
     return 0, secrets.token_urlsafe(TOKEN_BYTES)
@@ -242,8 +240,8 @@ def last_address(run: Path) -> tuple[int, str]:
 
 def remember(run: Path, port: int, token: str) -> None:
     """Remembers it, for this user alone, if it can be written."""
-    name = str(run.resolve())
-    known = {each: where for each, where in _known().items() if each != name}
+    known = _known()
+    known.pop(name := str(run.resolve()), None)
     write_state(FILE, dict([*known.items(), (name, [port, token])][-MOST:]))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
@@ -30,12 +30,11 @@ class Shot:
 
 def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf) -> Shot:
     """What to show, `idle` s after a test was last running. Stays with the `previous` test while it runs."""
-    numbers = [row.test for row in live if 0 < row.test <= len(state.tests)]
-    running = [number for number in numbers if state.tests[number - 1].outcome == "running"]
+    running = [test for test in _tests(state, [row.test for row in live]) if test.outcome == "running"]
     before = previous if previous is not None and previous.kind == "live" else None
     if running:
-        number = before.test if before is not None and before.test in running else None
-        return shot_of_test(state, "live", state.tests[(number or running[0]) - 1])
+        same = (test for test in running if before is not None and test.id == before.test)
+        return shot_of_test(state, "live", next(same, running[0]))
     if state.status in ("baseline", "running") and before is not None and idle < HOLD:
         return before
     test = _to_replay(state)
@@ -46,26 +45,28 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
 
 def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Shot:
     """What to show of a candidate or a try: the test that runs, or the last one that showed f, or the last one that ended."""
-    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
+    tests = _tests(state, row.tests)
     # At an earlier moment of the run, what ran then has ended by now.
     running = [test for test in tests if test.outcome == "running"]
     similar = [test for test in tests if test.outcome == "similar"]
-    found = (running[:1] or similar[-1:] or tests[-1:])[:1]
-    if not found:
+    if not tests:
         return _shot(state, "start", None, frozenset(row.models), f"{row.label} · not tested yet")
-    kind = "live" if any(each.test == found[0].id for each in live) and running else "replay"
-    return shot_of_test(state, kind, found[0], row)
+    test = (running[:1] or similar[-1:] or tests[-1:])[0]
+    kind = "live" if any(each.test == test.id for each in live) and running else "replay"
+    return shot_of_test(state, kind, test, row)
+
+
+def _tests(state: RunState, numbers: Iterable[int]) -> list[Test]:
+    return [state.tests[number - 1] for number in numbers if 0 < number <= len(state.tests)]
 
 
 def _to_replay(state: RunState) -> Test | None:
+    shown = [state.evidence_test] if state.evidence_test is not None else []
     if state.waiting_candidate is not None and state.round is not None:
-        tests = state.round.candidates[state.waiting_candidate].tests
-        similar = [state.tests[id - 1] for id in tests if state.tests[id - 1].outcome == "similar"]
-        if similar:
-            return similar[-1]
-    if state.evidence_test is not None and 0 < state.evidence_test <= len(state.tests):
-        return state.tests[state.evidence_test - 1]
-    return next((test for test in reversed(state.tests) if test.is_finished), None)
+        tests = _tests(state, state.round.candidates[state.waiting_candidate].tests)
+        shown += [test.id for test in tests if test.outcome == "similar"]
+    finished = (test for test in reversed(state.tests) if test.is_finished)
+    return next(reversed(_tests(state, shown)), None) or next(finished, None)
 
 
 def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:

@@ -65,9 +65,8 @@ class Stage:
 
     def drawn(self, path: Path, thing: Object | None) -> bytes:
         """The message that draws `thing` at `path`, or None deletes what is there, for one browser alone: it is not kept."""
-        if thing is None:
-            return bytes(umsgpack.packb({"type": "delete", "path": _text(path)}))
-        return bytes(umsgpack.packb({"type": "set_object", "object": thing.lower(), "path": _text(path)}))
+        command = {"type": "delete"} if thing is None else {"type": "set_object", "object": thing.lower()}
+        return bytes(umsgpack.packb(command | {"path": _text(path)}))
 
     def messages(self) -> list[bytes]:
         """The messages that a new browser needs, objects before their properties."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.scene import mesh
-from ddenv.scene.mesh import Painted, Surface, paint
+from ddenv.scene.mesh import Surface, paint
 from ddenv.world.drive import Drive, find_drive, rolled, turned_links, wheel_links
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector, pose_of
@@ -20,7 +20,7 @@ from ddenv.world.scenario import Wheels as Named
 
 # Spokes, so that a plain wheel is seen to turn: their width, as part of its radius, and how far they stand out of it, m.
 SPOKE, OUT = 0.12, 0.003
-SPOKE_COLOR = (0.75, 0.76, 0.78)
+SPOKE_COLOR = (0.75, 0.76, 0.78, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Wheel:
     """
 
     key: str
-    painted: Painted
+    painted: Surface
     position: Vector
     axis: Vector
     side: int
@@ -77,11 +77,9 @@ class Wheels:
             x, y, z = (sign * part for part in to_first.rotate(joint.axis))
             place = (to_first @ joint.pose).position
             to_wheel = Pose(place).inverse() @ to_first
-            painted = paint(links)
-            wheel = mesh.merge([item.surface.at(to_wheel) for item in painted])
-            spokes = _spokes(wheel, np.array((x, y, z)), drive.radius)
-            tints = [*(item.tints for item in painted), np.tile(SPOKE_COLOR, (len(spokes.vertices), 1))]
-            whole = Painted(mesh.merge([wheel, spokes]), np.concatenate(tints), 1.0)
+            wheel = mesh.merge([item.at(to_wheel) for item in paint(links)])
+            spokes = _spokes(wheel, np.array((x, y, z)), drive.radius).painted(SPOKE_COLOR)
+            whole = replace(mesh.merge([wheel, spokes]), alpha=1.0)
             yield Wheel(f"wheel {number}", whole, place, (x, y, z), 0 if left else 1)
 
 

@@ -1,108 +1,45 @@
-"""A study from start to end: makes the remaining cells, shows progress, and records when it was worked on."""
+"""A study from start to end: makes the remaining cells, several at the same time, each with its own engine, and shows progress."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import shutil
+import signal
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mean
 from typing import NamedTuple, TextIO
 
 from rich.cells import cell_len, set_cell_size
 
+from ddenv.errors import UserError
+from ddenv.evidence.claims import current
+from ddenv.runfile.fold import fold
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
 from ddenv.runs.subject import load_parts
 from ddenv.runs.tests_left import remaining, rough_run
-from ddenv.study.plan import Cell, Plan
-from ddenv.study.results import read_cell
+from ddenv.study.folder import Session, machine, opened, sessions, versions, write_sessions
+from ddenv.study.plan import Cell, Plan, run_path
+from ddenv.study.results import difference, read_cell
 from ddenv.study.study_page import write_study
-from ddenv.study.work import (
-    PER_CELL,
-    Sitting,
-    Work,
-    is_done,
-    machine,
-    opened,
-    sittings,
-    tests_made,
-    versions,
-    work,
-    write_sittings,
-)
 from ddenv.text import count, duration, printable
-from ddenv.world.scenario import Scenario
 
 # The cost of a dynamic model in a test, relative to a static one: about what piles of boards cost when measured.
 MOVES = 4
 # Equal spans of time put most of a world into one part, which takes many rounds to split.
 SLOW = ("timeseg/", "trajectoryseg/")
-
-
-class Size(NamedTuple):
-    """A scenario's world: how many models can be removed, and the cost of a test, in static models."""
-
-    models: int
-    cost: int
-
-
-def sizes(plan: Plan) -> dict[str, Size]:
-    """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
-    return {scenario.name: _size(scenario) for scenario in plan.scenarios}
-
-
-def _size(scenario: Scenario) -> Size:
-    world, _ = load_parts(scenario)
-    elements = set(world.elements(frozenset(scenario.protected)))
-    moving = sum(not model.static for model in world.models if model.name in elements)
-    return Size(len(elements), len(elements) + MOVES * moving)
-
-
-def seconds_left(
-    running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
-) -> float | None:
-    """Time until the last cell ends, s; None if unknown."""
-    alone = [_of_running(each) for each in running]
-    times = [*alone, *(_of_waiting(cell, (*running, *ended), worlds) for cell in waiting)]
-    known = [each for each in times if each is not None]
-    if len(known) < len(times):
-        return None
-    return max(sum(known) / jobs, *(seconds / each.workers for seconds, each in zip(known, running, strict=False)), 0)
-
-
-def _of_running(each: Work) -> float | None:
-    """What one worker still needs, s; None if unknown."""
-    left = remaining(each.state, True)
-    return None if left is None or left.seconds is None else left.seconds[1] * max(1, each.state.jobs)
-
-
-def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
-    """What one worker would need, s: the time of other cells of the scenario, or an estimate by the time of a test."""
-    same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
-    # Tests reused from another cell cost nothing.
-    if over := [
-        sum(test.wall_seconds for test in each.state.finished_tests if not test.taken)
-        for each in same
-        if each.state.status == "finished"
-    ]:
-        return mean(over)
-    tested = [each for each in same if each.state.finished_tests] or [
-        each for each in others if each.state.finished_tests
-    ]
-    if not tested:
-        return None
-    size = worlds[cell.scenario.name]
-    a_test = mean(
-        mean(test.wall_seconds for test in each.state.finished_tests)
-        * (size.cost / worlds[each.cell.scenario.name].cost)
-        for each in tested
-    )
-    return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
-
-
+# With more workers for a cell, most of the additional tests are not needed.
+PER_CELL = 2
+POLL = 0.2
 # Time between two estimates of the time left, which are slow, and two records of the time so far, s: a killed study loses the time
 # since the last one.
 LOOK_PERIOD = 2.0
@@ -114,92 +51,284 @@ QUIET = 60.0
 LEAST = 5.0
 
 
-class Progress:
-    """Shows how far the study `plan` in `folder` is, and records there how long this session has worked on it.
+@dataclass
+class Work:
+    """A cell in work by so many `workers`, since its run was as `before`.
 
-    `done` cells were finished before; `jobs` workers run tests. Raises UserError if earlier records cannot be read.
+    `engine` is None while an engine of another study works on it. `problem` says why it did not end this time.
     """
 
-    def __init__(self, plan: Plan, folder: Path, done: int, worlds: dict[str, Size], jobs: int, out: TextIO) -> None:
-        self._in_all, self._before = len(plan.cells), done
-        self._folder, self._seeds = folder, plan.seeds
-        self._worlds, self._jobs = worlds, jobs
-        self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
-        self._earlier, self._begun = sittings(folder), Sitting(time.time(), 0.0, jobs, 0, versions(), machine())
-        self._began = self._next_look = time.monotonic()
-        self._next_line = self._began + QUIET
-        self._cells: tuple[Work, ...] = ()
-        self._reported = 0
-        self._left: float | None = None
-
-    def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
-        """Reports what is new."""
-        self._cells = (*running, *ended)
-        for each in ended[self._reported :]:
-            self._reported += 1
-            seed = f", seed {each.cell.seed}" if self._seeds > 1 else ""
-            self._say(f"{self._done}  {each.cell.label}{seed}: {self._ending(each)}")
-        now = time.monotonic()
-        if now >= self._next_look:
-            self._left = seconds_left(running, waiting, ended, self._worlds, self._jobs) if running else None
-            self._write()
-            self._next_look = now + LOOK_PERIOD
-        if self._live:
-            line = self._now(running, shutil.get_terminal_size().columns - 1)
-            print(f"{CLEAR}{printable(line)}", end="", file=self._out, flush=True)
-        elif now >= self._next_line and running:
-            self._next_line = now + QUIET
-            self._say(self._now(running))
+    cell: Cell
+    path: Path
+    workers: int
+    file: RunFile
+    before: RunState
+    state: RunState
+    engine: subprocess.Popen[bytes] | None = None
+    problem: str = ""
 
     @property
-    def _done(self) -> str:
-        return f"{self._before + self._reported}/{self._in_all}"
+    def tests(self) -> int:
+        """How many tests this session has made, and not reused from another cell."""
+        return _made(self.state) - _made(self.before)
 
-    def close(self) -> None:
-        """Records the whole session, and clears the last line."""
-        self._write()
+    def catch_up(self) -> None:
+        """Reads the new events."""
+        self.state = fold(self.file.events(self.state.revision), self.state)
+
+    def has_ended(self) -> bool:
+        """Whether no engine works on it any more."""
+        # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours,
+        # and then ours gave up.
+        at_work = (self.engine is not None and self.engine.poll() is None) or engine_is_alive(self.path)
+        self.catch_up()
+        if not at_work and self.state.status != "finished":
+            # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
+            said = self.state.ended and self.state.revision > self.before.revision
+            self.problem = self.state.reason if said else last_words(self.path)
+        return not at_work
+
+
+def _made(state: RunState) -> int:
+    return state.made - sum(test.taken for test in state.tests)
+
+
+def is_done(folder: Path, cell: Cell) -> bool:
+    """Whether nothing is left to do for a cell. Raises UserError if its run file has other settings."""
+    path = run_path(folder, cell)
+    if not path.exists():
+        return False
+    try:
+        with RunFile(path) as file:
+            state = fold(file.events())
+            other = difference(file, cell)
+    except UserError as error:
+        raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
+    if other:
+        raise UserError(f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}")
+    return _is_over(state) and not _all_broke(state) and not engine_is_alive(path)
+
+
+def _is_over(state: RunState) -> bool:
+    """Whether an engine has nothing to do: it makes tests again that broke, if the certificate is open without them."""
+    certificate = current(state)
+    broke = certificate is not None and any(claim.verdict == "unknown" for claim in certificate.claims)
+    return state.status == "finished" and not broke
+
+
+def _all_broke(state: RunState) -> bool:
+    """Whether the simulator broke in all baseline runs: it may work now."""
+    broke = all(test.outcome in BROKEN for test in state.finished_tests)
+    return state.status == "finished" and state.baseline is None and broke
+
+
+def _begin(folder: Path, cell: Cell, workers: int) -> Work:
+    path = run_path(folder, cell)
+    if path.exists():
+        with RunFile(path) as old:
+            all_broke = _all_broke(fold(old.events()))
+        if all_broke:
+            path.unlink()
+    if not path.exists():
+        create_run(cell.scenario, path)
+    file = RunFile(path)
+    state = fold(file.events())
+    engine = None
+    if not engine_is_alive(path) and not _is_over(state):
+        engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
+    return Work(cell, path, workers, file, state, state, engine)
+
+
+class Size(NamedTuple):
+    """A scenario's world: how many models can be removed, and the cost of a test, in static models."""
+
+    models: int
+    cost: int
+
+
+def sizes(plan: Plan) -> dict[str, Size]:
+    """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
+    known: dict[str, Size] = {}
+    for scenario in plan.scenarios:
+        world, _ = load_parts(scenario)
+        elements = set(world.elements(frozenset(scenario.protected)))
+        moving = sum(not model.static for model in world.models if model.name in elements)
+        known[scenario.name] = Size(len(elements), len(elements) + MOVES * moving)
+    return known
+
+
+def seconds_left(
+    running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
+) -> float | None:
+    """Time until the last cell ends, s; None if unknown."""
+    tested = [work for work in (*running, *ended) if work.state.finished_tests]
+    alone: list[float] = []
+    for work in running:
+        left = remaining(work.state, True)
+        if left is None or left.seconds is None:
+            return None
+        alone.append(left.seconds[1] * max(1, work.state.jobs))
+    if waiting and not tested:
+        return None
+    rest = sum(_of_waiting(cell, tested, worlds) for cell in waiting)
+    return max((sum(alone) + rest) / jobs, *(time / work.workers for time, work in zip(alone, running, strict=True)), 0)
+
+
+def _of_waiting(cell: Cell, tested: Sequence[Work], worlds: dict[str, Size]) -> float:
+    """What one worker would need, s: the time of other cells of the scenario, or an estimate by the time of a test."""
+    same = [work for work in tested if work.cell.scenario.name == cell.scenario.name]
+    # Tests reused from another cell cost nothing.
+    over = [
+        sum(test.wall_seconds for test in work.state.finished_tests if not test.taken)
+        for work in same
+        if work.state.status == "finished"
+    ]
+    if over:
+        return mean(over)
+    size = worlds[cell.scenario.name]
+    a_test = mean(
+        mean(test.wall_seconds for test in work.state.finished_tests) * size.cost / worlds[work.cell.scenario.name].cost
+        for work in same or tested
+    )
+    return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
+
+
+class Runner:
+    """One session of work on the study `plan` in `folder`: makes `cells` with `jobs` workers in all, and says and records how far
+    it is; those that take long should come first. Raises UserError if earlier sessions cannot be read.
+    """
+
+    def __init__(
+        self, plan: Plan, folder: Path, cells: Sequence[Cell], worlds: dict[str, Size], jobs: int, out: TextIO
+    ) -> None:
+        self._plan, self._folder, self._worlds, self._jobs = plan, folder, worlds, jobs
+        self._waiting = list(cells)
+        self.running: list[Work] = []
+        self._ended: list[Work] = []
+        self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
+        self._earlier, self._session = sessions(folder), Session(time.time(), 0.0, jobs, 0, versions(), machine())
+        self._began = self._next_look = time.monotonic()
+        self._next_line = self._began + QUIET
+        self._left: float | None = None
+
+    def run(self) -> None:
+        """Makes the cells.
+
+        On KeyboardInterrupt the engines are stopped, and it is raised again. Raises UserError if a run file cannot be created, and
+        then stops the engines, too.
+        """
+        # Ignored signals stay ignored: a study under nohup outlives its terminal.
+        asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) != signal.SIG_IGN]
+        handlers = [(number, signal.signal(number, _interrupt)) for number in asked]
+        try:
+            while self._waiting or self.running:
+                while self._waiting and (free := self._jobs - sum(work.workers for work in self.running)) > 0:
+                    # Free workers are shared among the waiting cells.
+                    workers = max(min(PER_CELL, free), free // len(self._waiting))
+                    self.running.append(_begin(self._folder, self._waiting.pop(0), workers))
+                self._collect()
+                self.look()
+                if self.running:
+                    time.sleep(POLL)
+        finally:
+            _stop(self.running)
+            for work in self.running:
+                work.file.close()
+            for number, handler in handlers:
+                signal.signal(number, handler)
+            if self._live:
+                # The terminal may be gone.
+                with contextlib.suppress(OSError):
+                    print(CLEAR, end="", file=self._out, flush=True)
+            self._record()
+
+    def _collect(self) -> None:
+        """Says what has ended."""
+        for work in tuple(self.running):
+            if work.has_ended():
+                self.running.remove(work)
+                self._ended.append(work)
+                work.file.close()
+                seed = f", seed {work.cell.seed}" if self._plan.seeds > 1 else ""
+                self._say(f"{self._share}  {work.cell.label}{seed}: {self._ending(work)}")
+
+    def look(self) -> None:
+        """Says how far it is, and records it from time to time."""
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._left = seconds_left(self.running, self._waiting, self._ended, self._worlds, self._jobs)
+            self._record()
+            self._next_look = now + LOOK_PERIOD
         if self._live:
-            # The terminal may be gone.
-            with contextlib.suppress(OSError):
-                print(CLEAR, end="", file=self._out, flush=True)
+            line = self._now(shutil.get_terminal_size().columns - 1)
+            print(f"{CLEAR}{printable(line)}", end="", file=self._out, flush=True)
+        elif now >= self._next_line and self.running:
+            self._next_line = now + QUIET
+            self._say(self._now())
 
-    def _write(self) -> None:
-        tests = sum(tests_made(each.state) - each.made_before for each in self._cells)
-        session = replace(self._begun, seconds=time.monotonic() - self._began, tests=tests)
-        write_sittings(self._folder, (*self._earlier, session))
+    @property
+    def _share(self) -> str:
+        cells = len(self._plan.cells)
+        return f"{cells - len(self._waiting) - len(self.running)}/{cells}"
+
+    def _record(self) -> None:
+        seconds, tests = time.monotonic() - self._began, sum(work.tests for work in (*self.running, *self._ended))
+        write_sessions(self._folder, (*self._earlier, replace(self._session, seconds=seconds, tests=tests)))
 
     def _say(self, line: str) -> None:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
 
-    def _now(self, running: Sequence[Work], columns: int = 200) -> str:
+    def _now(self, columns: int = 200) -> str:
         """The current state, as detailed as fits."""
+        if not self.running:
+            return ""
         left = "" if self._left is None or self._left < LEAST else f" · about {duration(self._left)} left"
-        for names in ([each.cell.label for each in running], [each.cell.scenario.name for each in running]):
-            doing = (f"{name}: {_doing(each)}" for name, each in zip(names, running, strict=True))
-            line = " · ".join((f"{self._done}{left}", *doing))
+        line = ""
+        for names in ([work.cell.label for work in self.running], [work.cell.scenario.name for work in self.running]):
+            doing = (f"{name}: {_doing(work)}" for name, work in zip(names, self.running, strict=True))
+            line = " · ".join((f"{self._share}{left}", *doing))
             if cell_len(line) <= columns:
                 break
-        return set_cell_size(line, columns).rstrip() if running else ""
+        return set_cell_size(line, columns).rstrip()
 
-    def _ending(self, each: Work) -> str:
+    def _ending(self, work: Work) -> str:
         """How a cell ended, in one line."""
-        if each.problem:
-            return each.problem
-        found = read_cell(self._folder, each.cell)
-        if found.baseline is None:
-            return found.problem
-        sizes = f"{len(found.elements)} → {count(len(found.left), 'model')}"
-        tests = f"{count(found.tests, 'test')} and {found.certificate_tests} for the certificate"
-        doubt = "" if found.minimal else f"; not certified: {found.problem}"
-        return f"{sizes}, {tests}, {duration(each.state.working_seconds)}{doubt}"
+        if work.problem:
+            return work.problem
+        result = read_cell(self._folder, work.cell)
+        if result.baseline is None:
+            return result.problem
+        sizes = f"{len(result.elements)} → {count(len(result.left), 'model')}"
+        tests = f"{count(result.tests, 'test')} and {result.certificate_tests} for the certificate"
+        doubt = "" if result.minimal else f"; not certified: {result.problem}"
+        return f"{sizes}, {tests}, {duration(work.state.working_seconds)}{doubt}"
 
 
-def _doing(each: Work) -> str:
-    state = each.state
+def _doing(work: Work) -> str:
+    state = work.state
     if state.baseline is None:
-        return f"{state.tests_done} of {each.cell.scenario.reduction.baseline_runs} baseline runs"
+        return f"{state.tests_done} of {work.cell.scenario.reduction.baseline_runs} baseline runs"
     models = f"{len(state.environment)} of {len(state.elements)} models"
     return f"{models}, {'certificate, ' if state.confirming else ''}{state.tests_done} tests"
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _stop(running: Sequence[Work]) -> None:
+    """Stops engines, which record it."""
+    # On cells without an engine of ours, the engine of an earlier, killed study works.
+    left = [work for work in running if work.engine is None and engine_is_alive(work.path)]
+    for work in left:
+        with contextlib.suppress(UserError):
+            work.file.send("stop")
+    stop_engines([(work.file, work.engine) for work in running if work.engine is not None])
+    deadline = time.monotonic() + STOP_WAIT
+    while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in left):
+        time.sleep(POLL)
+    for work in running:
+        work.catch_up()
 
 
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
@@ -209,27 +338,23 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
     """
     worlds, interrupted = sizes(plan), False
     with opened(folder):
-        names = {cell.name for cell in plan.cells if is_done(folder, cell)}
-        open_ones = [cell for cell in plan.cells if cell.name not in names]
+        done = {cell.name for cell in plan.cells if is_done(folder, cell)}
+        cells = [cell for cell in plan.cells if cell.name not in done]
+        if jobs > PER_CELL:
+            # The cells that take longest come first.
+            cells.sort(key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW)))
         try:
-            if open_ones:
-                progress = Progress(plan, folder, len(names), worlds, jobs, out)
-                if jobs > PER_CELL:
-                    # The cells that take longest come first.
-                    open_ones.sort(
-                        key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW))
-                    )
-                with contextlib.closing(progress):
-                    work(folder, open_ones, jobs, progress.look)
+            if cells:
+                Runner(plan, folder, cells, worlds, jobs, out).run()
         except KeyboardInterrupt:
             interrupted = True
-        page, found = write_study(plan, folder, sittings(folder))
-    for each in found:
-        if each.problem and each.cell.name in names:
-            print(printable(f"{each.cell.label}, seed {each.cell.seed}: {each.problem}"), file=out)
-    minimal = sum(each.minimal for each in found)
-    print(printable(f"{minimal} of {count(len(found), 'cell')} certified; wrote {page}"), file=out, flush=True)
+        page, results = write_study(plan, folder, sessions(folder))
+    for result in results:
+        if result.problem and result.cell.name in done:
+            print(printable(f"{result.cell.label}, seed {result.cell.seed}: {result.problem}"), file=out)
+    minimal = sum(result.minimal for result in results)
+    print(printable(f"{minimal} of {count(len(results), 'cell')} certified; wrote {page}"), file=out, flush=True)
     if interrupted:
         print("interrupted; the same command continues", file=sys.stderr)
         return 130
-    return 0 if minimal == len(found) else 1
+    return 0 if minimal == len(results) else 1

@@ -155,7 +155,7 @@ def _chosen(
     option: str, words: str, check: Callable[[str], object], groups: Mapping[str, Sequence[str]]
 ) -> tuple[str, ...]:
     """The names in `words`, each once; that of a group stands for all in it. Raises UserError."""
-    names = tuple(dict.fromkeys(name for each in _names(option, words) for name in groups.get(each, (each,))))
+    names = tuple(dict.fromkeys(name for word in _names(option, words) for name in groups.get(word, (word,))))
     for name in names:
         try:
             check(name)

@@ -1,10 +1,9 @@
-"""What a cell came to, read from its run file, and the rows of the tables: the cells of a method, which differ in their seeds."""
+"""What a cell came to, read from its run file, and the rows of the tables: the results of a method, one for each seed."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -61,7 +60,7 @@ def _compared(scenario: object) -> object:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Result:
     """`tests` are the baseline and the tests behind each verdict of the search, `reruns` of them re-runs; `certificate_tests` are
     those that the certificates rest on. They do not depend on the number of workers; tests made `ahead` of time and not needed do.
 
@@ -105,26 +104,26 @@ class Found:
 
     @property
     def bounds(self) -> tuple[int, int]:
-        """The minimum of tests to show this result, and to find it (`least_to_show`, `least_to_find`)."""
-        known = len(self.elements), len(self.left), self.misses, self.cell.scenario.reduction.baseline_runs
-        return least_to_show(*known), least_to_find(*known)
+        """The minimum of tests to show this result, and to find it (`least_tests`)."""
+        baseline_runs = self.cell.scenario.reduction.baseline_runs
+        return least_tests(len(self.elements), len(self.left), self.misses, baseline_runs)
 
 
-def read_cell(folder: Path, cell: Cell) -> Found:
+def read_cell(folder: Path, cell: Cell) -> Result:
     """The result of a cell so far; if it cannot be read, `problem` says so."""
     path = run_path(folder, cell)
     if not path.exists():
-        return Found(cell)
+        return Result(cell)
     try:
         with RunFile(path) as file:
-            found = _read(file, cell)
+            result = _read(file, cell)
             other = difference(file, cell)
     except UserError as error:
-        return Found(cell, problem=str(error))
-    return Found(cell, problem=f"its run was made with {other}") if other else found
+        return Result(cell, problem=str(error))
+    return Result(cell, problem=f"its run was made with {other}") if other else result
 
 
-def _read(file: RunFile, cell: Cell) -> Found:
+def _read(file: RunFile, cell: Cell) -> Result:
     """What the events of a cell's run add up to. Raises UserError."""
     state = RunState()
     # The numbers of the tests that the search and the certificates rest on, in order.
@@ -150,7 +149,7 @@ def _read(file: RunFile, cell: Cell) -> Found:
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
     # A certificate runs the whole world only where what is left missed f: its runs would show the rate as too low.
     whole = [test.outcome for test in tests if test.environment == 0 and test.outcome in ("similar", "other", "pass")]
-    return Found(
+    return Result(
         cell,
         ended=state.ended,
         minimal=minimal,
@@ -184,7 +183,7 @@ def _problem(state: RunState) -> str:
     return state.reason if state.ended else "has not ended"
 
 
-class Theirs(NamedTuple):
+class Paper(NamedTuple):
     """A row of the paper: the number of its table, tests, which part of the models was removed, and minutes."""
 
     table: str
@@ -194,88 +193,73 @@ class Theirs(NamedTuple):
 
 
 @cache
-def _paper() -> dict[str, Any]:
+def _tables() -> dict[str, Any]:
     return dict(yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text()))
 
 
-def theirs(cell: Cell) -> Theirs | None:
+def paper_row(cell: Cell) -> Paper | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
-    table = _paper().get(cell.scenario.name, {"rows": {}})
+    table = _tables().get(cell.scenario.name, {"rows": {}})
     row = table["rows"].get(cell.method.pair)
-    if row is None or cell.method.algorithm != "ddenv" or cell.slices:
-        return None
-    return Theirs(table["table"], **row)
+    return Paper(table["table"], **row) if row and cell.method.algorithm == "ddenv" and not cell.slices else None
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The results of a method's cells, in the order of their seeds: `found` without slices, and `sliced` with them."""
+    """The results of a method in a scenario, in the order of their seeds: `results` without slices, and `sliced` with them."""
 
+    scenario: Scenario
     method: Method
-    found: tuple[Found, ...]
-    sliced: tuple[Found, ...] = ()
+    results: tuple[Result, ...]
+    sliced: tuple[Result, ...] = ()
 
     @property
-    def over(self) -> tuple[Found, ...]:
-        """The cells that came to an end, whatever its certificate shows."""
-        return tuple(each for each in self.found if each.certificate is not None)
+    def paper(self) -> Paper | None:
+        """The paper's numbers for this method."""
+        return paper_row(self.results[0].cell)
 
     @property
-    def minimal(self) -> tuple[Found, ...]:
-        """The cells whose certificate shows that their end is minimal."""
-        return tuple(each for each in self.found if each.minimal)
+    def over(self) -> tuple[Result, ...]:
+        """The results that came to an end, whatever their certificates show."""
+        return tuple(result for result in self.results if result.certificate is not None)
+
+    @property
+    def minimal(self) -> tuple[Result, ...]:
+        """The results whose certificate shows that they are minimal."""
+        return tuple(result for result in self.results if result.minimal)
 
     @property
     def certified(self) -> bool:
-        """Whether all cells are minimal: only then its numbers are those of a success."""
-        return all(each.minimal for each in self.found)
+        """Whether all are minimal: only then its numbers are those of a success."""
+        return len(self.minimal) == len(self.results)
 
     @property
     def bound(self) -> float | None:
         """The minimum of tests for any method to find this result, the median of the seeds; None if nothing is minimal."""
-        return median(each.bounds[0] for each in self.minimal) if self.minimal else None
+        return median(result.bounds[0] for result in self.minimal) if self.minimal else None
 
     @property
     def tests(self) -> float | None:
         """Their median, without those of certificates; None if nothing is minimal."""
-        return median(each.tests for each in self.minimal) if self.minimal else None
+        return median(result.tests for result in self.minimal) if self.minimal else None
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """All rows of a scenario."""
+def rows_of(plan: Plan, results: Sequence[Result]) -> tuple[tuple[Row, ...], ...]:
+    """The `results` of the plan's cells as rows, for each scenario a row for each method."""
 
-    scenario: Scenario
-    rows: tuple[Row, ...]
-
-    @property
-    def over(self) -> tuple[Found, ...]:
-        """All cells that came to an end."""
-        return tuple(each for row in self.rows for each in row.over)
-
-    @property
-    def minimal(self) -> tuple[Found, ...]:
-        """All cells that are minimal."""
-        return tuple(each for row in self.rows for each in row.minimal)
-
-    @property
-    def models(self) -> int:
-        """How many models of its world can be removed; 0 before the first run."""
-        return max(len(each.elements) for row in self.rows for each in row.found)
-
-
-def groups(plan: Plan, found: Sequence[Found]) -> tuple[Group, ...]:
-    """The cells of `plan`, in its order, as rows of its scenarios."""
-    cells = defaultdict[tuple[str, Method, bool], tuple[Found, ...]](tuple)
-    for each in found:
-        cells[each.cell.scenario.name, each.cell.method, each.cell.slices] += (each,)
-    return tuple(
-        Group(
-            scenario,
-            tuple(Row(one, cells[scenario.name, one, False], cells[scenario.name, one, True]) for one in plan.methods),
+    def row(scenario: Scenario, method: Method) -> Row:
+        without, sliced = (
+            tuple(
+                result
+                for result in results
+                if (result.cell.scenario.name, result.cell.method, result.cell.slices)
+                == (scenario.name, method, slices)
+            )
+            for slices in (False, True)
         )
-        for scenario in plan.scenarios
-    )
+        return Row(scenario, method, without, sliced)
+
+    return tuple(tuple(row(scenario, method) for method in plan.methods) for scenario in plan.scenarios)
 
 
 def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
@@ -287,26 +271,22 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
     return middle if low == high else f"{middle} ({low} to {high})"
 
 
-def least_to_show(models: int, needed: int, misses: int, baseline_runs: int) -> int:
-    """The minimum of tests for a search that ends at `needed` of `models` models, for any method, without its certificate.
+def least_tests(models: int, needed: int, misses: int, baseline_runs: int) -> tuple[int, int]:
+    """The minimum of tests for a search that ends at `needed` of `models` models, without its certificate: for any method, and on
+    average to find them, if each set of that size is equally likely.
 
     After the baseline, f has to show once in what is left, and each of its models has to be left out without success, alone or with
     others that are not left, with `misses` tests each.
-    """
-    return baseline_runs + (1 if needed < models else 0) + needed * misses
-
-
-def least_to_find(models: int, needed: int, misses: int, baseline_runs: int) -> int:
-    """The minimum of tests to find them, on average, if each set of that size is equally likely.
 
     A candidate without f costs `misses` tests, one with f at least one. So a test gives at most log2(1/x) bits, where
     x + x^misses = 1 (Kraft's inequality; one bit a test if one miss is enough), and log2 C(n, k) bits are needed. A method that
     knows more, such as that models near f are likelier, may need less.
     """
+    to_show = baseline_runs + (1 if needed < models else 0) + needed * misses
     # x in (0, 1) with x + x^misses = 1, by halving.
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if middle + middle**misses < 1 else (low, middle)
-    least = math.log(math.comb(models, needed)) / -math.log((low + high) / 2)
-    return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, misses, baseline_runs))
+    to_find = math.log(math.comb(models, needed)) / -math.log((low + high) / 2)
+    return to_show, max(to_show, baseline_runs + math.ceil(to_find - 1e-9))

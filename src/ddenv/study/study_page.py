@@ -30,10 +30,10 @@ from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.repeat import value_words
 from ddenv.settings import SETTINGS
+from ddenv.study.folder import Session
 from ddenv.study.plan import RUNS, Plan, run_path
-from ddenv.study.results import Found, groups, read_cell, theirs
+from ddenv.study.results import Result, paper_row, read_cell, rows_of
 from ddenv.study.tables import best, section
-from ddenv.study.work import Sitting
 from ddenv.text import count, plain
 from ddenv.world.access import write_file
 
@@ -51,32 +51,39 @@ COUNTED = (
 COLUMNS = Path(__file__).with_name("columns.yaml")
 
 
-def content(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Report:
-    """The page of a study; `found` are the cells of `plan` in its order."""
-    rows = groups(plan, found)
-    minimal = [each for each in found if each.minimal]
-    sections = [best(rows), *(section(folder, group) for group in rows), making(plan, found, sittings, folder)]
+def content(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path) -> Report:
+    """The page of a study; `results` are those of the plan's cells in their order."""
+    scenarios = rows_of(plan, results)
+    minimal = [result for result in results if result.minimal]
+    sections = [
+        best(scenarios),
+        *(section(folder, rows) for rows in scenarios),
+        making(plan, results, sessions, folder),
+    ]
     return Report(
         name="ddenv study",
-        verdict=_verdict(found, minimal),
-        lead=tuple(_lead(found, minimal)),
-        figures=_figures(found, minimal, sittings),
-        sections=tuple(each for each in sections if each is not None),
+        verdict=_verdict(results, minimal),
+        lead=tuple(_lead(results, minimal)),
+        figures=tuple(_figures(results, minimal, sessions)),
+        sections=tuple(part for part in sections if part is not None),
         foot=f"Written by ddenv {__version__}. Lengths in m, times in UTC.",
     )
 
 
-def _verdict(found: Sequence[Found], minimal: Sequence[Found]) -> str:
+def _verdict(results: Sequence[Result], minimal: Sequence[Result]) -> str:
     if not minimal:
-        open_ones = any(not each.ended for each in found)
-        return f"None of {count(len(found), 'world')} is minimal{' yet' if open_ones else ''}"
-    every = "Every" if len(minimal) == len(found) else f"{len(minimal)} of {len(found)}"
-    worlds = "world is" if len(minimal) == len(found) else "worlds are"
-    return f"{every} {worlds} minimal: {percent(mean(each.smaller for each in minimal))} smaller on average"
+        yet = " yet" if any(not result.ended for result in results) else ""
+        return f"None of {count(len(results), 'world')} is minimal{yet}"
+    worlds = "Every world is" if len(minimal) == len(results) else f"{len(minimal)} of {len(results)} worlds are"
+    return f"{worlds} minimal: {_smaller(minimal)} smaller on average"
 
 
-def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> Iterator[Paragraph]:
-    shares = sorted({each.cell.scenario.reduction.certify_rate for each in found})
+def _smaller(minimal: Sequence[Result]) -> str:
+    return percent(mean(result.smaller for result in minimal))
+
+
+def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Paragraph]:
+    shares = sorted({result.cell.scenario.reduction.certify_rate for result in results})
     yield say(
         "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
         "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, and "
@@ -84,12 +91,12 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> Iterator[Paragrap
         f"it keeps at least {' or '.join(map(percent, shares))} of the whole world's failure rate, and less without any one "
         "of its models."
     )
-    beside = [(each, paper) for each in minimal if (paper := theirs(each.cell)) is not None]
+    beside = [(result, paper) for result in minimal if (paper := paper_row(result.cell)) is not None]
     if beside:
-        better = sum(each.smaller >= paper.smaller for each, paper in beside)
-        fewer = sum(each.tests <= paper.tests for each, paper in beside)
+        better = sum(result.smaller >= paper.smaller for result, paper in beside)
+        fewer = sum(result.tests <= paper.tests for result, paper in beside)
         hours = sum(paper.minutes for _, paper in beside) / 60
-        ours, more = (duration(sum(getattr(each, time) for each, _ in beside)) for time in TIMES)
+        ours, more = (duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES)
         yield say(
             f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
             f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, one test after another, and "
@@ -97,40 +104,39 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> Iterator[Paragrap
             "its worlds, and the simulator differs: compare the methods with each other, and the minutes only roughly with the "
             "paper's."
         )
-    if missing := len(found) - len(minimal):
+    if missing := len(results) - len(minimal):
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
 
 
 def _figures(
-    found: Sequence[Found], minimal: Sequence[Found], sittings: Sequence[Sitting]
-) -> tuple[tuple[str, str], ...]:
-    seconds, jobs = sum(each.seconds for each in sittings), sorted({each.jobs for each in sittings})
-    figures = [(f"{len(minimal)} of {len(found)}", "certified")]
+    results: Sequence[Result], minimal: Sequence[Result], sessions: Sequence[Session]
+) -> Iterator[tuple[str, str]]:
+    yield f"{len(minimal)} of {len(results)}", "certified"
     if minimal:
-        figures.append((percent(mean(each.smaller for each in minimal)), "smaller, mean"))
-    figures.append((thousands(sum(each.simulated for each in found)), "search tests"))
-    figures.append((thousands(sum(each.certificate_simulated for each in found)), "certificate tests"))
-    if sittings:
+        yield _smaller(minimal), "smaller, mean"
+    yield thousands(sum(result.simulated for result in results)), "search tests"
+    yield thousands(sum(result.certificate_simulated for result in results)), "certificate tests"
+    if sessions:
+        jobs = sorted({session.jobs for session in sessions})
         workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
-        made = thousands(sum(each.tests for each in sittings))
-        figures.append((duration(seconds), f"with {workers}, {made} made"))
-    return tuple(figures)
+        made = thousands(sum(session.tests for session in sessions))
+        yield duration(sum(session.seconds for session in sessions)), f"with {workers}, {made} made"
 
 
-def write_study(plan: Plan, folder: Path, sittings: Sequence[Sitting]) -> tuple[Path, tuple[Found, ...]]:
-    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its cells. Raises UserError."""
-    found = tuple(read_cell(folder, cell) for cell in plan.cells)
-    report = content(plan, found, sittings, folder)
-    texts = {f"{STEM}.csv": table(folder, found), **pictures(report, STEM)}
+def write_study(plan: Plan, folder: Path, sessions: Sequence[Session]) -> tuple[Path, tuple[Result, ...]]:
+    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its results. Raises UserError."""
+    results = tuple(read_cell(folder, cell) for cell in plan.cells)
+    report = content(plan, results, sessions, folder)
+    texts = {f"{STEM}.csv": table(folder, results), **pictures(report, STEM)}
     texts |= {f"{STEM}.md": markdown(report, STEM), f"{STEM}.html": html(report)}
     for name, text in texts.items():
         write_file(folder / name, text.encode(errors="replace"))
-    return folder / f"{STEM}.html", found
+    return folder / f"{STEM}.html", results
 
 
-def table(folder: Path, found: Sequence[Found]) -> str:
+def table(folder: Path, results: Sequence[Result]) -> str:
     """All cells as CSV, a row each; missing values are empty."""
-    rows = [_row(folder, each) for each in found]
+    rows = [_row(folder, result) for result in results]
     out = io.StringIO()
     writer = csv.DictWriter(out, rows[0], lineterminator="\n")
     writer.writeheader()
@@ -138,11 +144,11 @@ def table(folder: Path, found: Sequence[Found]) -> str:
     return out.getvalue()
 
 
-def _row(folder: Path, each: Found) -> dict[str, object]:
-    cell, base, paper = each.cell, each.baseline, theirs(each.cell)
+def _row(folder: Path, result: Result) -> dict[str, object]:
+    cell, base, paper = result.cell, result.baseline, paper_row(result.cell)
     partitioning, prioritization = cell.method.parts
-    to_show, to_find = each.bounds if each.minimal else (None, None)
-    left, *removals = each.certificate.claims if each.certificate is not None else (None,)
+    to_show, to_find = result.bounds if result.minimal else (None, None)
+    left, *removals = result.certificate.claims if result.certificate is not None else (None,)
     most = max((claim.shown / claim.runs for claim in removals if claim and claim.runs), default=None)
     return {
         "scenario": cell.scenario.name,
@@ -151,20 +157,20 @@ def _row(folder: Path, each: Found) -> dict[str, object]:
         "prioritization": prioritization,
         "seed": cell.seed,
         "slices": cell.slices,
-        "certified": each.minimal,
-        "problem": each.problem,
-        "models": len(each.elements),
-        "left": len(each.left),
-        "reduction": round(each.smaller, 4),
-        "names": " ".join(each.left),
-        **{name: round(getattr(each, name), 2) for name in COUNTED},
+        "certified": result.minimal,
+        "problem": result.problem,
+        "models": len(result.elements),
+        "left": len(result.left),
+        "reduction": round(result.smaller, 4),
+        "names": " ".join(result.left),
+        **{name: round(getattr(result, name), 2) for name in COUNTED},
         "baseline_runs": base and base.runs,
         "baseline_f": base and base.failures,
         "least_to_show": to_show,
         "least_to_find": to_find,
-        "keep_rate": each.certificate and each.certificate.keep_rate,
-        "whole_runs": each.certificate and each.whole_runs,
-        "whole_f": each.certificate and each.whole_f,
+        "keep_rate": result.certificate and result.certificate.keep_rate,
+        "whole_runs": result.certificate and result.whole_runs,
+        "whole_f": result.certificate and result.whole_f,
         "left_runs": left and left.runs,
         "left_f": left and left.shown,
         "left_low": left and round(left.low, 4),
@@ -174,21 +180,29 @@ def _row(folder: Path, each: Found) -> dict[str, object]:
         "paper_tests": paper and paper.tests,
         "paper_reduction": paper and paper.smaller,
         "paper_minutes": paper and paper.minutes,
-        "ddenv": each.version,
-        "simulator": each.simulator if cell.scenario.oracle is None else "",
+        "ddenv": result.version,
+        "simulator": result.simulator if cell.scenario.oracle is None else "",
         "run": run_path(folder, cell).relative_to(folder),
     }
 
 
-def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:
+def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path) -> Section:
     """The section on how the study was made."""
     # A name that begins with a dash would be an option.
     start = f"./{folder}" if str(folder).startswith("-") else folder
     example = shlex.quote(plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv"))
+    worked = [
+        (
+            *(f"{moment(session.begun)} UTC", duration(session.seconds), str(session.jobs), thousands(session.tests)),
+            *(Name(session.machine), Name(session.versions)),
+        )
+        for session in sessions
+    ]
+    head = ("worked on", "for", "workers", "tests made", "machine", "versions")
     blocks: list[Block] = [
         _settings(plan),
-        *([_sittings(sittings)] if sittings else []),
-        *_computed(found),
+        *([Table(head, tuple(worked), {1, 2, 3})] if worked else []),
+        *_computed(results),
         say("What the columns mean:"),
         Table(("column", "meaning"), tuple(yaml.safe_load(COLUMNS.read_text()).items())),
         say("Each cell is a run that can be watched, continued and reported:"),
@@ -201,33 +215,23 @@ def _settings(plan: Plan) -> Table:
     """The settings that any method uses, with a column for each scenario."""
     used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
     rows = [
-        (one.label, *(value_words(getattr(getattr(each, one.section), one.name)) for each in plan.scenarios))
-        for one in SETTINGS.values()
-        if one.section != "simulation" and one.name not in OF_A_CELL and (not one.used_by or used & set(one.used_by))
+        (item.label, *(value_words(getattr(getattr(scenario, item.section), item.name)) for scenario in plan.scenarios))
+        for item in SETTINGS.values()
+        if item.section != "simulation"
+        and item.name not in OF_A_CELL
+        and (not item.used_by or used & set(item.used_by))
     ]
     seeds = ({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name} for scenario in plan.scenarios)
-    rows.append(("seeds", *(", ".join(map(str, sorted(each))) for each in seeds)))
+    rows.append(("seeds", *(", ".join(map(str, sorted(numbers))) for numbers in seeds)))
     head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
-    return Table(head, tuple(rows), frozenset(range(1, len(head))))
+    return Table(head, tuple(rows), range(1, len(head)))
 
 
-def _sittings(sittings: Sequence[Sitting]) -> Table:
-    rows = tuple(
-        (
-            *(f"{moment(one.begun)} UTC", duration(one.seconds), str(one.jobs), thousands(one.tests)),
-            *(Name(one.machine), Name(one.versions)),
-        )
-        for one in sittings
-    )
-    head = ("worked on", "for", "workers", "tests made", "machine", "versions")
-    return Table(head, rows, frozenset({1, 2, 3}))
-
-
-def _computed(found: Sequence[Found]) -> Iterator[Block]:
+def _computed(results: Sequence[Result]) -> Iterator[Block]:
     # Tests of different versions may differ.
-    drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
-    versions = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
-    taken = sum(each.taken_over for each in found)
+    drake = [result for result in results if result.simulator and result.cell.scenario.oracle is None]
+    versions = sorted({f"ddenv {result.version}, {result.simulator}" for result in drake})
+    taken = sum(result.taken_over for result in results)
     if len(versions) == 1:
         yield say(f"Computed with {versions[0]}.")
     elif versions:

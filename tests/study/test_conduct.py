@@ -16,10 +16,10 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
-from ddenv.study.conduct import Progress, conduct
+from ddenv.study.conduct import Runner, conduct
+from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
-from ddenv.study.work import sittings
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
 from tests.waiting import PATIENCE, wait_until
@@ -79,8 +79,8 @@ def test_a_study_runs_to_its_end(undisturbed, two_by_two):
         assert f"{row['tests']} tests and {row['certificate_tests']} for the certificate" in line
     assert [row["names"] for row in told(folder)] == ["deck wall"] * 4
     assert all(row["left_f"] == row["left_runs"] > "0" and row["without_most"] == "0.0" for row in told(folder))
-    (sitting,) = sittings(folder)
-    assert (sitting.jobs, sitting.tests) == (2, lab.made)
+    (session,) = sessions(folder)
+    assert (session.jobs, session.tests) == (2, lab.made)
     assert len(lab.started) == 4
 
 
@@ -95,20 +95,18 @@ def test_what_another_cell_has_tested_is_not_tested_again(undisturbed, two_by_tw
     assert [each.taken_over >= each.certificate_tests for each in found] == [False, True, False, True]
 
 
-def test_run_again_it_makes_no_test(undisturbed, two_by_two, lab, tmp_path):
+def test_run_again_it_makes_only_what_is_missing(undisturbed, two_by_two, lab, tmp_path):
+    """Also in another place: where files are does not matter, what they hold does."""
     shutil.copytree(undisturbed[0], folder := tmp_path / "study")
     (folder / "study.html").unlink()
-    code, words = study(folder, two_by_two)
-    assert (code, words) == (0, f"4 of 4 cells certified; wrote {folder}/study.html\n")
+    moved = plan_of(wall(tmp_path, "one"), wall(tmp_path, "two", seed=50), **METHODS)
+    assert moved.scenarios != two_by_two.scenarios
+    assert study(folder, moved) == (0, f"4 of 4 cells certified; wrote {folder}/study.html\n")
     assert (lab.made, lab.started) == (0, [])
-    assert (folder / "study.html").exists() and len(sittings(folder)) == 1
-
-
-def test_what_is_missing_is_made(undisturbed, two_by_two, lab, tmp_path):
-    shutil.copytree(undisturbed[0], folder := tmp_path / "study")
-    one = two_by_two.cells[1]
+    assert (folder / "study.html").exists() and len(sessions(folder)) == 1
+    one = moved.cells[1]
     run_path(folder, one).unlink()
-    assert study(folder, two_by_two)[0] == 0
+    assert study(folder, moved)[0] == 0
     assert [name for name, _ in lab.started] == [one.name]
     assert told(folder) == told(undisturbed[0])
 
@@ -161,7 +159,7 @@ def test_terminated_it_writes_what_it_has_and_goes_on(tmp_path, lab, two_by_two,
     lab.before = lambda run, made: None
     assert study(tmp_path, two_by_two)[0] == 0
     assert told(tmp_path) == told(undisturbed[0])
-    assert sum(each.tests for each in sittings(tmp_path)) == lab.made
+    assert sum(each.tests for each in sessions(tmp_path)) == lab.made
 
 
 def test_cells_that_come_to_no_end_are_told_and_the_others_are_made(tmp_path, lab):
@@ -221,15 +219,15 @@ def alone(tmp_path):
 
 def when_it_waits(monkeypatch, happens):
     """Something `happens` as soon as the study waits for its engines."""
-    look, happened = Progress.look, []
+    look, happened = Runner.look, []
 
-    def first(self, running, *others):
-        look(self, running, *others)
-        if running and not happened:
+    def first(self):
+        look(self)
+        if self.running and not happened:
             happened.append(True)
             happens()
 
-    monkeypatch.setattr(Progress, "look", first)
+    monkeypatch.setattr(Runner, "look", first)
 
 
 def test_an_engine_that_a_killed_study_left_is_waited_for(alone, lab, monkeypatch):
@@ -244,24 +242,24 @@ def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, m
     gate = threading.Event()
     start = lab.start_engine
 
-    look, mine, looks = Progress.look, [], []
+    look, mine, looks = Runner.look, [], []
 
-    def let_go(self, running, *others):
-        look(self, running, *others)
+    def let_go(self):
+        look(self)
         if mine and mine[0].poll() is not None:
-            looks.append(running)
+            looks.append(self)
         # The study has seen that the new one has given up.
         if len(looks) > 1:
             gate.set()
 
     def late(*words, **options):
-        monkeypatch.setattr("ddenv.study.work.start_engine", start)
+        monkeypatch.setattr("ddenv.study.conduct.start_engine", start)
         orphan(lab, *alone, gate)
         mine.append(start(*words, **options))
         return mine[0]
 
-    monkeypatch.setattr("ddenv.study.work.start_engine", late)
-    monkeypatch.setattr(Progress, "look", let_go)
+    monkeypatch.setattr("ddenv.study.conduct.start_engine", late)
+    monkeypatch.setattr(Runner, "look", let_go)
     code, words = study(*alone)
     gate.set()
     assert code == 0, words
@@ -281,37 +279,27 @@ def test_an_engine_that_was_left_is_stopped_with_the_study(alone, lab, monkeypat
     assert engine.poll() == 1
 
 
-def other(folder, plan, **options):
-    """The cells of another study in the same folder."""
-    with pytest.raises(UserError) as error:
-        study(folder, plan_of(plan.scenarios[0].world.parent / "wall.yaml", **ONE, **options))
-    return str(error.value)
-
-
 def test_a_run_of_something_else_is_refused_in_one_line(tmp_path, lab):
-    (tmp_path / "wall.sdf").write_bytes((wall_world := plan_of(wall(tmp_path), **ONE).scenarios[0].world).read_bytes())
-    file = tmp_path / "wall.yaml"
-    file.write_text(file.read_text().replace(str(wall_world), "wall.sdf"))
-    plan, folder = plan_of(file, **ONE), tmp_path / "study"
-    run = run_path(folder, plan.cells[0])
-    create_run(plan.cells[0].scenario, run)
+    file = wall(tmp_path)
+    world = plan_of(file, **ONE).scenarios[0].world
+    (tmp_path / "wall.sdf").write_bytes(world.read_bytes())
+    file.write_text(file.read_text().replace(str(world), "wall.sdf"))
+    folder, (cell,) = tmp_path / "study", plan_of(file, **ONE).cells
+    create_run(cell.scenario, run := run_path(folder, cell))
     (folder / "study.lock").touch()
-    told = "delete that file, or choose another folder with -o"
-    leave = f"choose another folder with -o, or delete {folder}/runs"
-    assert other(folder, plan, epsilon=0.5) == f"{run}: was made with another scenario, or with other options; {leave}"
+
+    def refused(**options):
+        with pytest.raises(UserError) as error:
+            study(folder, plan_of(file, **ONE, **options))
+        return str(error.value)
+
+    told, leave = f"{run}: was made with another", f"choose another folder with -o, or delete {folder}/runs"
+    assert refused(epsilon=0.5) == f"{told} scenario, or with other options; {leave}"
     (tmp_path / "wall.sdf").write_text((tmp_path / "wall.sdf").read_text().replace("far_box", "far_bin"))
-    assert other(folder, plan) == f"{run}: was made with another world; {leave}"
+    assert refused() == f"{told} world; {leave}"
     with sqlite3.connect(run) as db:
         db.execute("DELETE FROM event")
-    assert told in other(folder, plan)
-    run.write_text("no run file")
-    assert told in other(folder, plan)
+    for _ in range(2):
+        assert "delete that file, or choose another folder with -o" in refused()
+        run.write_text("no run file")
     assert lab.started == []
-
-
-def test_a_study_goes_on_in_another_place(undisturbed, two_by_two, lab, tmp_path):
-    """The scenarios were copied as well: where files are does not matter, what they hold does."""
-    shutil.copytree(undisturbed[0], folder := tmp_path / "study")
-    moved = plan_of(wall(tmp_path, "one"), wall(tmp_path, "two", seed=50), **METHODS)
-    assert moved.scenarios != two_by_two.scenarios
-    assert study(folder, moved)[0] == 0 and lab.started == []
