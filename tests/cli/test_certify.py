@@ -11,13 +11,6 @@ from tests.command import in_process
 from tests.workbench import fake_moments, fake_run
 
 
-@pytest.fixture
-def run(tmp_path):
-    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
-    yield made
-    made.close()
-
-
 def told(run) -> tuple[dict, str]:
     state = fold(run.file.events())
     return summary(state, run.path), "\n".join(summary_lines(state, run.path))

@@ -16,13 +16,6 @@ EXAMPLE = ROOT / "docs/examples/any_simulator"
 
 
 @pytest.fixture
-def run(tmp_path):
-    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
-    yield made
-    made.close()
-
-
-@pytest.fixture
 def started(monkeypatch):
     """The engines that were asked for; none starts."""
     asked = []
