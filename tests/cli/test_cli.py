@@ -294,6 +294,12 @@ MISTAKES = {
         "--world: only for a scenario",
     ),
     "output": (["run", WALL, "--output", "x.txt"], "neither a folder nor"),
+    "no world to check": (["world", "check", "nowhere.sdf"], "nowhere.sdf: no such file"),
+    "folder to show": (["world", "show", DATA], "is a folder"),
+    "no scenario to check": (["world", "check", "frction"], "frction: no such file"),
+    "stand-in": (["world", "check", DATA / "wall.sdf", "--stand-in", "x"], "--stand-in: expected URI=SHAPE"),
+    "ignore": (["world", "check", DATA / "wall.sdf", "--ignore", "walls"], "'walls' is not one of"),
+    "no folder to write to": (["world", "convert", DATA / "wall.sdf", "-o", "/no/where/x.sdf"], "cannot be written"),
 }
 
 

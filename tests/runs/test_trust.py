@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import AcceptModeChanged, EngineStarted
+from ddenv.runfile.events import EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
@@ -163,13 +163,3 @@ def test_what_the_user_trusts_or_owns_starts_and_is_not_asked_about_again(scenar
         assert done.returncode == 0, done.stderr
         assert len(json.loads(done.stdout)["runs"]) == 1
     assert (home / "started").exists()
-
-
-def test_a_run_file_is_the_users_own_until_it_is_opened_to_others(home):
-    run = home / "run.ddenv"
-    create_run(load_scenario(DATA / "wall.yaml"), run)
-    assert run.stat().st_mode & 0o777 == 0o600
-    run.chmod(0o640)
-    with RunFile(run) as file:
-        file.append(AcceptModeChanged("ask"))
-    assert run.stat().st_mode & 0o777 == 0o640
