@@ -57,3 +57,10 @@ def in_process(monkeypatch, capsys, *words: object) -> Said:
     printed = capsys.readouterr()
     code = left.value.code or 0
     return Said(code, printed.out, printed.err + "".join(f"{each.message}\n" for each in shown))
+
+
+def is_one_line(done, *words: str) -> None:
+    """That a command was refused in one line with these words, and printed nothing else."""
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    assert all(word in done.stderr for word in words), done.stderr

@@ -43,6 +43,16 @@ def home(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture
+def run(tmp_path):
+    """A run file to write events to, in place of an engine."""
+    from tests.workbench.fake_run import FakeRun
+
+    made = FakeRun(tmp_path / "crates-1.ddenv")
+    yield made
+    made.close()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What is slow for one of the named reasons is `slow`, but for its witness."""

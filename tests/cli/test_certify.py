@@ -7,15 +7,8 @@ import pytest
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.runfile.fold import fold
 from ddenv.runs.folder import runs_folder
-from tests.command import in_process
+from tests.command import in_process, is_one_line
 from tests.workbench import fake_moments, fake_run
-
-
-@pytest.fixture
-def run(tmp_path):
-    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
-    yield made
-    made.close()
 
 
 def told(run) -> tuple[dict, str]:
@@ -87,13 +80,7 @@ def test_an_engine_makes_at_least_so_many_runs(run, monkeypatch, capsys):
 
 def test_what_cannot_be_certified_is_refused_in_one_line(run, monkeypatch, capsys):
     run.created()
-    assert refused(monkeypatch, capsys, run).startswith(f"ddenv: {run.path}: f is not known yet")
+    is_one_line(in_process(monkeypatch, capsys, "certify", run.path), f"ddenv: {run.path}: f is not known yet")
     fake_run.FakeRun.baseline(run)
     with run.engine():
-        assert "another engine is working on this run" in refused(monkeypatch, capsys, run)
-
-
-def refused(monkeypatch, capsys, run) -> str:
-    done = in_process(monkeypatch, capsys, "certify", run.path)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
-    return done.stderr
+        is_one_line(in_process(monkeypatch, capsys, "certify", run.path), "another engine is working on this run")

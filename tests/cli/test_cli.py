@@ -19,7 +19,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
 from ddenv.schemas import names
 from ddenv.words.claims import shown
-from tests.command import ddenv, in_process
+from tests.command import ddenv, in_process, is_one_line
 from tests.conftest import DATA
 from tests.waiting import PATIENCE, wait_until
 
@@ -229,15 +229,7 @@ def test_a_second_engine_is_refused(reduced, tmp_path):
     # Another process may be looking at the run that all share.
     run = Path(shutil.copy(reduced[1]["run_file"], tmp_path))
     with engine_lock(run):
-        _is_one_line(ddenv("resume", run), "another engine is working on this run")
-
-
-def _is_one_line(done, words):
-    assert done.returncode == 2, done.stdout + done.stderr
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert "Traceback" not in done.stderr
-    assert words in done.stderr
-    assert done.stdout == ""
+        is_one_line(ddenv("resume", run), "another engine is working on this run")
 
 
 MISTAKES = {
@@ -294,13 +286,19 @@ MISTAKES = {
         "--world: only for a scenario",
     ),
     "output": (["run", WALL, "--output", "x.txt"], "neither a folder nor"),
+    "no world to check": (["world", "check", "nowhere.sdf"], "nowhere.sdf: no such file"),
+    "folder to show": (["world", "show", DATA], "is a folder"),
+    "no scenario to check": (["world", "check", "frction"], "frction: no such file"),
+    "stand-in": (["world", "check", DATA / "wall.sdf", "--stand-in", "x"], "--stand-in: expected URI=SHAPE"),
+    "ignore": (["world", "check", DATA / "wall.sdf", "--ignore", "walls"], "'walls' is not one of"),
+    "no folder to write to": (["world", "convert", DATA / "wall.sdf", "-o", "/no/where/x.sdf"], "cannot be written"),
 }
 
 
 @pytest.mark.parametrize(("words", "told"), MISTAKES.values(), ids=MISTAKES.keys())
 def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, words, told):
     monkeypatch.chdir(home)
-    _is_one_line(in_process(monkeypatch, capsys, *words), told)
+    is_one_line(in_process(monkeypatch, capsys, *words), told)
     assert list(home.rglob("*")) == []
 
 
@@ -337,8 +335,8 @@ def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home, reduced):
     run = shutil.copy(reduced[1]["run_file"], home / "broken.ddenv")
     with sqlite3.connect(run) as database:
         database.execute("UPDATE document SET content = x'7b7d' WHERE name = 'scenario'")
-    _is_one_line(ddenv("resume", run), "its scenario is not valid")
-    _is_one_line(ddenv("test", run), "its scenario is not valid")
+    is_one_line(ddenv("resume", run), "its scenario is not valid")
+    is_one_line(ddenv("test", run), "its scenario is not valid")
 
 
 @pytest.mark.programs
@@ -372,7 +370,7 @@ def test_a_malformed_world_is_told_with_its_line(home):
     data["world"] = "w.sdf"
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
-    _is_one_line(ddenv("run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
+    is_one_line(ddenv("run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
 
 
 def test_a_newer_run_file_is_refused(reduced, tmp_path):
@@ -383,7 +381,7 @@ def test_a_newer_run_file_is_refused(reduced, tmp_path):
     with sqlite3.connect(copy) as database:
         database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
     for command in ("open", "resume", "test"):
-        _is_one_line(ddenv(command, copy), "written by a newer ddenv")
+        is_one_line(ddenv(command, copy), "written by a newer ddenv")
 
 
 @pytest.mark.parametrize(

@@ -24,11 +24,11 @@ def forget():
 
 
 def test_all_are_listed_with_their_explanations():
-    told = "\n".join(lines())
+    told, found = "\n".join(lines()), report()
     for kind in ("partitioning", "prioritization", "algorithm"):
-        for name in schemas.names(kind):
-            words = schemas.explanation(kind, name)
-            assert words
+        assert set(found[f"{kind}s"]) == set(schemas.names(kind))
+        for name, words in found[f"{kind}s"].items():
+            assert words == schemas.explanation(kind, name) != ""
             assert f"\n  {name}\n    {words}" in told
 
 
@@ -37,13 +37,6 @@ def test_the_lines_are_as_wide_as_the_terminal_and_lose_no_word(columns):
     told = lines(columns)
     assert max(map(width, told)) <= columns
     assert " ".join(" ".join(told).split()) == " ".join(" ".join(lines()).split())
-
-
-def test_the_object_names_all_by_kind():
-    assert report() == {
-        f"{kind}s": {name: schemas.explanation(kind, name) for name in schemas.names(kind)}
-        for kind in ("partitioning", "prioritization", "algorithm")
-    }
 
 
 def test_those_of_other_packages_are_listed_and_cannot_steer_the_terminal(tmp_path, monkeypatch):

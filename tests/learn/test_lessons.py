@@ -173,14 +173,10 @@ def test_all_lessons_together_are_small(tmp_path):
 
 
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
-def test_a_recorded_run_came_to_its_end(run):
+def test_a_recorded_run_came_to_its_end_and_a_reader_writes_nothing_beside_it(run):
     with RunFile(run) as file:
         end = position_in(file.events()).end
     assert end.status == "finished" and end.certificate.claims
-
-
-@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
-def test_a_reader_writes_nothing_beside_a_lesson(run):
     # The two bytes of SQLite's header that say that a reader makes no log of its own.
     assert run.read_bytes()[18:20] == b"\x01\x01"
 

@@ -10,7 +10,7 @@ from docs.lessons.record_plays import record_plays
 
 from ddenv.errors import UserError
 from ddenv.learn.attempt import RecordedRound, read_oracle
-from ddenv.learn.race import KINDS, Play, Race, bet, plays_of_runs, recorded_play, result, tally, why
+from ddenv.learn.race import KINDS, Play, Race, bet, plays_of_runs, recorded_play, reductions, result, spent, why
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.store import RunFile
 from tests.learn.lessons import RUNS, opened
@@ -23,12 +23,12 @@ by_name = lambda play: play.name  # noqa: E731
 @pytest.mark.parametrize("play", PLAYS, ids=by_name)
 def test_every_test_of_a_search_is_of_one_kind(play):
     for tests in range(play.tests + 1):
-        spent = tally(play, tests).spent
-        assert sum(spent.values()) == tests
-        assert spent.keys() == KINDS.keys()
+        numbers = spent(play, tests)
+        assert sum(numbers.values()) == tests
+        assert numbers.keys() == KINDS.keys()
     # These do not only shrink by tests: one goes back, the other goes on with a slice.
     if play.name not in ("quay-kept", "ditch-sliced"):
-        assert len(play.begins) - len(play.left) == sum(tally(play).steps)
+        assert len(play.begins) - len(play.left) == sum(reductions(play))
 
 
 @pytest.mark.parametrize("play", opened(0).plays.values(), ids=by_name)

@@ -98,13 +98,10 @@ def test_a_fit_shows_all_models_and_points_in_proportion():
         assert view.cell(x, y) is not None
 
 
-def test_a_fit_clips_a_huge_model():
+def test_a_fit_clips_a_huge_model_and_is_ten_metres_for_nothing():
     prints = prints_of(box("hangar", 0, 0, size=(900, 900, 1)), box("a", 1, 1), box("b", 3, 2))
     view = fit(prints, [(0.0, 0.0)], 60, 15)
     assert view.scale * view.columns < 60
-
-
-def test_a_fit_of_nothing_is_ten_metres():
     assert fit((), (), 20, 10, margin=0).scale == pytest.approx(0.5)
 
 

@@ -68,7 +68,9 @@ def _reduce(run, keep):
         writing.write("reduced", {"candidate": 0, "environment": keep, "evidence_test": 1})
 
 
-def written(folder):
+def exported(run, folder, sdf="m.sdf"):
+    """The scenario that is written, as data."""
+    export_world(run, folder / sdf, folder / "m.yaml")
     return yaml.safe_load((folder / "m.yaml").read_text())
 
 
@@ -78,8 +80,7 @@ def test_files_beside_the_scenario_or_below_are_named_relative_to_it(tmp_path, f
     away = tmp_path / "away"
     away.mkdir()
     run = run_of(tmp_path, [box("a", 5), box("b", 7)], reading=reading_of(model_path=[folder / "models", away]))
-    export_world(run, folder / "worlds" / "m.sdf", folder / "m.yaml")
-    told = written(folder)
+    told = exported(run, folder, "worlds/m.sdf")
     assert told["world"] == "worlds/m.sdf"
     assert told["robot"]["model"] == "m.robot.sdf"
     assert told["reading"]["model_path"] == ["models", str(away)]
@@ -92,8 +93,7 @@ def test_a_world_elsewhere_is_named_by_its_whole_path(tmp_path, folder, monkeypa
     run = run_of(tmp_path, [box("a", 5)])
     monkeypatch.chdir(folder)
     (tmp_path / "other").mkdir()
-    export_world(run, tmp_path / "other" / "m.sdf", folder / "m.yaml")
-    assert written(folder)["world"] == str(tmp_path / "other" / "m.sdf")
+    assert exported(run, folder, tmp_path / "other" / "m.sdf")["world"] == str(tmp_path / "other" / "m.sdf")
 
 
 @pytest.mark.parametrize(
@@ -114,8 +114,7 @@ def test_the_original_folder_is_searched_only_for_what_lies_there(tmp_path, fold
     (tmp_path / "world" / "rock.obj").write_text(TETRAHEDRON)
     reading = reading_of(model_path=[tmp_path / "models"])
     run = run_of(tmp_path, [mesh("rock", uri, 5), box("a", 8)], reading=reading)
-    export_world(run, folder / "m.sdf", folder / "m.yaml")
-    assert (str(tmp_path / "world") in written(folder)["reading"]["model_path"]) is needed
+    assert (str(tmp_path / "world") in exported(run, folder)["reading"]["model_path"]) is needed
     assert load_parts(load_scenario(folder / "m.yaml"))[0].elements() == ("rock", "a")
 
 
@@ -123,9 +122,8 @@ def test_a_folder_is_not_searched_for_what_was_removed(tmp_path, folder):
     (tmp_path / "world").mkdir()
     (tmp_path / "world" / "rock.obj").write_text(TETRAHEDRON)
     run = run_of(tmp_path, [mesh("rock", "rock.obj", 5), box("a", 8)], keep=["a"])
-    exported = export_world(run, folder / "m.sdf", folder / "m.yaml")
-    assert written(folder)["reading"]["model_path"] == []
-    assert exported.needs == []
+    assert exported(run, folder)["reading"]["model_path"] == []
+    assert export_world(run, folder / "m.sdf", None).needs == []
 
 
 def test_the_robots_folder_is_searched_for_what_it_names_there(tmp_path, folder):
@@ -138,8 +136,7 @@ def test_the_robots_folder_is_searched_for_what_it_names_there(tmp_path, folder)
     robot.write_text(f"{text[:start]}<geometry><mesh><uri>body.obj</uri></mesh>{text[end:]}")
     (robot.parent / "body.obj").write_text(TETRAHEDRON)
     run = run_of(tmp_path, [box("a", 5)], robot=robot)
-    export_world(run, folder / "m.sdf", folder / "m.yaml")
-    assert written(folder)["reading"]["model_path"] == [str(robot.parent)]
+    assert exported(run, folder)["reading"]["model_path"] == [str(robot.parent)]
     load_parts(load_scenario(folder / "m.yaml"))
 
 
@@ -152,20 +149,17 @@ def test_a_urdf_stays_one_and_its_package_is_found(tmp_path, folder):
     uri = "package://cart/meshes/body.obj"
     robot.write_text(text.replace('<box size="0.36 0.26 0.10"/>', f'<mesh filename="{uri}" scale="0.1 0.1 0.1"/>'))
     run = run_of(tmp_path, [box("a", 5)], robot=robot)
-    export_world(run, folder / "m.sdf", folder / "m.yaml")
-    assert written(folder)["robot"]["model"] == "m.robot.urdf"
-    assert written(folder)["reading"]["model_path"] == [str(robot.parents[1])]
+    told = exported(run, folder)
+    assert (told["robot"]["model"], told["reading"]["model_path"]) == ("m.robot.urdf", [str(robot.parents[1])])
     load_parts(load_scenario(folder / "m.yaml"))
 
 
 def test_the_scenarios_folder_is_named_where_a_program_of_its_own_lies_there(tmp_path, folder):
     own = ROOT / "docs" / "examples" / "own_robot"
     create_run(load_scenario(own / "scenario.yaml"), tmp_path / "own.ddenv")
-    export_world(tmp_path / "own.ddenv", folder / "m.sdf", folder / "m.yaml")
-    assert written(folder)["folder"] == str(own)
+    assert exported(tmp_path / "own.ddenv", folder)["folder"] == str(own)
     assert load_scenario(folder / "m.yaml").folder == own
-    export_world(run_of(tmp_path, [box("a", 5)]), folder / "m.sdf", folder / "m.yaml")
-    assert "folder" not in written(folder)
+    assert "folder" not in exported(run_of(tmp_path, [box("a", 5)]), folder)
 
 
 def test_what_the_kept_models_name_is_still_needed(tmp_path, folder):
@@ -182,8 +176,7 @@ def test_what_the_kept_models_name_is_still_needed(tmp_path, folder):
 def test_protected_models_are_called_as_they_are_in_the_exported_world(tmp_path, folder):
     models = [box("box", 5), box("box", 8), box("post", 11), box("box", 14), box("crate", 17)]
     run = run_of(tmp_path, models, keep=["crate"], protected=["box #3", "post"])
-    export_world(run, folder / "m.sdf", folder / "m.yaml")
-    assert written(folder)["protected"] == ["box", "post"]
+    assert exported(run, folder)["protected"] == ["box", "post"]
     world, _ = load_parts(load_scenario(folder / "m.yaml"))
     assert {model.name: model.pose.position[0] for model in world.models} == {"post": 11, "box": 14, "crate": 17}
 

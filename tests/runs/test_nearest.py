@@ -8,20 +8,13 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import INSTANTS, nearest, removed_in_passing
-from tests.workbench import fake_moments, fake_run
+from tests.workbench import fake_moments
 
 
 def read(path):
     with RunFile(path) as file:
         state = fold(file.events())
         return state, nearest(file, state)
-
-
-@pytest.fixture
-def run(tmp_path):
-    made = fake_run.FakeRun(tmp_path / "one.ddenv")
-    yield made
-    made.close()
 
 
 def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
@@ -86,24 +79,25 @@ def ended(run, claims, removal):
     return read(run.path)[1]
 
 
-def test_what_is_not_shown_is_not_claimed(run):
-    claims = ((None, "passes", 20, 20), (0, "needed", 0, 9), (1, "not shown", 3, 9), (2, "needed", 0, 9))
-    found = ended(run, claims, 1)
-    assert not found.shown
-    assert found.words.endswith("; not shown that each of them has to go: undecided with crate_01 put back")
+PASSES, EACH_NEEDED = (None, "passes", 20, 20), [(back, "needed", 0, 9) for back in range(3)]
+ENDS = {
+    "not shown": (
+        (PASSES, EACH_NEEDED[0], (1, "not shown", 3, 9), EACH_NEEDED[2]),
+        1,
+        False,
+        "; not shown that each of them has to go: undecided with crate_01 put back",
+    ),
+    "the worst": ((PASSES, *EACH_NEEDED), 1, True, "with any one of these 3 put back in at most 0 of 9 fresh runs"),
+    "no world": ((), None, False, "no world was found that passes: the robot does not reach its goal"),
+    "no world of all": ((), None, False, "all 11 models that may go"),
+}
 
 
-def test_the_worst_of_several_that_are_put_back_is_named_by_its_numbers(run):
-    found = ended(run, ((None, "passes", 20, 20), *((each, "needed", 0, 9) for each in range(3))), 1)
-    assert found.shown
-    assert "with any one of these 3 put back in at most 0 of 9 fresh runs" in found.words
-
-
-def test_where_no_world_passes_it_says_so(run):
-    found = ended(run, (), None)
-    assert (found.gone, found.shown) == ((), False)
-    assert found.words.startswith("no world was found that passes: the robot does not reach its goal")
-    assert "all 11 models that may go" in found.words
+@pytest.mark.parametrize(("claims", "removal", "shown", "words"), ENDS.values(), ids=ENDS)
+def test_nothing_is_claimed_but_what_is_shown(run, claims, removal, shown, words):
+    found = ended(run, claims, removal)
+    assert (bool(found.gone), found.shown) == (removal is not None, shown)
+    assert words in found.words
 
 
 def test_where_fresh_runs_do_not_show_that_it_passes_it_says_so(run):

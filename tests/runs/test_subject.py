@@ -6,7 +6,7 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
-from ddenv.runs.folder import runs_folder
+from ddenv.runs.folder import BUNDLED_RUN, find_run, runs_folder
 from ddenv.runs.subject import named, open_subject, robot_file
 from ddenv.world.load import SCENARIOS, load_scenario
 from tests.conftest import DATA
@@ -40,6 +40,17 @@ def test_a_run_comes_before_a_bundled_scenario_and_a_file_before_both(here):
     (here / "ditch").mkdir()
     assert named("ditch") is named("no such thing") is None
     assert named("missing.ddenv")[0] == "run"
+
+
+def test_a_bundle_is_its_run_but_a_stored_run_of_its_name_comes_first(here):
+    run, stored = here / "ditch-1" / BUNDLED_RUN, runs_folder() / "ditch-1.ddenv"
+    run.parent.mkdir()
+    assert find_run("ditch-1") == stored
+    run.touch()
+    assert find_run("ditch-1").samefile(run)
+    stored.touch()
+    assert find_run("ditch-1") == stored
+    assert find_run(str(run.parent)) == run
 
 
 def test_a_run_is_opened_with_its_own_scenario_world_and_robot(here):

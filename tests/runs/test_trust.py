@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import AcceptModeChanged, EngineStarted
+from ddenv.runfile.events import EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
@@ -56,25 +56,23 @@ def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
     check_trusted(loaded, "mail.ddenv")
 
 
-@pytest.mark.parametrize(
-    ("brings", "file"), [("command", "sim.sh"), ("controller", "mine.py"), ("package", "whole/part.py")]
+# A program that has changed, and what Python would import first in its place.
+CHANGED = (
+    ("command", "sim.sh"),
+    ("controller", "mine.py"),
+    ("package", "whole/part.py"),
+    ("controller", "mine/__init__.py"),
+    ("controller", "mine.cpython-311-x86_64-linux-gnu.so"),
 )
-def test_a_program_that_has_changed_is_not_what_was_trusted(scenario, brings, file):
+
+
+@pytest.mark.parametrize(("brings", "file"), CHANGED)
+def test_another_program_is_not_what_was_trusted(scenario, brings, file):
     path = scenario(BRINGS[brings])
     trust(program_of(load_scenario(path)))
-    with (path.parent / file).open("a") as changed:
-        changed.write("# changed\n")
-    with pytest.raises(UserError):
-        check_trusted(load_scenario(path), path)
-
-
-@pytest.mark.parametrize("name", ["mine/__init__.py", "mine.cpython-311-x86_64-linux-gnu.so"])
-def test_what_python_would_import_first_is_not_what_was_trusted(scenario, name):
-    path = scenario(BRINGS["controller"])
-    trust(program_of(load_scenario(path)))
-    first = path.parent / name
-    first.parent.mkdir(exist_ok=True)
-    first.write_text("class Mine: ...")
+    changed = path.parent / file
+    changed.parent.mkdir(exist_ok=True)
+    changed.write_text("class Mine: ...")
     with pytest.raises(UserError):
         check_trusted(load_scenario(path), path)
 
@@ -128,14 +126,12 @@ COMMANDS = {
 @pytest.mark.parametrize("words", slow(pytest.mark.programs, COMMANDS, but=["resume", "test"]))
 @pytest.mark.parametrize("brings", ["command", "controller"])
 def test_a_mailed_run_starts_nothing(scenario, home, monkeypatch, capsys, words, brings):
-    from tests.command import in_process
+    from tests.command import in_process, is_one_line
 
     run = home / "mail.ddenv"
     create_run(load_scenario(scenario(BRINGS[brings])), run)
     done = in_process(monkeypatch, capsys, *[str(run) if word == "RUN" else word for word in COMMANDS[words]])
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "mail.ddenv" in done.stderr and "--trust" in done.stderr
+    is_one_line(done, "mail.ddenv", "--trust")
     assert not (home / "started").exists()
 
 
@@ -152,32 +148,16 @@ def test_no_engine_starts_it_either(scenario, home, brings):
 
 
 @pytest.mark.programs
-def test_what_the_user_trusts_starts_and_is_not_asked_about_again(scenario, home):
+@pytest.mark.parametrize("mailed", [True, False], ids=["mailed", "own"])
+def test_what_the_user_trusts_or_owns_starts_and_is_not_asked_about_again(scenario, home, mailed):
     from tests.command import ddenv
 
-    path, run = scenario(BRINGS["command"]), home / "mail.ddenv"
-    create_run(load_scenario(path), run)
-    env = os.environ | {"DDENV_HOME": str(home)}
-    done = ddenv("test", run, "--trust", "--json", env=env)
-    assert done.returncode == 0, done.stderr
+    subject, trusted, env = scenario(BRINGS["command"]), [], os.environ | {"DDENV_HOME": str(home)}
+    if mailed:
+        create_run(load_scenario(subject), home / "mail.ddenv")
+        subject, trusted = home / "mail.ddenv", ["--trust"]
+    for words in (trusted, []):
+        done = ddenv("test", subject, "--json", *words, env=env)
+        assert done.returncode == 0, done.stderr
+        assert len(json.loads(done.stdout)["runs"]) == 1
     assert (home / "started").exists()
-    assert len(json.loads(ddenv("test", run, "--json", env=env).stdout)["runs"]) == 1
-
-
-@pytest.mark.programs
-def test_a_scenario_of_the_users_own_starts_by_its_name(scenario, home):
-    from tests.command import ddenv
-
-    done = ddenv("test", scenario(BRINGS["command"]), "--json", env=os.environ | {"DDENV_HOME": str(home)})
-    assert done.returncode == 0, done.stderr
-    assert (home / "started").exists()
-
-
-def test_a_run_file_is_the_users_own_until_it_is_opened_to_others(home):
-    run = home / "run.ddenv"
-    create_run(load_scenario(DATA / "wall.yaml"), run)
-    assert run.stat().st_mode & 0o777 == 0o600
-    run.chmod(0o640)
-    with RunFile(run) as file:
-        file.append(AcceptModeChanged("ask"))
-    assert run.stat().st_mode & 0o777 == 0o640

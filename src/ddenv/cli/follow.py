@@ -22,6 +22,8 @@ from ddenv.text import printable
 from ddenv.words.news import headline, news
 
 POLL = 0.2
+# Takes back the line of a terminal.
+CLEAR = "\r\x1b[K"
 
 
 @dataclass(eq=False)
@@ -51,22 +53,21 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
     Raises UserError and Interrupted.
     """
     signal.signal(signal.SIGTERM, _interrupt)
-    view = _View(sys.stderr if as_json else sys.stdout)
+    out = sys.stderr if as_json else sys.stdout
     interrupted = False
     with RunFile(path) as file:
         follower = Follower(file, fold(file.events()))
         before = follower.state.revision
-        view.now(follower.state, None)
         try:
             while engine.poll() is None:
-                view.update(file, follower)
+                _show(file, follower, out)
                 time.sleep(POLL)
         except KeyboardInterrupt:
             interrupted = True
             with contextlib.suppress(KeyboardInterrupt):
                 stop_engines([(file, engine)])
-        view.update(file, follower)
-    view.close()
+        _show(file, follower, out)
+    print(CLEAR if out.isatty() else "", end="", file=out, flush=True)
     state = follower.state
     if interrupted:
         raise Interrupted(state)
@@ -83,22 +84,12 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-class _View:
-    """A line for each important event; on a terminal, also the latest state below them."""
-
-    def __init__(self, out: TextIO) -> None:
-        self._out, self._terminal = out, out.isatty()
-        self._begin = "\r\x1b[K" if self._terminal else ""
-
-    def update(self, file: RunFile, follower: Follower) -> None:
-        for event, before, after in follower.new():
-            if line := news(event.kind, before, after):
-                print(f"{self._begin}{printable(line)}", file=self._out, flush=True)
-        self.now(follower.state, max((live.time for live in file.live()), default=None))
-
-    def now(self, state: RunState, simulated: float | None) -> None:
-        if self._terminal:
-            print(f"{self._begin}{printable(headline(state, simulated))}", end="", file=self._out, flush=True)
-
-    def close(self) -> None:
-        print(self._begin, end="", file=self._out, flush=True)
+def _show(file: RunFile, follower: Follower, out: TextIO) -> None:
+    """A line for each new event that matters; on a terminal, also the latest state below them."""
+    clear = CLEAR if out.isatty() else ""
+    for event, before, after in follower.new():
+        if line := news(event.kind, before, after):
+            print(f"{clear}{printable(line)}", file=out, flush=True)
+    if clear:
+        simulated = max((live.time for live in file.live()), default=None)
+        print(f"{clear}{printable(headline(follower.state, simulated))}", end="", file=out, flush=True)

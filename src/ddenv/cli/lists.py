@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -20,9 +19,6 @@ from ddenv.runs.folder import find_run, runs_folder
 from ddenv.schemas import Kind, explanation, names
 from ddenv.text import printable
 
-if TYPE_CHECKING:
-    from ddenv.workbench.runs.recent_runs import Recent
-
 TITLES: dict[Kind, str] = {
     "partitioning": "partitionings: how the environment is split",
     "prioritization": "prioritizations: in which order the parts are tried",
@@ -34,26 +30,18 @@ SIGNS = {"ok": " ", "note": "!", "wrong": "✗"}
 @click.command("runs")
 def runs_command() -> int:
     """Lists the runs."""
-    lines = run_lines(runs_folder())
-    print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
-    return 0
-
-
-def run_lines(folder: Path) -> list[str]:
-    """One line a run, last changed first: name, status, models left, tests. A damaged file says so in its line."""
     from ddenv.workbench.runs.recent_runs import RunsFolder
 
-    found = RunsFolder(folder).look()
+    found = RunsFolder(runs_folder()).look()
+    if not found:
+        print(f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
     width = max((len(run.path.stem) for run in found), default=0)
-    return [printable(f"{run.path.stem:<{width}}  {_line(run)}") for run in found]
-
-
-def _line(run: Recent) -> str:
-    if run.trouble:
-        return run.trouble
-    status = "minimal" if run.minimal else "engine not running" if run.status == "lost" else run.status
-    size = f"{len(run.kept)} of {run.total} models"
-    return f"{status:<18}  {size:<20}  {run.tests} tests"
+    for run in found:
+        status = "minimal" if run.minimal else "engine not running" if run.status == "lost" else run.status
+        size = f"{len(run.kept)} of {run.total} models"
+        says = run.trouble or f"{status:<18}  {size:<20}  {run.tests} tests"
+        print(printable(f"{run.path.stem:<{width}}  {says}"))
+    return 0
 
 
 @click.command("schemas")

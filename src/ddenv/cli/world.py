@@ -200,16 +200,13 @@ def _cell(text: str, columns: int, which: int) -> str:
 
 
 def _totals(world: World) -> str:
-    said = [f"{number} {kind}" for kind in ("replaced", "ignored") if (number := _count(world, kind))]
+    kinds = Counter(note.kind for note in world.notes)
+    said = [f"{kinds[kind]} {kind}" for kind in ("replaced", "ignored") if kinds[kind]]
     stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
     why = f"; {they} since others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
     return f"{models}; {', '.join(said) or 'nothing was replaced or ignored'}"
-
-
-def _count(world: World, kind: str) -> int:
-    return sum(note.kind == kind for note in world.notes)
 
 
 # Its map.

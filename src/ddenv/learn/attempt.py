@@ -118,8 +118,14 @@ class Attempt:
         self.ended = False
         self._chain: list[tuple[str, ...]] = [oracle.models]
         for move in moves:
+            what, _, names = move.partition(" ")
             try:
-                self._make(move)
+                if what == "test":
+                    self.test(names.split())
+                elif what == "back":
+                    self.back()
+                elif what == "end":
+                    self.end()
             except UserError:
                 return
 
@@ -168,15 +174,6 @@ class Attempt:
         if not self.ended:
             self.ended = True
             self.moves += ("end",)
-
-    def _make(self, move: str) -> None:
-        what, _, names = move.partition(" ")
-        if what == "test":
-            self.test(names.split())
-        elif what == "back":
-            self.back()
-        elif what == "end":
-            self.end()
 
     # What it is worth.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -131,8 +131,7 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
             test, (candidate, again) = state.tests[event.test - 1], begun[event.test]
             turns.append(Turn(candidate, test.round or 0, test.outcome, state.environment, again))
         elif turns and state.environment is not turns[-1].left:
-            last = turns[-1]
-            turns[-1] = Turn(last.candidate, last.round, last.outcome, state.environment, last.again)
+            turns[-1] = replace(turns[-1], left=state.environment)
     if not turns:
         raise UserError(f"{run}: has no tests of a search yet")
     # While fresh runs certify its end, no test of the search is left.
@@ -147,24 +146,16 @@ def _method(state: RunState) -> str:
     return f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
 
 
-@dataclass(frozen=True, slots=True)
-class Tally:
-    """The tests of a search by what they were good for: `spent` has a number for each of `KINDS`; they add up to all tests.
-
-    `steps` says how many models each test that showed f took away.
-    """
-
-    spent: dict[str, int]
-    steps: tuple[int, ...]
+def spent(play: Play, tests: int | None = None) -> dict[str, int]:
+    """How many tests of a search, of the first so many `tests` or of all, were good for what, by `KINDS`."""
+    return dict.fromkeys(KINDS, 0) | Counter(map(kind_of, play.turns[:tests]))
 
 
-def tally(play: Play, tests: int | None = None) -> Tally:
-    """What the tests of a search were good for; the first so many `tests`, or all."""
-    turns = play.turns[:tests]
-    lefts = (play.begins, *(turn.left for turn in turns))
-    gone = [len(before) - len(after) for before, after in pairwise(lefts)]
-    steps = (size for size, turn in zip(gone, turns, strict=True) if turn.outcome == "similar" and size > 0)
-    return Tally(dict.fromkeys(KINDS, 0) | Counter(map(kind_of, turns)), tuple(steps))
+def reductions(play: Play) -> list[int]:
+    """How many models each test that showed f took away."""
+    lefts = [len(play.begins), *(len(turn.left) for turn in play.turns)]
+    gone = zip(play.turns, pairwise(lefts), strict=True)
+    return [before - after for turn, (before, after) in gone if turn.outcome == "similar" and before > after]
 
 
 def kind_of(turn: Turn) -> str:
@@ -236,16 +227,17 @@ def result(plays: Sequence[Play]) -> tuple[str, ...]:
 
 def why(first: Play, last: Play) -> str:
     """Why `first` needed fewer tests than `last`: the kind of tests that makes up most of the difference."""
-    quick, slow = tally(first), tally(last)
-    most = max(KINDS, key=lambda kind: slow.spent[kind] - quick.spent[kind])
+    quick, slow = spent(first), spent(last)
+    most = max(KINDS, key=lambda kind: slow[kind] - quick[kind])
     if most != "f showed":
-        fewer = f"only {count(quick.spent[most], 'time')}" if quick.spent[most] else "never"
-        return f"{last.name} {KINDS[most]} {count(slow.spent[most], 'time')}, {first.name} {fewer}."
-    return f"{first.name} got there in {_in_steps(quick)}, {last.name} in {_in_steps(slow)}."
+        fewer = f"only {count(quick[most], 'time')}" if quick[most] else "never"
+        return f"{last.name} {KINDS[most]} {count(slow[most], 'time')}, {first.name} {fewer}."
+    return f"{first.name} got there in {_in_steps(first)}, {last.name} in {_in_steps(last)}."
 
 
-def _in_steps(tally: Tally) -> str:
-    return f"{count(len(tally.steps), 'reduction')} of {', '.join(map(str, tally.steps)) or 'no'} models"
+def _in_steps(play: Play) -> str:
+    sizes = reductions(play)
+    return f"{count(len(sizes), 'reduction')} of {', '.join(map(str, sizes)) or 'no'} models"
 
 
 def _ends(plays: Sequence[Play]) -> tuple[str, ...]:

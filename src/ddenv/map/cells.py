@@ -55,7 +55,10 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
     sizes = np.bincount(grid[grid >= 0], minlength=len(centers))
     seen = seen[np.lexsort((-sizes[seen], signs.rank[seen], ~signs.sure[seen]))]
     if len(seen) * ROOM > rows * columns:
-        kept = _readable(cells[seen] // BLOCK, signs.sure[seen])
+        # The sure ones, and the first of each block.
+        blocks: np.ndarray = cells[seen] // BLOCK
+        kept: np.ndarray = signs.sure[seen].copy()
+        kept[np.unique(blocks[:, 0] << 20 | blocks[:, 1], return_index=True)[1]] = True
         _, first = np.unique(signs.groups[seen], return_index=True)
         if sum(len(signs.texts[index]) for index in seen[first].tolist()) * LEAST_ROOM <= rows * columns:
             kept[first] = True
@@ -82,13 +85,6 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
         if any(put(index, *cell) for cell in _around(grid, index, len(signs.texts[index]))):
             groups.add(group)
     return placed
-
-
-def _readable(blocks: np.ndarray, sure: np.ndarray) -> np.ndarray:
-    """Which signs are kept if there are too many: the sure ones, and the first of each block."""
-    kept: np.ndarray = sure.copy()
-    kept[np.unique(blocks[:, 0] << 20 | blocks[:, 1], return_index=True)[1]] = True
-    return kept
 
 
 def _around(grid: np.ndarray, index: int, length: int) -> list[Cell]:

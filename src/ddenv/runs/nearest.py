@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import is_nearest
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
-from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_unknown, where_they_part
+from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_words
 from ddenv.text import first_of
 from ddenv.words.claims import of_passing
 
@@ -53,13 +53,8 @@ class Nearest:
     def sentences(self) -> str:
         """All of it in a few sentences."""
         said = f"{self.words[:1].upper()}{self.words[1:]}."
-        if (parting := self.parting) is None:
-            return f"{said} {parting_unknown(self.lacks)}".rstrip()
-        said += f" {where_they_part(parting)}"
-        if parting.met is None:
-            return said
-        did, first = "touches" if parting.touched else "senses", first_of((self.first,), 1)
-        return f"{said} Of what has to go, {first} takes part first: the robot {did} it after {parting.met:.1f} s."
+        met = f"Of what has to go, {first_of((self.first,), 1)} takes part first:"
+        return f"{said} {parting_words(self.parting, self.lacks, met)}".rstrip()
 
 
 def nearest(file: RunFile, state: RunState) -> Nearest | None:

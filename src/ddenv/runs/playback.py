@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,23 +68,17 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     except UserError:
         words = f"test {number}"
     rows, moving = array("d"), {}
-    for name, samples in _motions(file, number, lacks):
-        if name == ROBOT:
+    for name, samples in _stored(file, number, lacks).items():
+        table = _table(samples)
+        if not _makes_sense(table):
+            lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
+        elif name == ROBOT:
             rows = samples
         else:
-            moving[name] = _table(samples)
+            moving[name] = table
     if not rows:
         lacks.append(f"The run file has no way of the robot in test {number}: nothing moves here.")
     return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
-
-
-def _motions(file: RunFile, number: int, lacks: list[str]) -> Iterator[tuple[str, array[float]]]:
-    """The motions that can be played; of the others it is said that they are damaged."""
-    for name, samples in _stored(file, number, lacks).items():
-        if _makes_sense(_table(samples)):
-            yield name, samples
-        else:
-            lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
 
 
 def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:

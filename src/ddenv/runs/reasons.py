@@ -209,21 +209,21 @@ def _point(place: tuple[float, float]) -> str:
 
 def parting_sentence(reason: Reason) -> str:
     """Where the ways with and without the models part, in one or two sentences; "" if no pair of runs shows it."""
-    one = reason.parting
+    it = "it" if len(reason.gone) == 1 else "one of them"
+    return parting_words(reason.parting, reason.lacks, f"With {it} there,", it)
+
+
+def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> str:
+    """Where two ways part, or why that is not known; then a sentence that begins with `met`, if the robot met `it`."""
     if one is None:
-        return parting_unknown(reason.lacks)
+        return f"Where the ways part is not known: {lacks}." if lacks else ""
     if one.met is None:
-        return where_they_part(one)
-    it, met = "it" if len(reason.gone) == 1 else "one of them", "touches" if one.touched else "senses"
-    return f"{where_they_part(one)} With {it} there, the robot {met} {it} after {one.met:.1f} s."
+        return _where_they_part(one)
+    did = "touches" if one.touched else "senses"
+    return f"{_where_they_part(one)} {met} the robot {did} {it} after {one.met:.1f} s."
 
 
-def parting_unknown(lacks: str) -> str:
-    """That it is not known where two ways part, and why the run file `lacks` it; "" if it lacks nothing."""
-    return f"Where the ways part is not known: {lacks}." if lacks else ""
-
-
-def where_they_part(one: Parting) -> str:
+def _where_they_part(one: Parting) -> str:
     """When two runs begin to differ, and when and where they are visibly apart, in one sentence."""
     if one.apart is None or one.place is None:
         # Their ways may be equal to the end.

@@ -11,7 +11,7 @@ from textual.app import ComposeResult
 from textual.containers import Container, Vertical, VerticalScroll
 from textual.widgets import Static
 
-from ddenv.learn.race import Play, Race, Turn, plays_of_runs, result, tally
+from ddenv.learn.race import Play, Race, Turn, plays_of_runs, result, spent
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.snapshot import Snapshot
@@ -207,8 +207,8 @@ def _table(race: Race) -> Text:
     heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
     text = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
     for play in race.plays:
-        spent = tally(play, race.at).spent
-        cells = "".join(f"{spent[kind] or '':>{len(head)}}" for kind, head in heads.items())
+        numbers = spent(play, race.at)
+        cells = "".join(f"{numbers[kind] or '':>{len(head)}}" for kind, head in heads.items())
         name = shortened(plain(play.name), width)
         text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
     return text
