@@ -148,6 +148,11 @@ scenario_options = together(
     ),
     click.option("--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."),
     click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
+    click.option(
+        "--remembered/--no-remembered",
+        default=True,
+        help="Use what you chose in the workbench for files that the world lacks.",
+    ),
 )
 
 # For commands that read an SDF world with references to other files.

@@ -55,6 +55,14 @@ def _log(place: Path, run: Path) -> BinaryIO:
     return os.fdopen(os.open(place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, mode_beside(run)), "ab")
 
 
+def export_mcap(run: Path, file: Path) -> None:
+    """Writes what the robot sensed and did; the runs are made again by Drake in a process of their own. Raises UserError."""
+    words = [sys.executable, "-m", "ddenv", "export", "--mcap", str(file), "--", str(run)]
+    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    if done.returncode:
+        raise UserError((done.stderr.strip().splitlines() or ["the program ended"])[-1].removeprefix("ddenv: "))
+
+
 def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen[bytes]]]) -> None:
     """Asks all engines to stop, and waits for them; finished tests stay in their runs."""
     for file, engine in engines:

@@ -15,6 +15,7 @@ from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import SUFFIX, find_run
+from ddenv.runs.remedies import with_remembered
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
 from ddenv.world.access import read_bytes, write_file
@@ -59,7 +60,7 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
     if kind != "run":
         scenario = scenario_named(name, given, announce)
         return Subject(scenario, *load_parts(scenario, announce))
-    if any(value is not None and value != () for value in given.values()):
+    if any(value is not None and value != () for option, value in given.items() if option != "remembered"):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore are only for scenarios; "
             "a run keeps its own"
@@ -100,6 +101,7 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     Raises UserError.
     """
     others = dict(given)
+    remembered = others.pop("remembered", False)
     reading = {option: others.pop(option) for option in READING}
     spawn, goal = given["spawn"], given["goal"]
     if Path(name).suffix.lower() not in WORLD_FILES:
@@ -114,7 +116,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     else:
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
-    return with_options(scenario, reading=read_as, **others)
+    scenario = with_options(scenario, reading=read_as, **others)
+    return with_remembered(scenario, announce) if remembered else scenario
 
 
 def reading_of(

@@ -26,7 +26,11 @@ KINDS = (
     ("world", "world (SDF)", (".sdf", ".world")),
     ("scenario", "scenario (YAML)", (".yaml", ".yml")),
     ("report", "report (HTML)", (".html", ".htm", ".md")),
+    ("bundle", "bundle (ZIP)", (".zip",)),
+    ("mcap", "messages (MCAP)", (".mcap",)),
+    ("test", "pytest (folder)", ("",)),
 )
+TICKED = ("world", "scenario", "report")
 # Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
 
@@ -74,7 +78,7 @@ class ExportScreen(ModalScreen[None]):
                 yield PathEntry(str(_here()), id="export-folder")
             for (id, title, _), name in zip(KINDS, names, strict=True):
                 with Horizontal(classes="row"):
-                    yield Tick(title, True, id=f"export-{id}", compact=True, classes="name")
+                    yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")
                     yield Input(name, id=f"export-{id}-name", compact=True)
             with VerticalScroll(id="export-results", can_focus=False):
                 yield Static("", id="export-words", markup=False)
@@ -182,10 +186,10 @@ class ExportScreen(ModalScreen[None]):
         self.query_one("#export-wrong", Static).update(wrong)
 
 
-def suggested(run: Path) -> tuple[str, str, str]:
-    """Names for world, scenario and report of a run."""
+def suggested(run: Path) -> tuple[str, ...]:
+    """Names for what can be written of a run, in the order of `KINDS`."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
-    return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html"
+    return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html", f"{stem}.zip", f"{stem}.mcap", "."
 
 
 def _here() -> Path:
@@ -226,6 +230,9 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
         if id == "report":
             yield from files_of_report(path)
             continue
+        # A bundle and a test replace nothing.
+        if id in ("bundle", "test"):
+            continue
         yield path
         if id == "scenario":
             yield from (path.with_suffix(f".robot{kind}") for kind in (".sdf", ".urdf"))
@@ -233,8 +240,10 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
 
 def write(run: Path, wanted: Wanted) -> Iterator[str]:
     """Writes the files; yields a line for each. Raises UserError for the first that cannot be written."""
+    from ddenv.report.bundle import write_bundle, write_test
     from ddenv.report.report import write_report
     from ddenv.runs.export import export_world
+    from ddenv.runs.programs import export_mcap
 
     if "world" in wanted:
         exported = export_world(run, wanted["world"], wanted.get("scenario"))
@@ -244,3 +253,10 @@ def write(run: Path, wanted: Wanted) -> Iterator[str]:
             yield f"the world still needs {first_of(needs, MOST_NEEDS)}"
     if "report" in wanted:
         yield from (f"wrote {plain(path)}" for path in write_report(run, wanted["report"], force=True))
+    if "bundle" in wanted:
+        yield from (f"wrote {plain(path)}" for path in write_bundle(run, wanted["bundle"]))
+    if "test" in wanted:
+        yield from (f"wrote {plain(path)}" for path in write_test(run, wanted["test"]))
+    if "mcap" in wanted:
+        export_mcap(run, wanted["mcap"])
+        yield f"wrote {plain(wanted['mcap'])}"

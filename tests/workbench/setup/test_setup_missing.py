@@ -8,18 +8,11 @@ import pytest
 from textual.widgets import Input
 
 from ddenv.errors import UserError
+from ddenv.runs.remedies import KEPT, REMEDIES, remedy, remember_remedies, remembered
 from ddenv.runs.remembered import state_file
-from ddenv.runs.subject import load_parts
+from ddenv.runs.subject import load_parts, scenario_named
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.setup.missing_files import (
-    KEPT,
-    REMEDIES,
-    AskRemedy,
-    MissingList,
-    remedy,
-    remember_remedies,
-    remembered,
-)
+from ddenv.workbench.setup.missing_files import AskRemedy, MissingList
 from ddenv.world.model import Box, Cylinder
 from tests.workbench.setup.setup_session import Opened
 
@@ -185,3 +178,16 @@ async def test_the_question_for_the_start_says_how_to_come_to_the_map_and_comes_
         assert session.screen.focused is session.screen.query_one(WorldMap)
         assert "the start: move the crosshair" in session.told("picking")
         assert "press s for the start, on the map" in session.told("cost")
+
+
+def test_commands_use_what_the_workbench_remembers_and_say_so(depot):
+    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none", "model://another": "auto"})
+    given = {"model_path": (), "stand_in": (), "ignore": (), "spawn": (0, 0, 0.2, 0), "goal": (9, 0), "world": None}
+    said = []
+    scenario = scenario_named(str(depot), {**given, "remembered": True}, said.append)
+    world, _ = load_parts(scenario)
+    assert {model.name for model in world.models if model.name in ("one", "two")} == {"one", "two"}
+    assert all(name in said[-1] for name in (BARREL, SHELF, str(state_file(REMEDIES)), "--no-remembered"))
+    assert "another" not in said[-1]
+    with pytest.raises(UserError, match="construction_barrel"):
+        load_parts(scenario_named(str(depot), {**given, "remembered": False}))

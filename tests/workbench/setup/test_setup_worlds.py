@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input, OptionList, Static
 
+from ddenv.runs.remedies import REMEDIES, remembered
 from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.files import KEPT, RECENT, FileList, OpenFile, recent_files, remember
-from ddenv.workbench.setup.missing_files import REMEDIES, remembered
 from ddenv.workbench.setup.preview import PLACES, places_of, remember_places
 from tests.workbench.setup.setup_session import Opened, write_scenario
 

@@ -21,7 +21,7 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
-from ddenv.runs.remembered import read_state, write_state
+from ddenv.runs.remedies import remedy, remembered, with_remedies
 from ddenv.text import count, plain
 from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
@@ -37,8 +37,6 @@ none       without it
 /a/folder  the folder that holds its model's folder; tab completes
 box:x,y,z  or cylinder:radius,length, or sphere:radius (m)
 It is used in every world that names this file."""
-REMEDIES = "remedies.json"
-KEPT = 1000  # URIs
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,46 +50,6 @@ class Missing:
     uri: str
     remedy: str
     words: str
-
-
-def remembered() -> dict[str, str]:
-    """The remedies that the user chose so far, by URI."""
-    found = read_state(REMEDIES)
-    if not isinstance(found, dict):
-        return {}
-    return {uri: text for uri, text in found.items() if isinstance(text, str) and _is_usable(text)}
-
-
-def remember_remedies(chosen: Mapping[str, str]) -> None:
-    """Remembers the remedies of some URIs; "" forgets one."""
-    known = {uri: text for uri, text in remembered().items() if uri not in chosen}
-    known |= {uri: text for uri, text in chosen.items() if text}
-    write_state(REMEDIES, dict(list(known.items())[-KEPT:]))
-
-
-def remedy(text: str) -> str:
-    """What the user typed, as a remedy: a stand-in, or else the path of a folder. Raises UserError."""
-    from ddenv.world.access import is_folder, without_tilde
-    from ddenv.world.sdf.standin import AUTO, NONE, parse_stand_in
-
-    text = text.strip()
-    names_folder = text not in ("", AUTO, NONE) and is_folder(Path(text))
-    if "/" in text or text.startswith(("~", ".")) or names_folder:
-        folder = without_tilde(text).absolute()
-        if not is_folder(folder):
-            raise UserError(f"{folder} is a file; name a folder" if folder.exists() else f"there is no folder {folder}")
-        return str(folder)
-    stand_in = parse_stand_in(text, "remedy") if text else AUTO
-    if isinstance(stand_in, str) and stand_in not in (AUTO, NONE):
-        raise UserError(f"{text} is for single meshes, with --stand-in; auto takes the box around the visuals, too")
-    return text
-
-
-def _is_usable(text: str) -> bool:
-    try:
-        return bool(remedy(text))
-    except UserError:
-        return False
 
 
 def read_with_remedies(
@@ -127,14 +85,6 @@ def read_with_remedies(
         chosen,
         tuple(Missing(uri, text, _words(uri, text, vain.get(uri, ""), world)) for uri, text in found.items()),
     )
-
-
-def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[str, Any]:
-    """The `options` of the command line that say the same as the remedies, too."""
-    folders = tuple(dict.fromkeys(Path(text) for text in found.values() if text.startswith("/")))
-    stand_ins = tuple(f"{uri}={text}" for uri, text in found.items() if text and not text.startswith("/"))
-    more = {"model_path": folders, "stand_in": stand_ins}
-    return {**options, **{name: (*options.get(name, ()), *each) for name, each in more.items() if each}}
 
 
 def _words(uri: str, text: str, vain: str, world: World) -> str:

@@ -19,6 +19,7 @@ from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
 from ddenv.map.raster import arrow
+from ddenv.runs.remedies import remember_remedies
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
@@ -29,7 +30,7 @@ from ddenv.workbench.setup.choice import Choice, read_choice, spawn_height
 from ddenv.workbench.setup.costs import Past, past_of
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import remember
-from ddenv.workbench.setup.missing_files import MissingList, remember_remedies
+from ddenv.workbench.setup.missing_files import MissingList
 from ddenv.workbench.shared.background import call_if_open
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
