@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.cli.summary import summary, summary_lines
+from ddenv.cli.terminal import announce, say, wrapped
 from ddenv.errors import UserError
 from ddenv.runfile.fold import Follower, fold
 from ddenv.runfile.state import RunState
@@ -41,7 +43,11 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
     except Interrupted as interrupted:
         # It may have ended just then.
         state, code = interrupted.state, 0 if interrupted.state.certified else 130
-    print(json.dumps(summary(state, path)) if as_json else "\n".join(summary_lines(state, path)), flush=True)
+    if as_json:
+        print(json.dumps(summary(state, path)), flush=True)
+    else:
+        for line in summary_lines(state, path):
+            say(line)
     if code == 130:
         print(printable(f"interrupted; continue with: ddenv resume {path}"), file=sys.stderr)
     return code, state
@@ -66,6 +72,11 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
             interrupted = True
             with contextlib.suppress(KeyboardInterrupt):
                 stop_engines([(file, engine)])
+        except BrokenPipeError:
+            announce(
+                f"the engine goes on with {path}: 'ddenv open {path}' attaches to it, 'kill {engine.pid}' stops it"
+            )
+            raise
         _show(file, follower, out)
     print(CLEAR if out.isatty() else "", end="", file=out, flush=True)
     state = follower.state
@@ -89,7 +100,8 @@ def _show(file: RunFile, follower: Follower, out: TextIO) -> None:
     clear = CLEAR if out.isatty() else ""
     for event, before, after in follower.new():
         if line := news(event.kind, before, after):
-            print(f"{clear}{printable(line)}", file=out, flush=True)
+            lines = wrapped(printable(line), shutil.get_terminal_size().columns if clear else None)
+            print(clear + "\n".join(lines), file=out, flush=True)
     if clear:
         simulated = max((live.time for live in file.live()), default=None)
         print(f"{clear}{printable(headline(follower.state, simulated))}", end="", file=out, flush=True)

@@ -170,11 +170,8 @@ class Change:
     def refusal(self, now: Situation) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
             return ONLY_CHANGEABLE
-        try:
-            for name, value in self.asked.items():
-                _check(name, value)
-        except UserError as error:
-            return str(error)
+        if wrong := [why for name, value in self.asked.items() if (why := _wrong(name, value))]:
+            return "; ".join(wrong)
         new = self.new(now.state)
         budget, done = new.get("budget"), now.state.made
         if isinstance(budget, int) and budget <= done:
@@ -232,13 +229,17 @@ def typed(name: str, text: str) -> int | str | None:
         raise UserError(f"{name}: expected a whole number, found '{text[:20]}'") from None
 
 
-def _check(name: str, value: Any) -> None:
-    """Raises UserError for a value that the setting cannot have."""
+def _wrong(name: str, value: Any) -> str:
+    """Why the setting cannot have a value, or ""."""
     one = CHANGEABLE[name]
     if not one.allows(value):
         expected = one.range if one.kind is int else " or ".join(one.choices) or "a name"
-        raise UserError(f"{name}: expected {expected}, found {printable(str(value)[:20])}")
-    if name == "pair":
-        split_pair(str(value))
-    elif name == "algorithm":
-        check("algorithm", str(value))
+        return f"{name}: expected {expected}, found {printable(str(value)[:20])}"
+    try:
+        if name == "pair":
+            split_pair(str(value))
+        elif name == "algorithm":
+            check("algorithm", str(value))
+    except UserError as error:
+        return str(error)
+    return ""

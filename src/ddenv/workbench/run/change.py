@@ -98,16 +98,24 @@ class Change(ModalScreen[course.Change | None]):
         return str(field.value)
 
     def _command(self) -> course.Change:
-        """The command for the settings in the dialog. Raises UserError, which begins with the name of the wrong field."""
+        """The command for the settings in the dialog. Raises UserError, which begins with the name of the first wrong field."""
         kinds = {kind: str(self.query_one(f"#{kind}", Select).value) for kind in KINDS}
         asked: dict[str, Value] = {
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",
             "algorithm": kinds["algorithm"],
-            **{one.name: course.typed(one.name, self._text(one)) for one in OTHERS},
         }
+        wrong = []
+        for one in OTHERS:
+            try:
+                asked[one.name] = course.typed(one.name, self._text(one))
+            except UserError as error:
+                wrong.append(str(error))
         command = course.Change(course.Change(asked).new(self._state))
-        if why := command.refusal(Situation(self._state)):
-            raise UserError(why)
+        # Where a field is no number, that nothing else changes is no mistake.
+        if (command.settings or not wrong) and (why := command.refusal(Situation(self._state))):
+            wrong.append(why)
+        if wrong:
+            raise UserError("; ".join(wrong))
         return command
 
     @on(Input.Submitted)
