@@ -41,17 +41,23 @@ def spawn_pose(spawn: Spawn) -> Pose:
 
 def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
     """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground; it names a free place nearby."""
-    if (found := _obstacle(world.models, robot, spawn)) is None:
+    if (found := stands_inside(world, robot, spawn)) is None:
         return
-    model, depth, shape = found
-    # The hull of a hollow mesh fills space that looks free.
-    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
-    place = free_spawn(world, robot, spawn, depth)
+    why, place = found
     free = "move the spawn"
     if place is not None:
         free = f"free nearby: --spawn={place.x:g},{place.y:g},{place.z:g},{place.yaw:g}"
-    where = f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
-    raise UserError(f"{where}: the robot stands inside {what} '{model.name}' by {depth:.2f} m; {free}")
+    raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {free}")
+
+
+def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn | None] | None:
+    """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free."""
+    if (found := _obstacle(world.models, robot, spawn)) is None:
+        return None
+    model, depth, shape = found
+    # The hull of a hollow mesh fills space that looks free.
+    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
+    return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free_spawn(world, robot, spawn, depth)
 
 
 def _obstacle(models: Sequence[Model], robot: Model, spawn: Spawn) -> tuple[Model, float, Shape] | None:

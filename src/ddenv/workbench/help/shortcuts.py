@@ -149,7 +149,10 @@ class Help(Reading):
 
     def __init__(self, groups: Iterable[Group]) -> None:
         self.groups = tuple(groups)
-        super().__init__("Keys", [(each.title, self._rows(each)) for each in self.groups])
+        known = (shortcut for each in self.groups for shortcut in each.shortcuts)
+        palette = next((shortcut.keys for shortcut in known if shortcut.id == "app.commands"), "")
+        title = f"Keys · {palette} finds any command by its name" if palette else "Keys"
+        super().__init__(title, [(each.title, self._rows(each)) for each in self.groups])
 
     @staticmethod
     def _rows(group: Group) -> Iterator[tuple[str | Text, str | Text]]:

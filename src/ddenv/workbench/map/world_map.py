@@ -207,17 +207,24 @@ class WorldMap(Widget, can_focus=True):
         number, port = self._numbers.get(name), self.viewport
         if number is None or port.view is None:
             return False
-        center = self.place.prints[number].center
         drawn = self.picture
-        cell = drawn.cells.get(number) if drawn is not None and drawn.view == port.view else None
-        cell = cell or port.view.cell(*center)
-        if cell is None:
-            port.center_on(*center)
-        else:
-            port.cursor = cell
+        sign = drawn.cells.get(number) if drawn is not None and drawn.view == port.view else None
+        self.aim_at(*self.place.prints[number].center)
+        port.cursor = sign or port.cursor
         self._aim = (name, port.cursor, port.view)
         self.draw()
         return True
+
+    def aim_at(self, x: float, y: float) -> None:
+        """Moves the crosshair to a place, m, and the map if needed."""
+        port = self.viewport
+        cell = None if port.view is None else port.view.cell(x, y)
+        if cell is None:
+            port.center_on(x, y)
+        else:
+            port.cursor = cell
+        self._aim = None
+        self.draw()
 
     def mark(self, name: str | None) -> None:
         """Shows the crosshair on a model also without the focus; with None the map is again as it was."""

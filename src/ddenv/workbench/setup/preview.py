@@ -23,7 +23,7 @@ from ddenv.runs.remedies import remember_remedies
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.map.place import Place, place_of
+from ddenv.workbench.map.place import Place, Point, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice, read_choice, spawn_height
@@ -34,7 +34,11 @@ from ddenv.workbench.setup.missing_files import MissingList
 from ddenv.workbench.shared.background import call_if_open
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
-REMEDIES = {"drop": "lower the spawn's z", "inside": "move one model, or make both static"}
+REMEDIES = {
+    "start": "s moves it to a free place",
+    "drop": "lower the spawn's z",
+    "inside": "move one model, or make both static",
+}
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
 ASKS = {
     "start": "the start: move the crosshair and press enter, or click",
@@ -79,6 +83,8 @@ class Preview(Vertical):
         self.missing = MissingList(id="missing")
         self.choice: Choice | None = None
         self.picked_next = ""
+        # Where the robot has room, m, if it stands inside a model.
+        self._free: Point | None = None
         self.border_title = "World"
 
     def compose(self) -> ComposeResult:
@@ -109,7 +115,7 @@ class Preview(Vertical):
         self.pick("")
         self.workers.cancel_group(self, "notes")
         self._show_about()
-        self._show_notes(())
+        self._show_notes((), None)
         self.missing.show(())
         self.map.set_place(Place(), why)
 
@@ -200,6 +206,8 @@ class Preview(Vertical):
         """Starts picking "start", "heading" or "goal" on the map; "" ends it."""
         if what == "heading" and self.spawn is None:
             what = "start"
+        if what == "start" and self._free is not None:
+            self.map.aim_at(*self._free)
         self.picked_next = what
         self.map.picking = bool(what)
         for footer in self.screen.query(KeyFooter):
@@ -269,12 +277,13 @@ class Preview(Vertical):
 
     @work(thread=True, group="notes", exclusive=True)
     def _look_at_start(self, choice: Choice, spawn: tuple[float, ...] | None) -> None:
-        found = notes(choice, spawn)
+        found, free = notes(choice, spawn)
         if not get_current_worker().is_cancelled:
-            call_if_open(self, self._show_notes, found)
+            call_if_open(self, self._show_notes, found, free)
 
-    def _show_notes(self, found: tuple[tuple[str, str], ...]) -> None:
+    def _show_notes(self, found: tuple[tuple[str, str], ...], free: Point | None) -> None:
         """The first note is a line, hidden while there is none; the tooltip has all of them."""
+        self._free = free
         line = self.query_one("#start-notes", Static)
         line.display = bool(found)
         if found:
@@ -293,9 +302,9 @@ class Preview(Vertical):
         line.tooltip = words or None
 
 
-def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[str, str], ...]:
-    """What is wrong with the start, as the run would note it: a word and a sentence for each."""
-    from ddenv.world.placement import note_inside, notes_on_start
+def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[tuple[str, str], ...], Point | None]:
+    """What is wrong with the start, as the run would note it: a word and a sentence for each; and where it had better be, m."""
+    from ddenv.world.placement import note_inside, notes_on_start, stands_inside
     from ddenv.world.scenario import Spawn
 
     try:
@@ -304,9 +313,14 @@ def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[str, s
         # Start then reports the file's error.
         robot = None
     if robot is None or spawn is None:
-        return tuple(note_inside(choice.world))
+        return tuple(note_inside(choice.world)), None
     x, y, z, yaw = spawn
-    return tuple(notes_on_start(choice.world, robot, Spawn(x=x, y=y, z=z, yaw=yaw)))
+    start = Spawn(x=x, y=y, z=z, yaw=yaw)
+    others = tuple(notes_on_start(choice.world, robot, start))
+    if (inside := stands_inside(choice.world, robot, start)) is None:
+        return others, None
+    why, place = inside
+    return (("start", why), *others), None if place is None else (place.x, place.y)
 
 
 def places_of(world: Path) -> dict[str, str] | None:
