@@ -145,7 +145,7 @@ def main() -> None:
 
 async def make_all() -> None:
     # What took part would leave five models, and no round with much to see.
-    run = new_run("ditch", slice=False)
+    run = new_run("ditch", slice=False, seeds="consecutive")
     start_engine(run, 1, accept_mode="ask")
     async with opened(run) as pilot:
         await begin(pilot, run)
@@ -505,7 +505,7 @@ def state(pilot: Pilot[int]) -> RunState:
     return run_screen(pilot).snapshot.state
 
 
-def new_run(name: str, **reduction: bool) -> Path:
+def new_run(name: str, **reduction: bool | str) -> Path:
     run = HOME / "runs" / f"{name}-1.ddenv"
     scenario = load_scenario(find_scenario(name))
     create_run(scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)}), run)

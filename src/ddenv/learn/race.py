@@ -294,7 +294,7 @@ def comparison(oracle: Oracle, plays: Sequence[Play], attempt: Attempt | None) -
     for play in plays:
         yield Line(play.name, play.tests, play.left, bool(oracle.could_go(play.left)))
     size = len(attempt.held) if attempt is not None and attempt.found else min(map(len, oracle.minimal), default=0)
-    yield Line(f"log2 C({len(oracle.models)}, {size})", bound(len(oracle.models), size))
+    yield Line("minimum", bound(len(oracle.models), size))
 
 
 def bound(models: int, needed: int) -> int:

@@ -277,13 +277,13 @@ def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence
     """
     if could_go:
         any_one = "any one of " if len(could_go) > 1 else ""
-        return f"not 1-minimal: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
+        return f"more can go: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
     if not left:
         return "nothing is left that can be removed"
-    known = f"1-minimal: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    known = f"no single one can go: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
     if smaller:
         return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
-    return f"{known}. No smaller set shows f, either, which 1-minimal alone does not promise"
+    return f"{known}. No smaller set shows f, either, which that alone does not promise"
 
 
 def usual_runs(state: RunState, now: Certificate) -> str:
