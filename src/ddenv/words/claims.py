@@ -280,7 +280,9 @@ def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence
         return f"more can go: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
     if not left:
         return "nothing is left that can be removed"
-    known = f"no single one can go: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    known = (
+        f"no single one can go: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    )
     if smaller:
         return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
     return f"{known}. No smaller set shows f, either, which that alone does not promise"
