@@ -97,7 +97,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
     pin = ("pin", {"models": [4]})
     async with Attached(run) as session:
         await session.press("p", "slash", *"04", "enter")
-        assert "The reduction to part A (11 → 4 models) waits for you" in session.dialog()
+        assert "Part A shows f and waits for you (11 → 4 models)" in session.dialog()
         assert session.asked() == []
         await session.press(answer)
         decided = [] if first is None else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]
@@ -106,7 +106,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
             run.write("pinned", models=[4])
             await session.look()
             happening = session.text("#happening")
-            assert "Pinned crate_04; the reduction to part A dropped; round 1 ended with 5 untried." in happening
+            assert "Pinned crate_04; part A, which waited, dropped; round 1 ended with 5 untried." in happening
             assert "Nothing showed f" not in happening
 
 

@@ -64,7 +64,7 @@ def test_typed_words_and_the_keys_of_the_screen_guide_the_run(run):
     assert commands(run) == [("accept", {"round": 1, "candidate": 0})]
     words = said(run, "veto part C", "p crate_07, crate_08", "yes", "pin nobody", "veto part Z", "veto", "dance", "pin")
     assert commands(run)[1:] == [("veto", {"round": 1, "candidate": 4}), ("pin", {"models": [7, 8]})]
-    assert "The reduction to part A (11 → 4 models) waits for you" in words
+    assert "Part A shows f and waits for you (11 → 4 models)" in words
     for why in ("no model 'nobody'", "no 'part Z' in this round", "no command 'dance'", "pin: which models?"):
         assert why in words
 

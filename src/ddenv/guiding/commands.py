@@ -17,7 +17,7 @@ from ddenv.guiding.situation import Situation, waiting
 from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.text import count, snake_case
+from ddenv.text import as_sentence, count, snake_case
 
 Command = CourseCommand | SelectionCommand
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
@@ -43,7 +43,7 @@ def drops(command: Command, state: RunState) -> str:
     if waits is None:
         return ""
     sizes = f"{len(state.environment)} → {count(waits.size, 'model')}"
-    return f"The reduction to {waits.label} ({sizes}) waits for you; a new search would drop it."
+    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it."
 
 
 def _begins_anew(command: Command, state: RunState) -> bool:

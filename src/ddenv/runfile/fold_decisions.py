@@ -41,7 +41,7 @@ def _cut_short(state: RunState) -> str:
     if current is None:
         return ""
     waits = state.waiting_candidate
-    dropped = "" if waits is None else f"; the reduction to {current.candidates[waits].label} dropped"
+    dropped = "" if waits is None else f"; {current.candidates[waits].label}, which waited, dropped"
     untried = len(current.untried)
     return dropped + (f"; round {current.number} ended with {untried} untried" if untried else "")
 
