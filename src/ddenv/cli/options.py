@@ -149,9 +149,12 @@ scenario_options = together(
     click.option("--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."),
     click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
     click.option(
-        "--remembered/--no-remembered",
+        "--no-remembered",
+        "remembered",
+        is_flag=True,
         default=True,
-        help="Use what you chose in the workbench for files that the world lacks.",
+        flag_value=False,
+        help="Do not use what you chose in the workbench for files that the world lacks.",
     ),
 )
 
