@@ -261,11 +261,11 @@ class Course:
         return tuple(play for name, play in self._opened.plays.items() if name not in secret)
 
     def keep(self, attempt: Attempt) -> None:
-        """After a move of the student's own search. The first search that ends counts."""
+        """After a move of the student's own search. Only one that succeeds counts: to try is no mistake."""
         self.score = replace(self.score, moves={**self.score.moves, str(self.step): attempt.moves})
         if attempt.ended:
-            found = attempt.found and len(attempt.tried) <= attempt.budget
-            self.score = self.score.with_answer(str(self.step), Answer("", found, ""))
+            if attempt.found and len(attempt.tried) <= attempt.budget:
+                self.score = self.score.with_answer(str(self.step), Answer("", True, ""))
             self.due = False
 
     def watched(self) -> None:

@@ -44,7 +44,7 @@ class TryScreen(LearnScreen[None]):
         ("only", "o", "test(True)", "test only", "test the marked models alone"),
         ("back", "u", "back", "undo", "undo: keep again what the last reduction took away"),
         ("done", "m", "done", "minimal", "say that no single model can go: the verdict"),
-        ("again", "n", "again", "new search", "begin again; the first result counts"),
+        ("again", "n", "again", "new search", "begin again"),
         HELP,
         ("on", "enter", "on", "back to the lesson", "back to the lesson, once the search is over"),
         ("close", "escape,q", "close", "leave", "back to the lesson; it is kept", "esc"),
