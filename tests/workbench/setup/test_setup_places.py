@@ -107,7 +107,8 @@ async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size
 async def test_the_crosshair_and_the_mouse_pick(scenarios):
     async with Opened() as session:
         places = Places(session)
-        await session.press("s", "enter")
+        # In the middle of the map stand crates.
+        await session.press("s", *["left"] * 20, "enter")
         x, y = float(session.value("spawn_x")), float(session.value("spawn_y"))
         assert "the heading" in places.says()
         await session.press("up", "up", "enter")
