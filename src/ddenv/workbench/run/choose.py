@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar
 
 from rich.text import Text
-from textual import events, on
+from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.screen import ModalScreen
@@ -27,11 +27,9 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
-        Binding("enter", "take", "take", False, priority=True, id="choose.take", tooltip="take the chosen ones"),
-        Binding("slash", "filter", "filter", id="choose.filter", tooltip="type any part of a name", key_display="/"),
         Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
         Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
-        Binding("space,tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
+        Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
     ]
 
     def __init__(
@@ -59,32 +57,30 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
-        keys = "space tick   enter take   / filter   escape" if self._several else "enter take it   escape cancel"
+        keys = "space tick   enter take   escape cancel" if self._several else "enter take it   escape cancel"
         with Framed("Models" if self._several else "Model", keys):
             yield Static(self._title, id="purpose", markup=False)
-            yield Input(placeholder="/ and part of a name", id="filter", compact=True)
+            yield Input(placeholder="part of a name", id="filter", compact=True)
             yield OptionList(id="names", compact=True, markup=False)
             yield Static("", id="found", markup=False)
 
     def on_mount(self) -> None:
-        self.query_one(OptionList if self._several else Input).focus()
+        self.query_one(Input).focus()
         self._filter()
 
-    def action_filter(self) -> None:
-        self.query_one(Input).focus()
-
-    def on_key(self, event: events.Key) -> None:
-        """Any other character filters at once: enter would take a name that nobody meant."""
-        field = self.query_one(Input)
-        if event.is_printable and event.character not in (" ", "/") and not field.has_focus:
-            field.focus()
-            field.insert_text_at_cursor(event.character or "")
-            event.stop()
-
     @on(Input.Changed)
+    def _typed(self) -> None:
+        """A space ticks the model under the cursor. It comes through the field, so that no key overtakes another."""
+        field = self.query_one(Input)
+        if self._several and " " in field.value:
+            field.value = field.value.replace(" ", "")
+            self.action_mark()
+        else:
+            self._filter()
+
     def _filter(self) -> None:
         """Lists the names with the typed part. Each key calls it first: fast typing is ahead of the message `Changed`."""
-        part = self.query_one(Input).value.strip().casefold()
+        part = self.query_one(Input).value.strip().lstrip("/").casefold()
         if part != self._part:
             self._part = part
             self._list(part)
@@ -135,7 +131,8 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     def _show_on_map(self, event: OptionList.OptionHighlighted) -> None:
         self._mark(self._listed[event.option_index])
 
-    def action_take(self) -> None:
+    @on(Input.Submitted)
+    def _take(self) -> None:
         """Takes the chosen names, or the one under the cursor."""
         self._filter()
         place = self.query_one(OptionList).highlighted
