@@ -115,3 +115,28 @@ async def test_what_is_wrong_is_said_in_the_dialog(run, folder):
         await settled(pilot)
         assert "no such run file" in told(pilot)
         assert not names(folder)
+
+
+async def test_a_bundle_and_a_test_are_written_where_they_are_ticked(run, folder):
+    async with dialog(run) as pilot:
+        for kind in ("world", "report", "bundle", "test"):
+            pilot.app.screen.query_one(f"#export-{kind}", Checkbox).toggle()
+        await pilot.pause()
+        await pilot.press("ctrl+s")
+        await settled(pilot)
+        assert names(folder) == ("crates-1.zip", "crates_1.ddenv", "test_crates_1.py")
+        # They replace nothing.
+        await pilot.press("ctrl+s")
+        await settled(pilot)
+        assert "crates-1.zip: exists already" in told(pilot)
+
+
+async def test_why_messages_cannot_be_written_is_told(run, folder):
+    async with dialog(run) as pilot:
+        for kind in ("world", "report", "mcap"):
+            pilot.app.screen.query_one(f"#export-{kind}", Checkbox).toggle()
+        await pilot.pause()
+        await pilot.press("ctrl+s")
+        await settled(pilot)
+        # Drake makes the runs again, and the robot of this run cannot drive.
+        assert told(pilot).startswith("robot 'robot': expected wheels on both sides") and names(folder) == ()

@@ -31,7 +31,7 @@ WORDS = (
     (duration, {0: "0 s", 59.4: "59 s", 100: "1 min 40 s", 7500: "2 h 05 min"}),
     # In a table they are short.
     (brief, {0.42: "0.4 s", 9.96: "10 s", 312: "312 s", 1500: "25 min", 40_000: "11 h"}),
-    # What is not known exactly is told roughly.
+    # What is not known exactly is rounded.
     (lambda times: about(*times), {(4.2, 8.1, 22): "8 s (4 to 20)", (61, 122, 301): "2 min (1 to 5)"}),
     (lambda times: about(*times), {(1, 1, 1): "1 s", (3000, 9000, 40_000): "2 h (1 to 10)", (0, 0, 0): "1 s"}),
     # Percentages are never rounded to certainty.

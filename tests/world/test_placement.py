@@ -167,6 +167,17 @@ def test_a_spawn_inside_a_model_names_it(spawn, model):
         check_spawn(WALL, HUSKY, spawn)
 
 
+@pytest.mark.parametrize("z", [0.45, -1.5], ids=["beside", "above"])
+def test_the_place_that_the_error_names_is_free_and_near(z):
+    start = Spawn(x=1.5, y=0, z=z)
+    with pytest.raises(UserError, match="free nearby: --spawn=") as told:
+        check_spawn(WALL, HUSKY, start)
+    named = str(told.value).partition("--spawn=")[2]
+    x, y, z, yaw = map(float, named.split(","))
+    assert (x, y, z) != (start.x, start.y, start.z) and math.dist((x, y), (start.x, start.y)) <= 3
+    check_spawn(WALL, HUSKY, Spawn(x=x, y=y, z=z, yaw=yaw))
+
+
 def test_turning_can_make_room():
     check_spawn(WALL, HUSKY, Spawn(x=1.45, y=0, z=0.45, yaw=math.pi / 2))
 

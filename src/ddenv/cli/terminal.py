@@ -21,7 +21,8 @@ def terminal_columns() -> int | None:
 
 
 def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
-    """`first` and `text` in lines of at most `columns`, broken between words; the lines below hang under the text.
+    """`first` and `text` in lines of at most `columns`, broken between words; the lines below hang under the text, which may be
+    indented.
 
     A word that is wider than a line, such as a path, comes in pieces. In one line if `columns` is None.
     """
@@ -30,6 +31,7 @@ def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
     from rich.console import Console
     from rich.text import Text
 
+    first += text[: len(text) - len(text.lstrip(" "))]
     lines = Text(" ".join(text.split())).wrap(Console(), max(LEAST, columns - width(first)))
     below = " " * width(first)
     return [f"{below if number else first}{line.plain.rstrip()}" for number, line in enumerate(lines or [Text()])]

@@ -109,30 +109,27 @@ def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tupl
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m (median)."""
+    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m: median and maximum.
+
+    Both are NaN where no distance is known.
+    """
 
     failure: str
     runs: int
     away: float
+    farthest: float
 
 
 def failing_instead(state: RunState, certificate: Certificate, claim: Claim) -> Instead | None:
     """What the robot does without a model that is needed, where it mostly fails otherwise and does not reach its goal."""
     if claim.verdict != "needed" or claim.without is None:
         return None
-    ends = Counter(
-        test.failure if test.outcome == "other" else test.outcome for test in runs_behind(state, certificate, claim)
-    )
-    del ends["similar"]
-    failure = max(ends, key=lambda end: ends[end], default="pass")
-    if failure == "pass":
+    runs = [test for test in runs_behind(state, certificate, claim) if test.outcome != "similar"]
+    ends = Counter(test.failure if test.outcome == "other" else "pass" for test in runs)
+    if not ends or (failure := ends.most_common(1)[0][0]) == "pass":
         return None
-    tests = (
-        test for test in runs_behind(state, certificate, claim) if test.outcome == "other" and test.failure == failure
-    )
-    return Instead(
-        failure, ends[failure], median([test.distance for test in tests if test.distance is not None] or [math.nan])
-    )
+    away = [test.distance for test in runs if test.failure == failure and test.distance is not None] or [math.nan]
+    return Instead(failure, ends[failure], median(away), max(away))
 
 
 def in_the_making(state: RunState) -> Certificate | None:

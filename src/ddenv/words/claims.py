@@ -285,7 +285,7 @@ def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence
     )
     if smaller:
         return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
-    return f"{known}. No smaller set shows f, either, which that alone does not promise"
+    return f"{known}. No smaller set shows f, either; only a look at all sets can tell"
 
 
 def usual_runs(state: RunState, now: Certificate) -> str:

@@ -322,19 +322,17 @@ def _instead_of_f(state: RunState) -> tuple[str, ...]:
     """What the robot does without models that f needs, where it mostly fails in another way; and what counts that as f."""
     if (certificate := current(state)) is None:
         return ()
-    said = [
-        f"Without {plain(str(claim.without))} {words}."
-        for claim in certificate.claims
-        if (words := instead(state, certificate, claim))
-    ]
-    ends = (failing_instead(state, certificate, claim) for claim in certificate.claims)
-    nearest = min((end.away for end in ends if end is not None and math.isfinite(end.away)), default=math.inf)
+    ends = {claim: end for claim in certificate.claims if (end := failing_instead(state, certificate, claim))}
+    said = [f"Without {plain(str(claim.without))} {instead(state, certificate, claim)}." for claim in ends][:NAMED_ENDS]
     epsilon = settings(state).epsilon
-    if nearest > NEAR * epsilon:
-        return tuple(said[:NAMED_ENDS])
-    wider = math.ceil(nearest * 10 + 1) / 10
-    same = f"If that is the same failure to you, a new run with epsilon {wider:g} m (now {epsilon:g} m) counts it as f."
-    return (*said[:NAMED_ENDS], same)
+    # Where no distance is known, it is not near.
+    farthest = min((end.farthest for end in ends.values() if end.farthest <= NEAR * epsilon), default=None)
+    if farthest is not None:
+        wider = math.floor(farthest * 10 + 1) / 10
+        said.append(
+            f"If that is the same failure to you, start again with epsilon {wider:g} m (now {epsilon:g} m): it counts these."
+        )
+    return tuple(said)
 
 
 def _reason(state: RunState, otherwise: str) -> str:

@@ -1,4 +1,4 @@
-"""The dialog that exports the result of a run: its reduced world, a scenario for it, and a report."""
+"""The dialog that exports a run: what is left as a world and a scenario, a report, a bundle, messages, a test."""
 
 from __future__ import annotations
 
@@ -141,9 +141,9 @@ class ExportScreen(ModalScreen[None]):
     def _path(self, folder: Path, id: str, title: str, endings: tuple[str, ...]) -> Path:
         name = self._value(f"{id}-name")
         if not name or not f"{folder}{name}".isprintable():
-            raise UserError(f"{title}: give a name that ends in {endings[0]}")
+            raise UserError(f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}")
         path = folder / without_tilde(name)
-        if path.suffix.lower() not in endings:
+        if endings[0] and path.suffix.lower() not in endings:
             raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
         return path
 

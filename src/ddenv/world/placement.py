@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, product, starmap
 
 import numpy as np
 
@@ -30,8 +30,8 @@ from ddenv.world.scenario import Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
-# The steps in which a free place is looked for, and how far, m.
-STEP, FAR = 0.1, 2.0
+# The steps in which a free place is looked for, and how far, m; and over how many floors at most.
+STEP, FAR, FLOORS = 0.2, 2.0, 3
 
 
 def spawn_pose(spawn: Spawn) -> Pose:
@@ -51,54 +51,56 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
 
 
 def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn | None] | None:
-    """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free."""
-    if (found := _obstacle(world.models, robot, spawn)) is None:
-        return None
-    model, depth, shape = found
-    # The hull of a hollow mesh fills space that looks free.
-    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
-    return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free_spawn(world, robot, spawn, depth)
+    """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free.
 
-
-def _obstacle(models: Sequence[Model], robot: Model, spawn: Spawn) -> tuple[Model, float, Shape] | None:
-    """The first model that the robot at `spawn` is inside of, how deep, m, and the shape; None if its place is free.
-
+    That is on a grid of `STEP`, at this height or just above what the robot is inside of, such as floors on the ground; None if
+    there is none within `FAR`.
     Raises UserError for a robot without collision shapes.
     """
+    shapes = [(model, one) for model in world.models for one in model.collisions]
+    boxes = stacked(filled_bounds(one) for _, one in shapes)
+    if (found := _obstacle(shapes, boxes, robot, spawn)) is None:
+        return None
+    model, depth, shape = found
+
+    def moved(x: float, y: float, z: float) -> Spawn:
+        places = {"x": round(spawn.x + x, 2), "y": round(spawn.y + y, 2), "z": round(spawn.z + z, 2)}
+        return spawn.model_copy(update=places)
+
+    heights = [0.0]
+    below: tuple[Model, float, Shape] | None = found
+    while below is not None and len(heights) <= FLOORS:
+        heights.append(heights[-1] + below[1] + 0.01)
+        below = _obstacle(shapes, boxes, robot, moved(0.0, 0.0, heights[-1]))
+    sides = [number * STEP for number in range(-round(FAR / STEP), round(FAR / STEP) + 1)]
+    moves = sorted(product(sides, sides, heights), key=lambda move: math.hypot(*move))
+    free = next((place for place in starmap(moved, moves) if _obstacle(shapes, boxes, robot, place) is None), None)
+    # The hull of a hollow mesh fills space that looks free.
+    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
+    return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free
+
+
+def _obstacle(
+    shapes: Sequence[tuple[Model, Collision]], boxes: Bounds, robot: Model, spawn: Spawn
+) -> tuple[Model, float, Shape] | None:
+    """The first model that the robot at `spawn` is inside of, how deep, m, and in which shape; None if its place is free.
+
+    `boxes` are around the shapes of all models, which come one model after another.
+    """
     place = spawn_pose(spawn) @ robot.pose.inverse()
-    box = bounds(robot.collisions, place)
-    if box is None:
+    own = bounds(robot.collisions, place)
+    if own is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
     bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
-    for model in models:
-        near = [one for one in model.collisions if _meet(box, filled_bounds(one))]
-        depths = [(_depth(body, one), one.shape) for one in near for body in bodies]
-        if depths and (deepest := max(depths, key=lambda each: each[0]))[0] > TOLERANCE:
-            return model, *deepest
-    return None
-
-
-def free_spawn(world: World, robot: Model, spawn: Spawn, depth: float = 0.0) -> Spawn | None:
-    """The nearest free place around `spawn`, on a grid of `STEP`, or `depth`, m, above it; None within `FAR` of it."""
-    sides = [number * STEP for number in range(-round(FAR / STEP), round(FAR / STEP) + 1)]
-    moves = [(x, y, 0.0) for x in sides for y in sides] + [(0.0, 0.0, depth + 0.01)]
-    near = [model for model in world.models if _within(model, spawn, 2 * FAR + depth)]
-    for move in sorted(moves, key=lambda move: math.hypot(*move)):
-        x, y, z = (round(value + by, 2) for value, by in zip((spawn.x, spawn.y, spawn.z), move, strict=True))
-        place = spawn.model_copy(update={"x": x, "y": y, "z": z})
-        if _obstacle(near, robot, place) is None:
-            return place
-    return None
-
-
-def _within(model: Model, spawn: Spawn, reach: float) -> bool:
-    here = np.array([spawn.x, spawn.y, spawn.z])
-    return any(_meet((here - reach, here + reach), filled_bounds(one)) for one in model.collisions)
-
-
-def _meet(one: Bounds, other: Bounds) -> bool:
-    """Whether two boxes overlap."""
-    return bool((one[0] <= other[1]).all() and (other[0] <= one[1]).all())
+    found: tuple[Model, float, Shape] | None = None
+    near = ((own[0] <= boxes[1]) & (boxes[0] <= own[1])).all(axis=1)
+    for model, one in (shapes[number] for number in np.flatnonzero(near).tolist()):
+        if found is not None and found[0] is not model:
+            break
+        depth = max(_depth(body, one) for body in bodies)
+        if depth > (TOLERANCE if found is None else found[1]):
+            found = model, depth, one.shape
+    return found
 
 
 def _depth(body: Hull, obstacle: Collision) -> float:

@@ -128,19 +128,18 @@ class LessonScreen(LearnScreen[bool]):
         self.query_one("#lesson-header", Static).update(self._heading())
         footer, due = self.query_one(KeyFooter), course.due and not course.is_open
         asked = page.question is not None and page.chosen is None
+        plain = not self._algorithm_is_due()
+        self.set_class(plain, "-plain")
         can = {
             "lesson.activity": course.activity or "",
             "lesson.skip": "skip" if asked or course.due else "",
             "lesson.hint": "hint" if asked and page.question is not None and page.question.hint else "",
             "lesson.back": "step back" if course.step else "",
-            "lesson.predict": "" if course.must_answer else "predict",
+            "lesson.predict": "" if plain or course.must_answer else "predict",
         }
-        plain = not self._algorithm_is_due()
-        self.set_class(plain, "-plain")
         # The keys of the run come with the algorithm.
         of_run = {"run_back": "run back", "run_on": "run on", "next_decision": "verdict", "next_reduction": "reduction"}
         can |= {f"lesson.{key}": "" if plain else words for key, words in (of_run | {"variables": "variables"}).items()}
-        can["lesson.predict"] = "" if plain else can["lesson.predict"]
         for id, words in can.items():
             footer.say(id, words)
         footer.say("lesson.on", f"{course.activity}" if due else "next lesson" if self._at_next else "go on")

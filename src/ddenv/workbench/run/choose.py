@@ -145,6 +145,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     def _clicked(self, event: OptionList.OptionSelected) -> None:
         if self._several:
             self._toggle(event.option_index)
+            self.query_one(Input).focus()
         else:
             self._close((self._listed[event.option_index],))
 
