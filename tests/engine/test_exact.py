@@ -117,14 +117,16 @@ def test_that_runs_repeat_is_asked_once(tmp_path):
     )
 
 
-def test_it_can_be_chosen_during_a_run(tmp_path, monkeypatch):
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_it_can_be_chosen_during_a_run(tmp_path, monkeypatch, jobs):
+    # With two workers one of them still runs a test when the new search begins.
     monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
 
     def guide():
         yield from until(lambda state: state.round is not None and state.round.number == 2)
         yield "change", {"settings": {"accept_rate": "exact", "exact_seeds": 1}}
 
-    state = guided(new_run(tmp_path, accept_rate="kept"), needs("wall", "beam"), guide())
+    state = guided(new_run(tmp_path, accept_rate="kept"), needs("wall", "beam"), guide(), jobs)
     assert state.environment == ("wall", "beam")
     assert state.certificate.seeds == (0,)
     assert [claim.runs for claim in state.certificate.claims] == [20, 1, 1]

@@ -376,6 +376,6 @@ async def test_the_footer_keeps_to_its_width(run):
             footer = session.screen.query_one(KeyFooter)
             assert len(footer.render().plain) <= width
             shown = {key.words for key in footer.entries}
-            assert {"help", "quit", "undo"} <= shown
-            # Nothing is left to be stepped, accepted or vetoed.
+            # What comes next, and nothing that is left to be stepped, accepted or vetoed.
+            assert {"help", "quit", "why", "isolate", "export"} <= shown
             assert not shown & {"pause", "step", "accept", "reject", "veto"}

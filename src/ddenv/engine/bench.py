@@ -198,7 +198,8 @@ class Bench:
     def made_again(self, test: KnownTest) -> RunResult | Broken | None:
         """As the function `made_again`, once all workers are idle."""
         while self._busy:
-            self.tick()
+            # A search that is due begins after this.
+            self._look_around(WAIT)
         return made_again(self._journal, self._pool, self._control, test)
 
     # Tries of the user.

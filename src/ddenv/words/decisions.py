@@ -47,7 +47,8 @@ def by_hand(state: RunState) -> tuple[str, ...]:
     """Tries that are not judged yet, and models that are pinned."""
     sentences = [_under_way(state, trial) for trial in state.trials if not trial.verdict]
     pinned = [shortened(name, LONGEST) for name in state.environment if name in state.pinned]
-    if pinned and not state.ended:
+    # What has just been pinned is said by how the search began.
+    if pinned and not state.ended and not (arrival(state) and state.decisions[-1].kind == "pin"):
         sentences.append(f"Pinned, and so in every candidate: {first_of(pinned, NAMED)}.")
     return tuple(sentences)
 

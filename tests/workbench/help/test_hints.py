@@ -13,7 +13,7 @@ from tests.tiers import slow
 from tests.waiting import eventually
 
 # What an input or a scrolled text does with them is no binding of the screen.
-OF_WIDGETS = {"enter", "up", "down", "tab"}
+OF_WIDGETS = {"enter", "up", "down", "tab", "space"}
 
 
 def hints(screen):
