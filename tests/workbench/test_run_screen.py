@@ -377,5 +377,5 @@ async def test_the_footer_keeps_to_its_width(run):
             assert len(footer.render().plain) <= width
             shown = {key.words for key in footer.entries}
             # What comes next, and nothing that is left to be stepped, accepted or vetoed.
-            assert {"help", "quit", "why", "isolate", "export"} <= shown
+            assert {"help", "quit", "why", "export"} <= shown
             assert not shown & {"pause", "step", "accept", "reject", "veto"}
