@@ -98,8 +98,8 @@ def between(low: float, high: float) -> str:
     return f"{rounded(low):,} to {rounded(high):,}" if low < high else f"{rounded(high):,}"
 
 
-def about(low: float, middle: float, high: float) -> str:
-    """A time in s with its interval, rounded to its uncertainty: 2 min (1 to 5)."""
+def about(middle: float, low: float = 0.0, high: float = 0.0) -> str:
+    """An estimated time in s, with its interval if there is one: 2 min (1 to 5)."""
     unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
     interval = f" ({between(low / unit, high / unit)})" if rounded(low / unit) < rounded(high / unit) else ""
     return f"{rounded(middle / unit):,} {name}{interval}"

@@ -8,7 +8,8 @@ import pytest
 from ddenv.evidence.certificate import Terms, error_of, falls, keeps, settle
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.runfile.fold import fold
-from ddenv.runs.tests_left import remaining, rough_run, rough_tests
+from ddenv.runfile.progress import narrowed
+from ddenv.runs.tests_left import left_said, remaining, rough_run, rough_tests
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
@@ -174,9 +175,9 @@ CERTIFICATE = certificate_tests(3.5 / 5, 2 / 3, 3, 4, 4)
 
 
 def test_the_certificate_is_left_after_the_search(run):
-    fake_moments.mid_round(run)
-    run.write("forecast", round=2, tests=[0, 1, 9], tests_done=10)
-    assert left(run).tests == tuple(a + b for a, b in zip((0, 1, 9), CERTIFICATE, strict=True))
+    state = state_of(fake_moments.mid_round(run))
+    search = (max(0, each - state.tests_done + state.forecast.tests_done) for each in state.forecast.tests)
+    assert left(run).tests == tuple(a + b for a, b in zip(search, CERTIFICATE, strict=True))
 
 
 def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
@@ -194,8 +195,9 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
 
     for made in range(1, 60):
         make(10_000 + made)
-        expected = certificate_tests(0.99, 0.8, 6, 4, 4, Made(made, (made, made)))
+        expected = narrowed((low, likely, high), certificate_tests(0.99, 0.8, 6, 4, 4, Made(made, (made, made))))
         assert left(run, at_work=False).tests == tuple(each - made for each in expected)
+        assert expected[2] <= high
     # All of them showed f.
     assert expected[2] < high
     for made in range(60, 150):
@@ -220,10 +222,26 @@ def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
     assert left(run) is None
 
 
+def test_each_forecast_narrows_the_one_before_unless_they_contradict_each_other(run):
+    fake_moments.mid_round(run)
+    run.go_back(0)
+    run.write("leg_started", round=3, n_partitions=None, rate=0.0)
+    for done, tests, narrower in (
+        (10, (40, 60, 90), (40, 60, 90)),
+        (15, (20, 60, 100), (35, 60, 85)),
+        (20, (40, 50, 60), (40, 50, 60)),
+        # More are left than were foretold.
+        (30, (70, 80, 99), (70, 80, 99)),
+    ):
+        run.write("forecast", round=3, tests=list(tests), tests_done=done)
+        assert state_of(run).forecast.tests == narrower
+
+
 def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(run):
     fake_moments.mid_round(run)
     run.write("forecast", round=2, tests=[0, 1, 2], tests_done=1)
     assert left(run) is None
+    assert left_said(state_of(run), True)[0] == "more tests than forecast"
     run.write("forecast", round=2, tests=[1, 5, 9], tests_done=9)
     assert left(run) is not None
     run.go_back(0)

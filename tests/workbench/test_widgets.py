@@ -32,8 +32,8 @@ WORDS = (
     # In a table they are short.
     (brief, {0.42: "0.4 s", 9.96: "10 s", 312: "312 s", 1500: "25 min", 40_000: "11 h"}),
     # What is not known exactly is rounded.
-    (lambda times: about(*times), {(4.2, 8.1, 22): "8 s (4 to 20)", (61, 122, 301): "2 min (1 to 5)"}),
-    (lambda times: about(*times), {(1, 1, 1): "1 s", (3000, 9000, 40_000): "2 h (1 to 10)", (0, 0, 0): "1 s"}),
+    (lambda times: about(*times), {(8.1, 4.2, 22): "8 s (4 to 20)", (122, 61, 301): "2 min (1 to 5)"}),
+    (lambda times: about(*times), {(1,): "1 s", (9000, 3000, 40_000): "2 h (1 to 10)", (0, 0, 0): "1 s"}),
     # Percentages are never rounded to certainty.
     (percent, {0: "0 %", 0.001: "<1 %", 0.5: "50 %", 0.999: ">99 %", 1: "100 %"}),
     (metres, {None: "", "x": "", float("nan"): "", float("inf"): ""}),

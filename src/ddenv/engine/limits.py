@@ -112,7 +112,8 @@ def _slow(state: RunState, rate: float) -> str:
     each = timeout / rate
     runs, jobs = asked.baseline_runs, max(1, state.jobs)
     baseline = duration(each * -(-runs // jobs))
-    whole = about(*(each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds))
+    low, likely, high = (each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds)
+    whole = about(likely, low, high)
     return (
         f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
         f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run about {whole}; "

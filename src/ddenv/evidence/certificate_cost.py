@@ -30,7 +30,7 @@ NEEDS, NEEDS_AGAINST = math.log(2.0 / error_of(1) * len(STAKES)), math.log(REFUT
 # had shown that.
 WORTH, WORTH_WITHOUT = 3, 4
 # Eight of ten rates are in the interval of so many standard deviations. How little may be left, as a share of all, until it ends.
-EIGHT_OF_TEN, LEAST_LEFT = 1.28, 0.3
+EIGHT_OF_TEN, LEAST_LEFT = 1.28, 0.1
 
 # Of so many runs (the second number), so many showed f.
 Shown = tuple[int, int]

@@ -13,7 +13,7 @@ from ddenv.evidence.certificate import Terms, falls, keeps, often, settle
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
-from ddenv.runfile.progress import Certificate, Claim, Isolation
+from ddenv.runfile.progress import Certificate, Claim, Isolation, narrowed
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
@@ -144,7 +144,10 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
 
 
 def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
-    """How many runs a certificate of the current environment takes, as (low, likely, high)."""
+    """How many runs a certificate of the current environment takes, as (low, likely, high).
+
+    Its own runs narrow what the rates before it foretold. Only where they contradict that do they stand alone.
+    """
     left = len(state.environment) - len(state.pinned.intersection(state.environment))
     made = 0
     shown: dict[tuple[int, str | None], tuple[int, int]] = {}
@@ -160,7 +163,10 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, in
     before = 0 if state.baseline is None else state.baseline.runs
     without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
     done = Made(made, shown.get((now.node, None), (0, 0)), without)
-    return certificate_tests(now.rate, now.certify_rate, left, now.at_least, before, done)
+    foretold, by_runs = (
+        certificate_tests(now.rate, now.certify_rate, left, now.at_least, before, known) for known in (None, done)
+    )
+    return narrowed(foretold, by_runs) if made < foretold[-1] else by_runs
 
 
 def has_dropped(state: RunState) -> bool:

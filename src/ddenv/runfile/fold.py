@@ -17,7 +17,7 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Node, PastRound, Point
+from ddenv.runfile.progress import Node, PastRound, Point, narrowed
 from ddenv.runfile.state import Candidate, Round, RunState, Split
 from ddenv.runfile.store import Recorded, RunFile, uncollected
 from ddenv.text import count
@@ -252,10 +252,14 @@ def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, 
         raise ValueError("candidates")
 
 
-def _forecast(_: RunState, event: e.Forecast, __: float) -> Changes:
+def _forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
+    """A search is foretold anew in each round: each forecast narrows the one before."""
     if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
-    return {"forecast": event}
+    if state.forecast is None:
+        return {"forecast": event}
+    low, likely, high = (each - event.tests_done + state.forecast.tests_done for each in state.forecast.tests)
+    return {"forecast": replace(event, tests=narrowed((low, likely, high), event.tests))}
 
 
 def _candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:

@@ -274,3 +274,9 @@ class Physics:
 
 def _lacking(these: str, those: str) -> str:
     return ", ".join(each for each in these.split(", ") if each not in those.split(", ")) or "something unknown"
+
+
+def narrowed(before: tuple[int, int, int], now: tuple[int, int, int]) -> tuple[int, int, int]:
+    """What two estimates, as (low, likely, high), have in common; `now` where they contradict each other."""
+    low, high = max(before[0], now[0]), min(before[2], now[2])
+    return (low, min(max(low, now[1]), high), high) if low <= high else now

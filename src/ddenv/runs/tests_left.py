@@ -15,6 +15,7 @@ from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_m
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.settings import Reduction
+from ddenv.text import about, count, rounded
 
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
 LATEST, BUSY = 50, 0.9
@@ -65,6 +66,26 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
     return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
 
 
+def left_said(state: RunState, at_work: bool) -> tuple[str, ...]:
+    """What is left, in tests and with the time in brackets, from the longest form to none; nothing if it is unknown."""
+    left = remaining(state, at_work)
+    if left is None:
+        return ("more tests than forecast", "") if _is_overdue(state) else ()
+    low, likely, high = map(rounded, left.tests)
+    words = f"about {count(likely, 'test')} left"
+    time = [] if left.seconds is None else [about(left.seconds[1])]
+    ranges = [f"{low:,} to {high:,}"] if low < high else []
+    forms = [f"{words} ({', '.join(more)})" for more in (ranges + time, time or ranges) if more]
+    return (*dict.fromkeys(forms), words, "")
+
+
+def _is_overdue(state: RunState) -> bool:
+    """Whether the search takes more tests than were foretold."""
+    forecast = state.forecast
+    searches = not (state.ended or state.confirming or state.isolating is not None)
+    return searches and forecast is not None and state.tests_done - forecast.tests_done >= forecast.tests[-1]
+
+
 def _expected(state: RunState) -> tuple[int, int, int] | None:
     """How many tests are left, as (low, likely, high); None if unknown, or after more than were expected."""
     if state.isolating is not None:
@@ -78,9 +99,9 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     forecast, baseline = state.forecast, state.baseline
     if forecast is None or baseline is None:
         return None
-    done = state.tests_done - forecast.tests_done
-    if done >= forecast.tests[-1]:
+    if _is_overdue(state):
         return None
+    done = state.tests_done - forecast.tests_done
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
     asked = settings(state)

@@ -20,8 +20,8 @@ from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
-from ddenv.runs.tests_left import remaining
-from ddenv.text import about, count, first_of, plain, printable, rounded
+from ddenv.runs.tests_left import left_said
+from ddenv.text import count, first_of, plain, printable
 from ddenv.words.baseline import how_often
 from ddenv.words.claims import drift, what_ran
 from ddenv.words.explain import explain
@@ -64,10 +64,8 @@ def status(snapshot: Snapshot) -> Iterator[str]:
     yield headline(state)
     if forms := drift(state):
         yield forms[0]
-    left = remaining(state, snapshot.engine == "alive")
-    if left is not None:
-        time = f", about {about(*left.seconds)}" if left.seconds else ""
-        yield f"about {count(rounded(left.tests[1]), 'test')} left{time}"
+    if left := left_said(state, snapshot.engine == "alive"):
+        yield left[0]
     engines = {"alive": "an engine is at work", "starting": "the engine starts"}
     yield engines.get(snapshot.engine, "no engine is running")
 

@@ -14,8 +14,8 @@ from ddenv.runfile.branches import path
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
-from ddenv.runs.tests_left import Remaining, remaining
-from ddenv.text import about, between, count, duration, percent, plain, rounded, shortened, truncated
+from ddenv.runs.tests_left import left_said, remaining
+from ddenv.text import count, duration, percent, plain, shortened, truncated
 from ddenv.words.claims import drift, ended
 from ddenv.words.methods import GROUPS, labels
 from ddenv.words.signs import STATUS
@@ -24,7 +24,7 @@ from ddenv.workbench.terminal.themes import ink
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.
 SHRINK = (
-    *("cut", "time", "engine", "left", "scene", "tests", "drift", "left", "mode", "tests", "drift"),
+    *("cut", "time", "left", "engine", "left", "scene", "tests", "drift", "left", "mode", "tests", "drift"),
     *("asked", "engine", "tests", "drift", "state"),
 )
 # Which states end with a notification: the first one of these that follows another state.
@@ -165,7 +165,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
         "drift": drift_said(state),
         "cut": (f"{cut} ended early", "") if (cut := state.cut_tests) else (),
         "time": _time(snapshot),
-        "left": left_said(remaining(state, snapshot.engine == "alive")),
+        "left": left_said(state, snapshot.engine == "alive"),
         "mode": ("accept: ask", "") if state.accept_mode == "ask" and not state.ended else (),
         "engine": engine_said(snapshot),
         "scene": (f"scene {scene}", "scene") if scene else (),
@@ -216,19 +216,6 @@ def drift_said(state: RunState) -> tuple[str, ...]:
     if has_dropped(state):
         return tuple(f"▼ {form}: u goes back" for form in forms)
     return (*forms, "") if forms else ()
-
-
-def left_said(left: Remaining | None) -> tuple[str, ...]:
-    """What is left, with its interval, then without."""
-    if left is None:
-        return ()
-    low, middle, high = left.tests
-    if left.seconds is None:
-        words = f"about {count(rounded(middle), 'test')} left"
-        return (f"{words} ({between(low, high)})" if rounded(low) < rounded(high) else words, words, "")
-    words = about(*left.seconds)
-    time, _, interval = words.partition(" (")
-    return (f"about {time} left{f' ({interval}' if interval else ''}", f"about {time} left", "")
 
 
 def engine_said(snapshot: Snapshot) -> tuple[str, ...]:

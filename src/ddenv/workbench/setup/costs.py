@@ -87,5 +87,5 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
         words = f"{words} {UNKNOWN_RATE}"
     if past.seconds is None:
         return f"{words}; {parts}"
-    spent = about(*(each * past.seconds / jobs for each in (low, middle, high)))
+    spent = about(*(each * past.seconds / jobs for each in (middle, low, high)))
     return f"{words}, {spent} with {count(jobs, 'job')} at {past.seconds:.1f} s a test, as before; {parts}"
