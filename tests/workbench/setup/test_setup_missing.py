@@ -37,7 +37,7 @@ def depot(tmp_path):
 
 def rows(session):
     found = session.screen.query_one(MissingList)
-    return [option.prompt.plain for option in found.options] if found.display else []
+    return [option.prompt.plain for option in found.options if option.id] if found.display else []
 
 
 def shape(session, name):
@@ -104,7 +104,15 @@ async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_pa
         await session.press("m", "a")
         guessed = rows(session)
         assert [row[0] for row in guessed] == ["✓", "✓"]
-        await session.press("m", "w")
+        # What is solved is a line until one wants to read it.
+        found = session.screen.query_one(MissingList)
+        assert (found.border_title.split(",")[0].removesuffix(" (m)"), found.size.height) == (
+            "2 missing files replaced",
+            0,
+        )
+        await session.press("m")
+        assert found.size.height >= 2
+        await session.press("w")
         assert sum("left out" in row for row in rows(session)) == 1
         await session.press("m", "a")
         assert rows(session) == guessed
@@ -158,6 +166,27 @@ async def test_a_world_that_misses_nothing_has_no_rows(scenarios, depot):
         session.place(spawn_x="0", goal_x="8")
         await session.pilot.pause()
         assert "--stand-in auto" in session.told("command")
+
+
+async def test_what_was_replaced_or_ignored_can_be_read(tmp_path):
+    ball = """<model name='{}'><link name='l'><velocity_decay/><collision name='c'><geometry><sphere><radius>1</radius>
+        </sphere></geometry><surface><bounce><restitution_coefficient>1</restitution_coefficient></bounce></surface>
+        </collision></link></model>"""
+    path = tmp_path / "balls.world"
+    path.write_text(f"<sdf version='1.6'><world name='w'>{ball.format('one')}{ball.format('two')}</world></sdf>")
+    async with Opened(size=(80, 24)) as session:
+        await session.open(path)
+        found = session.screen.query_one(MissingList)
+        assert (found.border_title, found.size.height) == ("4 parts replaced or ignored (m)", 0)
+        await session.press("m")
+        assert found.size.height == 2
+        shown = [option.prompt.plain for option in found.options]
+        assert any(
+            row.startswith("  ignored <restitution_coefficient> × 2  bouncing is not simulated") for row in shown
+        )
+        assert not {"guess", "without"} & {each.binding.action for each in session.screen.active_bindings.values()}
+        await session.press("enter", "a", "w")
+        assert remembered() == {}
 
 
 def test_only_the_newest_remedies_are_kept():

@@ -80,8 +80,6 @@ class Choice:
                 "None of its models can be removed: there is nothing to reduce.",
                 "1 model: a run can only show whether the failure needs it.",
             )[self.models]
-        if notes := self.world.notes:
-            words += f" {count(len(notes), 'part')} replaced or ignored ('ddenv world check' lists them)."
         if self.run:
             return f"{words} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
         # The list has the name of a bundled file.

@@ -1,10 +1,12 @@
-"""Files that a world names but that cannot be found: their rows on the screen, and the remedy of each.
+"""What of a world is not as its file says: files that cannot be found, with the remedy of each, and parts that were replaced or
+ignored.
 
 A remedy is a stand-in, `none`, or a folder, and is remembered by URI.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +30,7 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 if TYPE_CHECKING:
-    from ddenv.world.model import World
+    from ddenv.world.model import Note, World
     from ddenv.world.scenario import Reading
 
 OPEN, DONE = "?", "✓"
@@ -102,7 +104,10 @@ def _on_the_map(uri: str, world: World) -> str:
 
 
 class MissingList(OptionList):
-    """A row for each missing file; hidden while there is none."""
+    """A row for each missing file, then for each kind of part that was replaced or ignored; hidden while there is none.
+
+    Once each file has its remedy, the title stands for all rows until the list has the focus.
+    """
 
     BINDINGS: ClassVar = keys(
         "missing",
@@ -122,16 +127,24 @@ class MissingList(OptionList):
         self._rows: tuple[Missing, ...] = ()
         self.display = False
 
-    def show(self, rows: tuple[Missing, ...]) -> None:
+    def show(self, rows: tuple[Missing, ...], notes: tuple[Note, ...] = ()) -> None:
         """Shows other rows; the cursor stays where it was, or goes to the first row without a remedy."""
         same = [row.uri for row in rows] == [row.uri for row in self._rows]
         place, self._rows = self.highlighted if same else None, rows
-        self.set_options(Option(self._line(row), id=row.uri) for row in rows)
+        of_files = tuple(note for note in notes if not any(f"'{row.uri}'" in note.why for row in rows))
+        alike = Counter((note.what, note.kind, note.why) for note in of_files)
+        self.set_options(
+            [
+                *(Option(self._line(row), id=row.uri) for row in rows),
+                *(Option(_note_line(number, *note)) for note, number in alike.items()),
+            ]
+        )
         undecided = [index for index, row in enumerate(rows) if not row.remedy]
-        self.highlighted = (next(iter(undecided), 0) if place is None else place) if rows else None
-        self.display = bool(rows)
-        still = f", {len(undecided)} without a remedy" if undecided else ""
-        self.border_title = f"{count(len(rows), 'file')} missing (m){still}"
+        first = next(iter(undecided), 0) if place is None else place
+        self.highlighted = first if self.option_count else None
+        self.display = self.option_count > 0
+        self.set_class(not undecided, "-folded")
+        self.border_title = _title(len(rows), len(undecided), len(of_files))
 
     def _line(self, row: Missing) -> Text:
         color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
@@ -143,6 +156,8 @@ class MissingList(OptionList):
     @on(OptionList.OptionSelected)
     def _selected(self, event: OptionList.OptionSelected) -> None:
         event.stop()
+        if event.option_index >= len(self._rows):
+            return
         row = self._rows[event.option_index]
 
         def take(text: str | None) -> None:
@@ -151,13 +166,34 @@ class MissingList(OptionList):
 
         self.app.push_screen(AskRemedy(row), take)
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        return bool(self._rows) or action not in ("guess", "without")
+
     def action_guess(self) -> None:
-        here = [] if self.highlighted is None else [self._rows[self.highlighted].uri]
-        self.post_message(self.Chosen(dict.fromkeys([row.uri for row in self._rows if not row.remedy] or here, "auto")))
+        undecided = [row.uri for row in self._rows if not row.remedy]
+        self.post_message(self.Chosen(dict.fromkeys(undecided or self._here, "auto")))
 
     def action_without(self) -> None:
-        if self.highlighted is not None:
-            self.post_message(self.Chosen({self._rows[self.highlighted].uri: "none"}))
+        self.post_message(self.Chosen(dict.fromkeys(self._here, "none")))
+
+    @property
+    def _here(self) -> list[str]:
+        """The URI of the missing file under the cursor."""
+        place = self.highlighted
+        return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
+
+
+def _title(missing: int, undecided: int, notes: int) -> str:
+    if undecided:
+        return f"{count(missing, 'file')} missing (m), {undecided} without a remedy"
+    files = f"{count(missing, 'missing file')} replaced" if missing else ""
+    parts = f"{count(notes, 'part')} replaced or ignored" if notes else ""
+    return f"{', '.join(filter(None, (files, parts)))} (m)"
+
+
+def _note_line(number: int, what: str, kind: str, why: str) -> Text:
+    parts = f"{plain(what)} × {number}" if number > 1 else plain(what)
+    return Text(no_wrap=True, overflow="ellipsis").append(f"  {kind} {parts}  ").append(plain(why), "dim")
 
 
 class AskRemedy(ModalScreen[str | None]):

@@ -151,7 +151,7 @@ class Preview(Vertical):
         self.choice = choice
         self._title(choice.name)
         self.map.set_place(place)
-        self.missing.show(choice.missing)
+        self.missing.show(choice.missing, choice.world.notes)
         self._show_about()
         self.post_message(self.Read(choice, name, again))
 
