@@ -75,6 +75,29 @@ def test_a_candidate_has_the_models_of_its_partition_or_all_others_in_their_orde
     assert [candidate.size for candidate in state.round.candidates] == [len(each) for each in models]
 
 
+def test_a_part_keeps_its_letter_from_round_to_round():
+    rounds = [
+        [[0, 1, 2], [3], [4, 5]],
+        # Half of A is new, in the first place; the others come in another order.
+        [[1, 2], [4, 5], [0], [3]],
+        [[3], [1], [2]],
+    ]
+    labels = []
+    for number, parts in enumerate(rounds, 1):
+        everything = sorted(model for part in parts for model in part)
+        events = [round_event(earlier, number=place) for place, earlier in enumerate(rounds[: number - 1], 1)]
+        state = state_after(*events, round_event(parts, environment=everything, number=number))
+        labels.append([one.label for one in state.round.candidates if one.kind == "partition"])
+        assert [state.round.split.letter_of[f"box {part[0]}"] for part in parts] == [
+            "ABCDE".index(label[-1]) for label in labels[-1]
+        ]
+    assert labels == [
+        ["part A", "part B", "part C"],
+        ["part A", "part C", "part D", "part B"],
+        ["part B", "part A", "part C"],
+    ]
+
+
 def test_candidates_are_equal_if_they_and_their_rounds_environment_are():
     one, same, other = (
         state_after(round_event([[0], [1]], environment)).round.candidates

@@ -5,6 +5,7 @@ What each event changes stands here and in the files `fold_*.py` beside this one
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import reduce
@@ -226,6 +227,7 @@ def _round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
         whole,
         parts,
         event.pinned,
+        _letters(parts, None if state.round is None else state.round.split),
     )
     candidates = PersistentTuple.of(
         Candidate(index, kind, partition, split, distance)
@@ -237,6 +239,14 @@ def _round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
         "round": Round(event.round, event.n_partitions, split, candidates),
         "nodes": with_node(state.nodes, here),
     }
+
+
+def _letters(parts: tuple[Environment, ...], before: Split | None) -> tuple[int, ...]:
+    """The number of each part's letter: that which it had in the split `before`, or else the first that is free."""
+    had = {} if before is None else dict(zip(before.parts, before.letters, strict=True))
+    kept = {had[part] for part in parts if part in had}
+    free = (number for number in itertools.count() if number not in kept)
+    return tuple(had[part] if part in had else next(free) for part in parts)
 
 
 def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, ...]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
@@ -300,7 +300,8 @@ class Round:
 class Split:
     """An environment and its disjoint parts, shared by all candidates of a round; by name, and as `whole` and `parts` by number.
 
-    `pinned` models of the environment are in no part, but in every candidate.
+    `pinned` models of the environment are in no part, but in every candidate. `letters` has the number of each part's letter: a
+    part that was one in the round before keeps its letter.
     """
 
     environment: tuple[str, ...]
@@ -309,6 +310,17 @@ class Split:
     whole: Environment = NOTHING
     parts: tuple[Environment, ...] = ()
     always: Environment = NOTHING
+    letters: tuple[int, ...] = ()
+
+    @property
+    def lettered(self) -> Iterator[tuple[int, tuple[str, ...]]]:
+        """Each part's names, with the number of its letter."""
+        return zip(self.letters or range(len(self.partitions)), self.partitions, strict=True)
+
+    @property
+    def letter_of(self) -> dict[str, int]:
+        """The number of the letter of each model that is in a part."""
+        return {name: letter for letter, part in self.lettered for name in part}
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,7 +366,8 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        letter = partition_letter(self.partition)
+        letters = self.split.letters
+        letter = partition_letter(letters[self.partition] if letters else self.partition)
         return f"part {letter}" if self.kind == "partition" else f"without {letter}"
 
 

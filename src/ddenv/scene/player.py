@@ -59,7 +59,7 @@ class Player:
         self._shot: Shot | None = None
         self._ran_at = -math.inf
         self._live: list[Live] = []
-        self._parts: tuple[tuple[str, ...], ...] = ()
+        self._parts: tuple[tuple[int, tuple[str, ...]], ...] = ()
         self._letters: list[Any] = []
         self._trail: list[tuple[float, ...]] = []
         self._evidence: int | None = None
@@ -211,13 +211,12 @@ class Player:
     def _show_parts(self) -> None:
         """Marks the partitions of the round that goes on, in the colours and with the letters of the map."""
         round = None if self._state.ended else self._state.round
-        parts = () if round is None or round.done else round.partitions
+        parts = () if round is None or round.done else tuple(round.split.lettered)
         if parts == self._parts:
             return
         self._parts = parts
         groups = [
-            (partition_letter(number), colors.of_bytes(HUES[number % len(HUES)]), names)
-            for number, names in enumerate(parts)
+            (partition_letter(number), colors.of_bytes(HUES[number % len(HUES)]), names) for number, names in parts
         ]
         self._letters = self._scenery.parts(groups)
         if self._shot is not None:

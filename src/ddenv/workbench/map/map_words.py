@@ -126,8 +126,7 @@ def _standing(state: RunState, name: str) -> str:
         return "protected"
     if name not in state.environment:
         return "removed"
-    partitions = state.round.partitions if state.round else ()
-    part = next((index for index, names in enumerate(partitions) if name in names), None)
+    part = state.round.split.letter_of.get(name) if state.round else None
     return "kept" if part is None else f"part {partition_letter(part)}"
 
 

@@ -73,7 +73,7 @@ class Kept:
 def kept(shown: Shown) -> Kept:
     """What the map needs of a run's state, and how models stand out in the layers that are shown."""
     state, layers, candidate, place = shown.snapshot.state, shown.layers, shown.candidate, shown.place
-    partitions = state.round.partitions if state.round and "partitions" in layers else ()
+    parts = state.round.split.letter_of if state.round and "partitions" in layers else {}
     met = in_last(state) if "took part" in layers else None
     standing = frozenset(candidate.models) if candidate else None
     return Kept(
@@ -81,7 +81,7 @@ def kept(shown: Shown) -> Kept:
         frozenset(state.environment) if state.elements else place.elements,
         standing if met is None else frozenset(met.names(state.elements)),
         frozenset(drops(state, candidate)) if candidate else frozenset(),
-        {name: index for index, part in enumerate(partitions) for name in part},
+        parts,
         state.pinned if "pinned" in layers else frozenset(),
         shown.selection,
         sensed_order(state) if "sensed" in layers else {},

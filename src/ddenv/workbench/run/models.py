@@ -70,8 +70,7 @@ class Row:
 
 def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
     """The models of the environment, those nearest to f first."""
-    partitions = state.round.partitions if state.round is not None and not state.round.done else ()
-    parts = {name: place for place, part in enumerate(partitions) for name in part}
+    parts = state.round.split.letter_of if state.round is not None and not state.round.done else {}
     sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
     places = {each.name: each for each in prints}
     f = None if state.f_position is None else state.f_position[:2]
