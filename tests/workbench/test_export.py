@@ -7,6 +7,8 @@ import pytest
 from textual.app import App
 from textual.widgets import Button, Checkbox, Input, Static
 
+from ddenv.errors import UserError
+from ddenv.runs.programs import export_mcap
 from ddenv.workbench.export import ExportScreen
 
 NAMES = ("crates-1.html", "crates-1.minimal.robot.sdf", "crates-1.minimal.sdf", "crates-1.minimal.yaml")
@@ -140,3 +142,13 @@ async def test_why_messages_cannot_be_written_is_told(run, folder):
         await settled(pilot)
         # Drake makes the runs again, and the robot of this run cannot drive.
         assert told(pilot).startswith("robot 'robot': expected wheels on both sides") and names(folder) == ()
+
+
+def test_messages_that_are_being_written_can_be_stopped(tmp_path, monkeypatch):
+    slow = tmp_path / "python"
+    slow.write_text("#!/bin/sh\nexec sleep 600\n")
+    slow.chmod(0o755)
+    monkeypatch.setattr("sys.executable", str(slow))
+    looks = iter([False, False, True])
+    with pytest.raises(UserError, match="stopped, nothing is written"):
+        export_mcap(tmp_path / "a.ddenv", tmp_path / "a.mcap", lambda: next(looks))

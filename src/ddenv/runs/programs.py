@@ -7,7 +7,8 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -22,6 +23,8 @@ ENGINE_STARTED = "started"
 FIRST_PORT = 7000
 # Maximum time for engines to stop, s.
 STOP_WAIT = 15.0
+# How often a program is asked whether it has ended, s.
+LOOK = 0.1
 # Matches the last line of a traceback.
 PYTHON_SAYS = re.compile(r"[\w.]*(Error|Exception)(:|$)")
 
@@ -55,12 +58,24 @@ def _log(place: Path, run: Path) -> BinaryIO:
     return os.fdopen(os.open(place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, mode_beside(run)), "ab")
 
 
-def export_mcap(run: Path, file: Path) -> None:
-    """Writes what the robot sensed and did; the runs are made again by Drake in a process of their own. Raises UserError."""
+def export_mcap(run: Path, file: Path, stopped: Callable[[], bool]) -> None:
+    """Writes what the robot sensed and did; the runs are made again by Drake in a process of their own.
+
+    Raises UserError, also once it is `stopped`; then nothing is written.
+    """
     words = [sys.executable, "-m", "ddenv", "export", "--mcap", str(file), "--", str(run)]
-    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    if done.returncode:
-        raise UserError((done.stderr.strip().splitlines() or ["the program ended"])[-1].removeprefix("ddenv: "))
+    with subprocess.Popen(
+        words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as program:
+        said = None
+        while said is None:
+            with suppress(subprocess.TimeoutExpired):
+                _, said = program.communicate(timeout=LOOK)
+            if said is None and stopped():
+                program.kill()
+                raise UserError(f"{file}: stopped, nothing is written")
+    if program.returncode:
+        raise UserError((said.strip().splitlines() or ["the program ended"])[-1].removeprefix("ddenv: "))
 
 
 def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen[bytes]]]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,6 +12,7 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
+from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
 from ddenv.text import count, first_of, plain, shortened
@@ -31,6 +32,7 @@ KINDS = (
     ("test", "pytest (folder)", ("",)),
 )
 TICKED = ("world", "scenario", "report")
+WRITING = "writing ... escape stops it"
 # Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
 
@@ -124,7 +126,7 @@ class ExportScreen(ModalScreen[None]):
             self._report("", str(error))
             return
         self._busy = True
-        self._report("writing ...")
+        self._report(WRITING)
         self._write(wanted, self._agreed)
 
     def _wanted(self) -> Wanted:
@@ -158,10 +160,11 @@ class ExportScreen(ModalScreen[None]):
         if there and not agreed.issuperset(there):
             call_if_open(self, self._ask, there)
             return
-        written: list[str] = []
-        wrong = ""
+        written, wrong, worker = list[str](), "", get_current_worker()
         try:
-            written.extend(write(self._file, wanted))
+            for line in write(self._file, wanted, lambda: worker.is_cancelled):
+                written.append(line)
+                call_if_open(self, self._report, "\n".join([*written, WRITING]))
         except UserError as error:
             wrong = str(error)
         self.app.call_from_thread(self._done, written, wrong)
@@ -238,8 +241,8 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
             yield from (path.with_suffix(f".robot{kind}") for kind in (".sdf", ".urdf"))
 
 
-def write(run: Path, wanted: Wanted) -> Iterator[str]:
-    """Writes the files; yields a line for each. Raises UserError for the first that cannot be written."""
+def write(run: Path, wanted: Wanted, stopped: Callable[[], bool]) -> Iterator[str]:
+    """Writes the files; yields a line for each. Raises UserError for the first that cannot be written, and once it is `stopped`."""
     from ddenv.report.bundle import write_bundle, write_test
     from ddenv.report.report import write_report
     from ddenv.runs.export import export_world
@@ -258,5 +261,5 @@ def write(run: Path, wanted: Wanted) -> Iterator[str]:
     if "test" in wanted:
         yield from (f"wrote {plain(path)}" for path in write_test(run, wanted["test"]))
     if "mcap" in wanted:
-        export_mcap(run, wanted["mcap"])
+        export_mcap(run, wanted["mcap"], stopped)
         yield f"wrote {plain(wanted['mcap'])}"

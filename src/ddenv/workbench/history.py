@@ -34,7 +34,7 @@ from ddenv.workbench.widgets.question import Question
 # Time between two looks at the run, s.
 PERIOD = 0.5
 # Name and width of the columns after the tree; the last is for wide terminals.
-COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("f shown", 10), ("", 14), ("method", 36))
+COLUMNS = (("#", 3), ("made by", 15), ("at test", 7), ("f shown", 10), ("", 14), ("method", 36))
 ROOM = 90
 # The width of the tree in columns, without the lines of its branches.
 TREE = 15
@@ -125,7 +125,7 @@ class History(Screen[int | None]):
         size = len(node.environment)
         marked = MARK if node.number == self._marked else ""
         words = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
-        texts = (str(node.number), plain(node.what), str(node.own_tests), seen(node), words, plain(node.method))
+        texts = (str(node.number), plain(node.what), str(node.tests), seen(node), words, plain(node.method))
         cells = (
             Text(text, style, justify=_side(name), no_wrap=True) for text, (name, _) in zip(texts, COLUMNS, strict=True)
         )
