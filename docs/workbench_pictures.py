@@ -18,6 +18,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import Popen
 from unittest.mock import patch
 
 from textual.pilot import Pilot
@@ -146,9 +147,10 @@ def main() -> None:
 async def make_all() -> None:
     # What took part would leave five models, and no round with much to see.
     run = new_run("ditch", slice=False, seed=2)
-    start_engine(run, 1, accept_mode="ask")
+    engine = start_engine(run, 1, accept_mode="ask")
     async with opened(run) as pilot:
-        await begin(pilot, run)
+        async with slowed(engine):
+            await begin(pilot, run)
         await guide(pilot)
         await look_back(pilot)
         await tell_why(pilot)
@@ -219,6 +221,24 @@ async def drawn(pilot: Pilot[int]) -> None:
 
 
 # The run of the ditch.
+
+
+@asynccontextmanager
+async def slowed(engine: Popen[bytes]) -> AsyncIterator[None]:
+    """The engine gets a tenth of the time, so that a robot that moves can be looked at."""
+
+    async def stop_and_go() -> None:
+        while engine.poll() is None:
+            for what, seconds in ((signal.SIGSTOP, 0.09), (signal.SIGCONT, 0.01)):
+                os.killpg(engine.pid, what)
+                await asyncio.sleep(seconds)
+
+    task = asyncio.create_task(stop_and_go())
+    try:
+        yield
+    finally:
+        task.cancel()
+        os.killpg(engine.pid, signal.SIGCONT)
 
 
 async def begin(pilot: Pilot[int], run: Path) -> None:
