@@ -22,17 +22,17 @@ _PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 def start_folder(scenario: Scenario) -> Path:
-    """The folder in which the oracle's command starts."""
+    """The folder in which the oracle's command starts, or where its module is searched."""
     own = None if scenario.oracle is None else scenario.oracle.folder
     return scenario.folder if own is None else own
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
-    """The words of the oracle's command, the absolute path of its program first, placeholders unfilled; () without an oracle.
+    """The words of the oracle's command, the absolute path of its program first, placeholders unfilled; () without a command.
 
     Raises UserError for an unknown placeholder, a missing folder, and a program that is missing or not executable.
     """
-    if scenario.oracle is None:
+    if scenario.oracle is None or scenario.oracle.command is None:
         return ()
     try:
         words = shlex.split(scenario.oracle.command)
