@@ -158,7 +158,7 @@ def _settle_in(output: Connection) -> None:
 
 
 def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]) -> Answer:
-    """Does a task, and tells the moments of a test. A traceback is printed."""
+    """Does a task, and tells the moments of a test. The traceback of what nobody foresaw is printed."""
     try:
         if isinstance(simulator, Exception):
             raise simulator
@@ -173,8 +173,10 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
     except BaseException as error:
         if error is simulator and isinstance(error, UserError):
             return error
-        traceback.print_exception(error)
-        sys.stderr.flush()
+        # A UserError says all that a user can mend.
+        if not isinstance(error, UserError):
+            traceback.print_exception(error)
+            sys.stderr.flush()
         return Broken("error", _reason(error))
 
 

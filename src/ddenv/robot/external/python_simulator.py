@@ -82,6 +82,8 @@ class PythonSimulator:
             raise ValueError(f"no such model: {min(unknown)}")
         started = time.perf_counter()
         removed = self._removable - keep
+        # A new file: to shorten an old one takes some file systems milliseconds.
+        self._path.unlink(missing_ok=True)
         write_files(self._path.parent, {self._path: without(self._world, removed)})
         models = tuple(model.name for model in self._world.models if model.name not in removed)
         world = SubWorld(self._path, self._its_scenario, models)
@@ -161,9 +163,10 @@ class Poses:
         """Adds a row. Raises BadLog."""
         self._count += 1
         where = f"gave row {self._count}"
-        if not isinstance(row, tuple | list) or len(row) not in (2, 3) or not isinstance([*row, {}][2], Mapping):
+        is_row = isinstance(row, tuple | list) and (len(row) == 2 or (len(row) == 3 and isinstance(row[2], Mapping)))
+        if not is_row:
             raise BadLog(f"{where}: expected {ROW}, found {_shown(row)}")
-        t, pose, others = [*row, {}][:3]
+        t, pose, others = row[0], row[1], row[2] if len(row) == 3 else {}
         kept = self.robot.take(_numbers(t, pose, where), where)
         for name, its_pose in others.items():
             self.check(name, where)
