@@ -32,8 +32,8 @@ def material(color: str) -> str:
 
 
 def part(name: str, position: Sequence[float], geometry: str, mu: float, color: str) -> str:
-    """A collision and a visual of the same shape."""
-    return collision(name, position, geometry, mu) + visual(name, position, geometry, color)
+    """A collision and a visual of the same shape. SDF wants different names for all parts of a link."""
+    return collision(name, position, geometry, mu) + visual(f"{name}_visual", position, geometry, color)
 
 
 def collision(name: str, position: Sequence[float], geometry: str, mu: float) -> str:
@@ -82,7 +82,7 @@ def ground(color: str, mu: float | None = None, pose: Sequence[float] = ()) -> s
     return (
         '    <model name="ground_plane">\n      <static>true</static>\n'
         f'{place}      <link name="link">\n        <collision name="ground">{plane}{surface}</collision>\n'
-        f'        <visual name="ground">\n          {plane}\n          {material(color)}\n        </visual>\n'
+        f'        <visual name="ground_visual">\n          {plane}\n          {material(color)}\n        </visual>\n'
         "      </link>\n    </model>\n"
     )
 

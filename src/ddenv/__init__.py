@@ -10,14 +10,29 @@ from ddenv.errors import UserError
 if TYPE_CHECKING:
     from ddenv.reduction.evidence import Traits
     from ddenv.reduction.reduce import Reduction, reduce
+    from ddenv.robot.external.protocol import Ended, SimulatorSetup, SubWorld
     from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
 
 __version__ = "0.1.0"
 
-__all__ = ["Reading", "Reduction", "Setup", "Traits", "Twist", "UserError", "WheelSpeeds", "__version__", "reduce"]
+__all__ = [
+    "Ended",
+    "Reading",
+    "Reduction",
+    "Setup",
+    "SimulatorSetup",
+    "SubWorld",
+    "Traits",
+    "Twist",
+    "UserError",
+    "WheelSpeeds",
+    "__version__",
+    "reduce",
+]
 
 _HOMES = {
     "ddenv.reduction.reduce": ("Reduction", "Traits", "reduce"),
+    "ddenv.robot.external.protocol": ("Ended", "SimulatorSetup", "SubWorld"),
     "ddenv.robot.protocol": ("Reading", "Setup", "Twist", "WheelSpeeds"),
 }
 

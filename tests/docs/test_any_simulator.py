@@ -2,21 +2,27 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 
 import pytest
 import yaml
 
+from ddenv.robot.external.python_simulator import PythonSimulator
 from ddenv.robot.external.simulator import COLUMNS, EXPECTED, TOO_LARGE, ExternalSimulator, PoseLog
 from ddenv.robot.external.supervise import GRACE
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import load_parts
 from ddenv.world.command import PLACEHOLDERS
 from ddenv.world.load import load_scenario
+from ddenv.world.scenario import Oracle
 from tests.command import ddenv
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs/any-simulator.md").read_text()
+BLOCKS = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 SCENARIO = ROOT / "docs/examples/any_simulator/scenario.yaml"
 
 
@@ -94,10 +100,45 @@ def test_the_same_seed_gives_the_same_run(tmp_path):
     assert json.loads(again.stdout)["runs"][0]["end_pose"] == one["end_pose"] != other["end_pose"]
 
 
+def test_the_class_of_the_page_runs_as_the_command_does():
+    (shown,) = re.findall(r"```python\n(class .*?)```", PAGE, re.DOTALL)
+    assert SCENARIO.with_name("corner.py").read_text().endswith(shown)
+    scenario = load_scenario(SCENARIO)
+    in_python = scenario.model_copy(update={"oracle": Oracle(**yaml.safe_load(BLOCKS[1])["oracle"])})
+    world, _ = load_parts(scenario)
+    one, other = ExternalSimulator(world, scenario), PythonSimulator(world, in_python)
+    try:
+        for left in (world.elements(), ("shelf_left",)):
+            first, second = (each.run(frozenset(left), 3) for each in (one, other))
+            # The log of the command is rounded.
+            assert (first.outcome, first.failure) == (second.outcome, second.failure)
+            assert first.trajectory[:, :4] == pytest.approx(second.trajectory[:, :4], abs=1e-3)
+            assert second.took_part <= frozenset(left)
+    finally:
+        other.close()
+
+
+@pytest.mark.examples
+def test_what_the_class_says_took_part_is_used_and_a_lie_is_found(tmp_path):
+    code = SCENARIO.with_name("corner.py").read_text()
+    for name, took_part in (("true", "touched"), ("lie", 'touched - {"shelf_right"}')):
+        folder = tmp_path / name
+        shutil.copytree(SCENARIO.parent, folder)
+        (folder / "corner.py").write_text(code.replace("took_part=touched", f"took_part={took_part}"))
+        text = SCENARIO.read_text().replace(*(block.strip() for block in BLOCKS[:2]))
+        (folder / "scenario.yaml").write_text(text)
+        done = ddenv("run", "scenario.yaml", "--output", "run.ddenv", cwd=folder)
+        assert done.returncode == 0, done.stderr
+        with RunFile(folder / "run.ddenv") as run:
+            state = fold(run.events())
+        assert set(state.environment) == {"shelf_left", "shelf_right"}, name
+        assert (state.refuted is not None) == (name == "lie")
+        assert name == "lie" or any(node.sliced_by for node in state.nodes)
+
+
 def test_the_page_shows_the_scenario_the_placeholders_and_the_variables(monkeypatch):
     monkeypatch.delenv("DDENV_HOME", raising=False)
-    shown = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[0]
-    assert yaml.safe_load(shown)["oracle"] == yaml.safe_load(SCENARIO.read_text())["oracle"]
+    assert yaml.safe_load(BLOCKS[0])["oracle"] == yaml.safe_load(SCENARIO.read_text())["oracle"]
     assert re.findall(r"^\| `\{(\w+)\}`", PAGE, re.MULTILINE) == list(PLACEHOLDERS)
     scenario = load_scenario(SCENARIO)
     simulator = ExternalSimulator(load_parts(scenario)[0], scenario)

@@ -1,6 +1,5 @@
 """The example of MuJoCo: what it makes of a world, and whether the robot fails there, too, where MuJoCo is installed."""
 
-import subprocess
 import sys
 from importlib.util import find_spec
 from xml.etree import ElementTree
@@ -8,6 +7,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from ddenv.robot.external.python_simulator import PythonSimulator
+from ddenv.runs.subject import load_parts
 from ddenv.world.drive import find_drive
 from ddenv.world.load import SDF, load_scenario, load_simulator
 from ddenv.world.model import (
@@ -27,8 +28,7 @@ from ddenv.world.model import (
 )
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Oracle
-from ddenv.world.sdf.read import read_model, read_world
-from ddenv.world.write import without
+from ddenv.world.sdf.read import read_model
 from tests.conftest import ROOT
 
 FOLDER = ROOT / "docs/examples/mujoco"
@@ -127,26 +127,19 @@ def test_what_it_cannot_translate_is_one_line(mjcf, joints):
 
 
 def test_the_file_of_the_simulator_is_read():
-    assert load_simulator(FOLDER / "simulator.yaml") == Oracle(
-        name="MuJoCo", command="./drive.py {scenario} {seed}", folder=FOLDER
-    )
+    assert load_simulator(FOLDER / "simulator.yaml") == Oracle(name="MuJoCo", use="drive:MuJoCo", folder=FOLDER)
 
 
 @needs_mujoco
 @pytest.mark.examples
-@pytest.mark.parametrize(
-    ("names", "code"), [(["barrel_01", "barrel_02", "green_patch_01"], 1), (["barrel_01", "barrel_02"], 0)]
-)
-def test_the_robot_of_friction_fails_in_mujoco_too_and_not_without_the_patch(names, code, tmp_path):
-    scenario = load_scenario(ROOT / "scenarios/friction.yaml")
-    world = read_world(scenario.world)
-    (tmp_path / "less.sdf").write_bytes(without(world, frozenset(world.elements()) - frozenset(names)))
-    text = (ROOT / "scenarios/friction.yaml").read_text()
-    for old, new in (("../sdf/worlds/friction.sdf", "less.sdf"), ("../sdf/", f"{SDF}/")):
-        text = text.replace(old, new)
-    (tmp_path / "less.yaml").write_text(text)
-    done = subprocess.run(
-        [sys.executable, FOLDER / "drive.py", tmp_path / "less.yaml", "0"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == code, done.stderr
-    assert (float(done.stdout.splitlines()[-1].split(",")[1]) < 3.0) == bool(code)
+def test_the_robot_of_friction_fails_in_mujoco_too_and_not_without_the_patch():
+    oracle = load_simulator(FOLDER / "simulator.yaml")
+    scenario = load_scenario(ROOT / "scenarios/friction.yaml").model_copy(update={"oracle": oracle})
+    simulator = PythonSimulator(load_parts(scenario)[0], scenario)
+    barrels = frozenset({"barrel_01", "barrel_02"})
+    failed, passed = (simulator.run(names, 0) for names in (barrels | {"green_patch_01"}, barrels))
+    again = simulator.run(barrels | {"green_patch_01"}, 0)
+    simulator.close()
+    assert (failed.outcome, passed.outcome) == ("failed", "pass")
+    assert failed.end_pose[0] < 3.0 < passed.end_pose[0]
+    assert again.trajectory.tobytes() == failed.trajectory.tobytes()

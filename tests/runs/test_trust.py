@@ -22,6 +22,7 @@ CONTROLLER = "import pathlib\n\npathlib.Path({mark!r}).touch()\n\n\nclass Mine:\
 BRINGS = {
     "command": {"oracle": {"command": "./sim.sh {world}"}},
     "controller": {"controller": {"use": "mine:Mine"}},
+    "simulator": {"oracle": {"use": "mine:Mine"}},
     "package": {"controller": {"use": "whole.part:Mine"}},
     "installed": {"controller": {"use": "subprocess:Popen"}},
 }
@@ -50,7 +51,7 @@ def scenario(home):
 @pytest.mark.parametrize("brings", BRINGS.values(), ids=BRINGS)
 def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
     loaded = load_scenario(scenario(brings))
-    with pytest.raises(UserError, match=r"mail\.ddenv: would start the (command|controller) .* give --trust"):
+    with pytest.raises(UserError, match=r"mail\.ddenv: would start the (command|controller|simulator) .* give --trust"):
         check_trusted(loaded, "mail.ddenv")
     trust(program_of(loaded))
     check_trusted(loaded, "mail.ddenv")
@@ -60,6 +61,7 @@ def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
 CHANGED = (
     ("command", "sim.sh"),
     ("controller", "mine.py"),
+    ("simulator", "mine.py"),
     ("package", "whole/part.py"),
     ("controller", "mine/__init__.py"),
     ("controller", "mine.cpython-311-x86_64-linux-gnu.so"),

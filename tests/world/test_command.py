@@ -89,3 +89,25 @@ def test_it_is_told_before_a_run_is_written(tmp_path):
     with pytest.raises(UserError, match=r"^oracle.command: .*gone.sh"):
         create_run(scenario, tmp_path / "run.ddenv")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_module_of_a_simulator_in_python_has_to_be_there_and_is_not_imported(tmp_path):
+    (tmp_path / "mine.py").write_text("raise SystemExit('imported')")
+    (tmp_path / "native.cpython-311-x86_64-linux-gnu.so").write_bytes(b"")
+    for use in ("mine:Mine", "native:Mine", "json.decoder:Any"):
+        assert command_words(wall(folder=tmp_path, oracle=Oracle(use=use))) == ()
+    run = tmp_path / "run.ddenv"
+    for oracle, said in (
+        (
+            Oracle(use="mime:Mine"),
+            rf"^oracle\.use: there is no module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$",
+        ),
+        (Oracle(use=".mine:Mine"), r"^oracle\.use: there is no module '\.mine' in "),
+        (
+            Oracle(use="mine:Mine", folder=tmp_path / "no"),
+            rf"^oracle\.folder: there is no folder {tmp_path}/no to start the ",
+        ),
+    ):
+        with pytest.raises(UserError, match=said):
+            create_run(wall(folder=tmp_path, oracle=oracle), run)
+        assert not run.exists()

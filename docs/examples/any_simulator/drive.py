@@ -14,10 +14,12 @@ RADIUS, SPEED, STEP = 0.3, 0.8, 0.05  # m, m/s, s
 NOISE = 0.1  # of the heading, rad
 
 
-def obstacles(file):
-    """x, y, yaw, half length, half width and radius of each collision."""
+def obstacles(file, name=None):
+    """x, y, yaw, half length, half width and radius of each collision, or of those of the model `name`."""
     found = []
     for model in ET.parse(file).getroot().iter("model"):
+        if name not in (None, model.get("name")):
+            continue
         x, y, _, _, _, yaw = map(float, (model.findtext("pose") or "0 0 0 0 0 0").split())
         for shape in model.iterfind("link/collision/geometry/*"):
             if shape.tag == "box":

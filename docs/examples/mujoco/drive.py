@@ -1,22 +1,21 @@
-#!/usr/bin/env python3
 """The robot of a scenario in MuJoCo, with the sensors, the pose estimate and the controller that it has in Drake.
 
-drive.py SCENARIO SEED prints the pose log. Exit codes: 0 goal reached, 1 time is up or it fell, 2 this cannot be simulated.
-drive.py SCENARIO prints world and robot as MJCF. Needs ddenv and `pip install mujoco`.
+simulator.yaml names the class MuJoCo. drive.py SCENARIO prints world and robot as MJCF. Needs ddenv and `pip install mujoco`.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from mjcf import Unsupported, mjcf, named
+from mjcf import mjcf, named
 
-from ddenv.errors import UserError
+from ddenv import Ended, SimulatorSetup, SubWorld
 from ddenv.robot.clock import Clock
-from ddenv.robot.controllers import ControllerFailed, controllers
+from ddenv.robot.controllers import controllers
 from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, Truth, setup_of
 from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
@@ -102,8 +101,8 @@ class Simulation:
         return self._data.xpos[self._links].copy(), self._data.xmat[self._links].reshape(-1, 3, 3).copy()
 
 
-def drive(parts: Parts, seed: int) -> bool:
-    """One run, which prints the pose log; whether the robot reached its goal. Raises Broken and ControllerFailed."""
+def drive(parts: Parts, seed: int) -> Iterator[tuple[float, tuple[float, ...]]]:
+    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and ControllerFailed."""
     scenario, world = parts.scenario, parts.world
     simulation, suite = Simulation(parts), SensorSuite(scenario.sensors, seed)
     setup = setup_of(parts.robot, parts.drive, parts.clock, scenario, seed)
@@ -116,7 +115,6 @@ def drive(parts: Parts, seed: int) -> bool:
         lidar = Lidar(scenario.sensors.lidar, Obstacles.of(world), names, moving, suite.lidar)
     floor = whole_of(world, scenario).floor
     speeds, before, goal = np.zeros(len(parts.drive.joints)), 0, scenario.goal
-    print("t,x,y,z,qx,qy,qz,qw")
     for tick in parts.clock.ticks:
         if tick.step > before:
             simulation.advance(tick.step - before, speeds)
@@ -126,9 +124,9 @@ def drive(parts: Parts, seed: int) -> bool:
         arrived = math.hypot(goal.x - x, goal.y - y) <= goal.tolerance
         ended = arrived or z < floor or tick.step == parts.clock.last
         if tick.record or ended:
-            print(f"{tick.time:.6g},{x!r},{y!r},{z!r},{qx!r},{qy!r},{qz!r},{qw!r}", flush=True)
+            yield tick.time, (x, y, z, qx, qy, qz, qw)
         if ended:
-            return arrived
+            return Ended(arrived)
         scan = lidar.scan(tick.time, pose, *simulation.links()) if tick.lidar and lidar else None
         autonomy.sense(tick, simulation.truth(), scan)
         if tick.command:
@@ -136,18 +134,16 @@ def drive(parts: Parts, seed: int) -> bool:
     raise AssertionError("the clock's last tick ends every run")
 
 
-def main() -> int:
-    try:
-        file, *seeds = sys.argv[1:]
-        parts = Parts(Path(file))
-        if not seeds:
-            print(parts.text())
-            return 0
-        return 0 if drive(parts, int(seeds[0])) else 1
-    except (UserError, Unsupported, Broken, ControllerFailed, ValueError, ImportError) as error:
-        print(str(error).splitlines()[0] if str(error) else type(error).__name__, file=sys.stderr)
-        return 2
+class MuJoCo:
+    """The simulator of simulator.yaml."""
+
+    def __init__(self, setup: SimulatorSetup) -> None:
+        # Once for all tests.
+        import mujoco  # noqa: F401
+
+    def run(self, world: SubWorld, seed: int, timeout: float) -> Iterator[tuple[float, tuple[float, ...]]]:
+        return drive(Parts(world.scenario), seed)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    print(Parts(Path(sys.argv[1])).text())

@@ -96,7 +96,13 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
     Raises UserError if stacks are to be kept and it cannot be known.
     """
     moves = any(model.links and not model.static for model in world.models)
-    if not moves and scenario.reduction.slice and journal.state.ties is None:
+    # A simulator in Python says itself what took part, with what rests on what.
+    in_python = scenario.oracle is not None and scenario.oracle.use is not None
+    if (
+        (not moves or (in_python and not scenario.reduction.keep_supports))
+        and scenario.reduction.slice
+        and journal.state.ties is None
+    ):
         journal.record(events.Still())
     if journal.state.ties is not None or journal.state.unsettled or journal.state.supports or not moves:
         return

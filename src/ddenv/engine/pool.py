@@ -53,7 +53,7 @@ def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
 
 # How often a worker may die before it takes its first task, while no test ends, before the engine gives up.
 MOST_BREAKS = 3
-# How much longer than its time limit a test of the user's own simulator may take, s: its worker ends the command, and says why.
+# How much longer than its time limit a test by a command of the user's may take, s: its worker ends the command, and says why.
 MARGIN = 60.0
 # The maximum time of what comes before a test moves, s: large piles are rehearsed for minutes, but nothing may hang forever.
 PREPARATION = 3600.0
@@ -139,10 +139,11 @@ class Pool:
         parts = pickle.dumps((make, (scenario, world, robot)))
         self._parts: Any = self._context.RawArray("c", len(parts))
         self._parts.raw = parts
-        # A simulator of the user's own has nothing to prepare.
-        self._prepares = scenario.oracle is None
+        # A command has nothing to prepare, and its worker ends it.
+        is_command = scenario.oracle is not None and scenario.oracle.command is not None
+        self._prepares = not is_command
         self._limit = scenario.simulation.wall_timeout or GENEROUS
-        self._margin = 0.0 if scenario.oracle is None else MARGIN
+        self._margin = MARGIN if is_command else 0.0
         self._memory = memory_limit(scenario, at_a_time or jobs)
         self._next_memory = 0.0
         self._slots = [_Slot(self._worker()) for _ in range(jobs)]

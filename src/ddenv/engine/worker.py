@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ddenv.errors import UserError
 from ddenv.robot.external.process import MOST_LEFT, PIECE, Complaints, signal_name
+from ddenv.robot.external.python_simulator import PythonSimulator
 from ddenv.robot.external.simulator import ExternalSimulator
 from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
@@ -113,7 +114,7 @@ Answer = Ready | Moment | RunResult | Start | Broken | UserError
 def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     """The simulator that a scenario asks for. Raises UserError if the world cannot be simulated."""
     if scenario.oracle is not None:
-        return ExternalSimulator(world, scenario)
+        return (PythonSimulator if scenario.oracle.use else ExternalSimulator)(world, scenario)
     # Drake takes a second to load, and users of another simulator may not have it.
     from ddenv.robot.simulation.template import Variants
 
@@ -157,7 +158,7 @@ def _settle_in(output: Connection) -> None:
 
 
 def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]) -> Answer:
-    """Does a task, and tells the moments of a test. A traceback is printed."""
+    """Does a task, and tells the moments of a test. The traceback of what nobody foresaw is printed."""
     try:
         if isinstance(simulator, Exception):
             raise simulator
@@ -172,8 +173,10 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
     except BaseException as error:
         if error is simulator and isinstance(error, UserError):
             return error
-        traceback.print_exception(error)
-        sys.stderr.flush()
+        # A UserError says all that a user can mend.
+        if not isinstance(error, UserError):
+            traceback.print_exception(error)
+            sys.stderr.flush()
         return Broken("error", _reason(error))
 
 

@@ -25,9 +25,9 @@ def settings(record: Record) -> Section:
     rows += [("start", _place(section(scenario, "robot").get("spawn")), "where the robot starts")]
     rows += [("goal", _place(scenario.get("goal")), "where it has to go")]
     rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
-    rows += [
-        ("simulator", value_words(section(scenario, "oracle").get("command")), "what runs the robot in place of Drake")
-    ]
+    oracle = section(scenario, "oracle")
+    program = oracle.get("command") or oracle.get("use")
+    rows += [("simulator", value_words(program), "what runs the robot in place of Drake")]
     table = Table(
         ("setting", "value", "meaning"), tuple((name, Name(value), meaning) for name, value, meaning in rows if value)
     )

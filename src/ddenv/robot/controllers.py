@@ -49,29 +49,30 @@ def controllers(settings: Controller, folder: Path) -> Callable[[Setup], Drives]
     return partial(Guarded, make, folder=folder.resolve(), answer_within=settings.answer_within)
 
 
-def load(use: str, folder: Path) -> Callable[[Setup], Any]:
+def load(use: str, folder: Path, key: str = "controller.use", method: str = "step(reading)") -> Callable[[Any], Any]:
     """The class that `use` names: `straight`, `costmap`, or `module:Class` with the module in `folder` or installed.
 
-    Raises UserError if there is no such class, or if its module cannot be imported.
+    Raises UserError, which names the scenario's `key`, if there is no such class with this `method`, or if its module cannot be
+    imported.
     """
     name, _, attribute = BUILT_IN.get(use, use).partition(":")
-    module = importlib.import_module(name) if use in BUILT_IN else _import(name, folder.resolve())
+    module = importlib.import_module(name) if use in BUILT_IN else _import(name, folder.resolve(), key)
     found = getattr(module, attribute, None)
     if not callable(found):
         classes = [each for each, value in vars(module).items() if isinstance(value, type) and each[0] != "_"]
-        raise UserError(f"controller.use: module '{name}' has no class '{attribute}'{nearest(attribute, classes)}")
-    if isinstance(found, type) and not callable(getattr(found, "step", None)):
-        raise UserError(f"controller.use: class '{attribute}' of module '{name}' has no method step(reading)")
-    return cast(Callable[[Setup], Any], found)
+        raise UserError(f"{key}: module '{name}' has no class '{attribute}'{nearest(attribute, classes)}")
+    if isinstance(found, type) and not callable(getattr(found, method.partition("(")[0], None)):
+        raise UserError(f"{key}: class '{attribute}' of module '{name}' has no method {method}")
+    return cast(Callable[[Any], Any], found)
 
 
-def _import(name: str, folder: Path) -> ModuleType:
+def _import(name: str, folder: Path, key: str) -> ModuleType:
     """The module `name`, from `folder` if it has one of that name. Raises UserError."""
     while _brought:
         sys.modules.pop(_brought.pop(), None)
     top = name.partition(".")[0]
     if _has(folder, top):
-        _check_name(top, folder)
+        _check_name(top, folder, key)
     before = set(sys.modules)
     # So that Python finds files written a moment ago.
     importlib.invalidate_caches()
@@ -80,13 +81,13 @@ def _import(name: str, folder: Path) -> ModuleType:
             call_within(LONGEST_IMPORT, __import__, name)
             return sys.modules[name]
     except TooLate:
-        raise UserError(f"controller.use: importing '{name}' took longer than {LONGEST_IMPORT:g} s") from None
+        raise UserError(f"{key}: importing '{name}' took longer than {LONGEST_IMPORT:g} s") from None
     # A module may also exit, or interrupt itself.
     except BaseException as error:
         if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
             hint = nearest(name, [file.stem for file in folder.glob("*.py")])
-            raise UserError(f"controller.use: there is no module '{name}' in {folder}, nor installed{hint}") from None
-        raise UserError(f"controller.use: importing '{name}' raised {described(error)}") from None
+            raise UserError(f"{key}: there is no module '{name}' in {folder}, nor installed{hint}") from None
+        raise UserError(f"{key}: importing '{name}' raised {described(error)}") from None
     finally:
         _brought.update(each for each in set(sys.modules) - before if _has(folder, each.partition(".")[0]))
 
@@ -95,13 +96,13 @@ def _has(folder: Path, top: str) -> bool:
     return (folder / f"{top}.py").is_file() or (folder / top).is_dir()
 
 
-def _check_name(top: str, folder: Path) -> None:
+def _check_name(top: str, folder: Path, key: str) -> None:
     """Raises UserError if a file of `folder` has the name of a module that other code needs."""
     loaded = sys.modules.get(top)
     places = [] if loaded is None else [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
     elsewhere = loaded is not None and not any(place and Path(place).is_relative_to(folder) for place in places)
     if elsewhere or top in sys.stdlib_module_names:
-        raise UserError(f"controller.use: '{top}' in {folder} has the name of another module; rename it")
+        raise UserError(f"{key}: '{top}' in {folder} has the name of another module; rename it")
 
 
 @contextmanager
@@ -120,7 +121,7 @@ FASTEST = 1000.0
 LONGEST_REASON = 300
 # The number of seeds of NumPy's global generator.
 SEEDS = 2**32
-# Our own files, which a reported place leaves out: they do not help the author of the controller.
+# Our own files, which a reported place leaves out: they do not help the author of the code.
 OURS = Path(__file__).parent
 
 
@@ -232,7 +233,7 @@ def _place(traceback: TracebackType | None) -> str:
     while traceback is not None:
         file, line = Path(traceback.tb_frame.f_code.co_filename), traceback.tb_lineno
         traceback = traceback.tb_next
-        if file.parent == OURS or str(file).startswith("<"):
+        if file.is_relative_to(OURS) or str(file).startswith("<"):
             continue
         folder = folder or file.parent
         if file.is_relative_to(folder):

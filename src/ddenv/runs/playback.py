@@ -61,7 +61,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     if not test.is_finished:
         why = "still runs" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
-    lacks = [ANOTHER_SIMULATOR] if position.end.scenario.get("oracle") else []
+    lacks = [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
     try:
         start = position.start_of(number)
         words = purpose(position.end if start is None else start.after, test)

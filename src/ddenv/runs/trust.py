@@ -1,7 +1,7 @@
-"""Programs that a scenario brings along: its own controller, the command of another simulator, or a cluster for its tests.
+"""Programs that a scenario brings along: its own controller, another simulator, or a cluster for its tests.
 
 They start only if the user trusts them: a run file holds its scenario, so one that came by mail can name any program of this
-machine. What is trusted is remembered with the contents of the files that the command names, or of the controller's own module.
+machine. What is trusted is remembered with the contents of the files that the command names, or of the class's own module.
 Where one of these changes, the user is asked again.
 """
 
@@ -64,12 +64,16 @@ def _own_program(scenario: Scenario) -> list[Program]:
     """Its simulator or its controller, if it brings one."""
     if scenario.oracle is not None:
         command, folder = scenario.oracle.command, start_folder(scenario).absolute()
-        return [_program(f"the command '{command}' in {folder}", _named(folder, command))]
-    folder, use = scenario.folder.absolute(), scenario.controller.use
-    if ":" not in use:
-        return []
+        if command is not None:
+            return [_program(f"the command '{command}' in {folder}", _named(folder, command))]
+        return [_class("simulator", scenario.oracle.program, folder)]
+    use = scenario.controller.use
+    return [_class("controller", use, scenario.folder.absolute())] if ":" in use else []
+
+
+def _class(what: str, use: str, folder: Path) -> Program:
     files = _modules(folder, use.partition(":")[0].partition(".")[0])
-    return [_program(f"the controller {use}, searched in {folder} first", files)]
+    return _program(f"the {what} {use}, searched in {folder} first", files)
 
 
 def _program(words: str, files: Iterable[Path]) -> Program:

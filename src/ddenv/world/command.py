@@ -7,6 +7,7 @@ import re
 import shlex
 import shutil
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -22,17 +23,21 @@ _PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 def start_folder(scenario: Scenario) -> Path:
-    """The folder in which the oracle's command starts."""
+    """The folder in which the oracle's command starts, or where its module is searched."""
     own = None if scenario.oracle is None else scenario.oracle.folder
     return scenario.folder if own is None else own
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
-    """The words of the oracle's command, the absolute path of its program first, placeholders unfilled; () without an oracle.
+    """The words of the oracle's command, the absolute path of its program first, placeholders unfilled; () without a command.
 
-    Raises UserError for an unknown placeholder, a missing folder, and a program that is missing or not executable.
+    Raises UserError for an unknown placeholder, a missing folder, and a program that is missing or not executable; for a simulator
+    in Python, if its module is missing.
     """
     if scenario.oracle is None:
+        return ()
+    if scenario.oracle.command is None:
+        _check_module(scenario.oracle.program.partition(":")[0], _existing(scenario))
         return ()
     try:
         words = shlex.split(scenario.oracle.command)
@@ -48,13 +53,27 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
                 f"{KEY}: unknown placeholder {{{name}}}{nearest(name, PLACEHOLDERS)}; "
                 "use {world}, {scenario}, {seed} and {log}; shell variables are not available"
             )
-    folder = start_folder(scenario)
-    if not folder.is_dir():
-        key = "folder" if scenario.oracle.folder is None else "oracle.folder"
-        raise UserError(f"{key}: there is no folder {folder} to start the command in")
-    program = _program(words[0], folder)
+    program = _program(words[0], _existing(scenario))
     _check_first_line(program)
     return program, *words[1:]
+
+
+def _existing(scenario: Scenario) -> Path:
+    """The oracle's folder. Raises UserError if there is none."""
+    folder = start_folder(scenario)
+    if not folder.is_dir():
+        key = "folder" if scenario.oracle is None or scenario.oracle.folder is None else "oracle.folder"
+        raise UserError(f"{key}: there is no folder {folder} to start the simulator in")
+    return folder
+
+
+def _check_module(name: str, folder: Path) -> None:
+    """Raises UserError if a module is neither in `folder` nor installed. Nothing of it is imported."""
+    top = name.partition(".")[0]
+    brought = top and (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None)
+    if not brought:
+        hint = nearest(top, [file.stem for file in folder.glob("*.py")])
+        raise UserError(f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}")
 
 
 def _program(word: str, folder: Path) -> str:

@@ -71,7 +71,7 @@ def load_simulator(path: Path) -> Oracle:
     Raises UserError.
     """
     try:
-        oracle = Oracle.model_validate(_data(path, "name and command"))
+        oracle = Oracle.model_validate(_data(path, "name, and command or use"))
     except ValidationError as error:
         raise _wrong(str(path), *complaint(error.errors()[0], Oracle), {}) from None
     folder = path.resolve().parent

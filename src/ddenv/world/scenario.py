@@ -243,15 +243,30 @@ def seed_of(reduction: Reduction, run: int) -> int:
 
 
 class Oracle(Section):
-    """A program that runs the robot in place of Drake: any simulator.
+    """What runs the robot in place of Drake: any simulator, as a command or as a class in Python.
 
     `command` is started in `folder`, by default the scenario's, without a shell; `{world}` stands for an SDF file, `{scenario}` for
     a scenario in that world, `{seed}` for a number and `{log}` for the file of its pose log (without it, what the command prints).
+    `use` is a `module:Class` in its place, whose module is searched in `folder` first.
     """
 
-    command: str = Field(min_length=1)
+    command: str | None = Field(default=None, min_length=1)
+    use: str | None = Field(default=None, pattern=r"^[\w.]+:\w+$")
     name: str = Field(default="", max_length=40, description="what results call it")
-    folder: Path | None = Field(default=None, description="where the command starts, if not in the scenario's folder")
+    folder: Path | None = Field(
+        default=None, description="where the command starts or the module lies, if not in the scenario's folder"
+    )
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Oracle:
+        if (self.command is None) == (self.use is None):
+            raise PydanticCustomError("oracle", "needs either command, or use: a class in Python")
+        return self
+
+    @property
+    def program(self) -> str:
+        """The command or the class, as it is written."""
+        return self.command or self.use or ""
 
 
 class Whole(Section):
@@ -269,7 +284,7 @@ class Whole(Section):
 class Scenario(Section):
     """Everything one reduction needs to know. `world` is an SDF file, relative to the scenario's folder.
 
-    `folder` is where an own controller's module and an oracle's command are found, by default the scenario's folder.
+    `folder` is where an own controller's module and an oracle's command or module are found, by default the scenario's folder.
     """
 
     name: str = Field(min_length=1, max_length=80)

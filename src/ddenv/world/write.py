@@ -127,10 +127,9 @@ def _link(parent: Element, name: str, link: Link, model: Model, out: Converted) 
     if link.inertia is not None:
         _inertia(element, link.inertia, link.pose)
     back = link.pose.inverse()
-    groups: tuple[tuple[Collision | Visual, ...], ...] = (link.collisions, link.visuals)
-    for group in groups:
-        for one, own in zip(group, _unique(one.name for one in group), strict=True):
-            _shown(element, own, one, back, out)
+    shown: tuple[Collision | Visual, ...] = (*link.collisions, *link.visuals)
+    for one, own in zip(shown, _unique(one.name for one in shown), strict=True):
+        _shown(element, own, one, back, out)
 
 
 def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, out: Converted) -> None:

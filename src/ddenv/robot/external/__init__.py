@@ -1,1 +1,1 @@
-"""Another simulator in Drake's place: a command of the user's."""
+"""Another simulator in Drake's place: a command or a class of the user's."""

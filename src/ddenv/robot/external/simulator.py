@@ -12,7 +12,7 @@ import shutil
 import tempfile
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +28,7 @@ from ddenv.world.command import command_words, filled, has_placeholder, start_fo
 from ddenv.world.files.resources import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Scenario, Whole
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
@@ -43,7 +43,7 @@ class ExternalSimulator:
         """Raises UserError if the command cannot be started."""
         self._world = world
         self._scenario = scenario
-        self._of_all = {"oracle": None, "whole": whole_of(world, scenario)}
+        self._whole = whole_of(world, scenario)
         self._words = command_words(scenario)
         self._names = frozenset(model.name for model in world.models)
         # What a test may take in real time, s.
@@ -60,7 +60,7 @@ class ExternalSimulator:
         if unknown:
             raise ValueError(f"no such model: {min(unknown)}")
         started = time.perf_counter()
-        with _temporary_folder() as folder:
+        with temporary_folder() as folder:
             ended, log = self._execute(folder, keep, seed, progress)
         outcome, failure, trajectory = self._judged(ended, log)
         return RunResult(
@@ -96,7 +96,8 @@ class ExternalSimulator:
 
         try:
             with running(words, start_folder(self._scenario), environment, folder) as command:
-                _write(folder, {world: without(self._world, self._removable - keep), whole: self._scenario_in(world)})
+                scenario = scenario_in(self._scenario, self._whole, world)
+                write_files(folder, {world: without(self._world, self._removable - keep), whole: scenario})
                 command.say(BEGIN)
                 ended = watch(command, self.limit, take, too_much)
                 # Reading a log that is too large would take longer than writing it did.
@@ -105,13 +106,6 @@ class ExternalSimulator:
         except OSError as error:
             ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")
         return ended, log
-
-    def _scenario_in(self, world: Path) -> bytes:
-        """The scenario in the file `world`, as YAML: for simulators that run the same robot."""
-        data = self._scenario.model_copy(update=self._of_all | {"world": world}).model_dump(mode="json")
-        # Files beside the original world are not beside the reduced one.
-        data["reading"]["model_path"] = [str(self._scenario.world.parent), *data["reading"]["model_path"]]
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode()
 
     def _environment(self, values: dict[str, str]) -> dict[str, str]:
         """Our own environment, and what the command needs to know about the scenario."""
@@ -149,12 +143,21 @@ class ExternalSimulator:
         return np.array([[0.0, *start.position, *start.quaternion]])
 
 
+def scenario_in(scenario: Scenario, whole: Whole, file: Path) -> bytes:
+    """The scenario in the part of its world in `file`, as YAML: for simulators that run the same robot."""
+    there = {"oracle": None, "whole": whole, "world": file}
+    data = scenario.model_copy(update=there).model_dump(mode="json")
+    # Files beside the original world are not beside the reduced one.
+    data["reading"]["model_path"] = [str(scenario.world.parent), *data["reading"]["model_path"]]
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode()
+
+
 def _numbers(*values: float) -> str:
     return " ".join(f"{value:.12g}" for value in values)
 
 
 @contextlib.contextmanager
-def _temporary_folder() -> Iterator[Path]:
+def temporary_folder() -> Iterator[Path]:
     """The name of a folder that is made with its files, once a supervisor is there that removes it if this process is killed."""
     try:
         folder = Path(tempfile.gettempdir()) / f"ddenv-{uuid.uuid4().hex}"
@@ -166,9 +169,10 @@ def _temporary_folder() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _write(folder: Path, files: dict[Path, bytes]) -> None:
+def write_files(folder: Path, files: dict[Path, bytes]) -> None:
+    """Writes `files` into the folder, which is made if need be. Raises UserError."""
     try:
-        folder.mkdir(0o700)
+        folder.mkdir(0o700, exist_ok=True)
         for file, text in files.items():
             file.write_bytes(text)
     except OSError as error:
@@ -300,28 +304,28 @@ class PoseLog:
             raise self._wrong(text) from None
         if len(numbers) != len(COLUMNS) or not all(map(math.isfinite, numbers)):
             raise self._wrong(text)
+        kept = self.take(numbers, f"the pose log, line {self._number}")
+        if kept is not None and self._progress is not None:
+            self._progress(kept[0], kept[1:], {})
+
+    def take(self, numbers: Sequence[float], where: str) -> Row | None:
+        """Adds t, x, y, z, qx, qy, qz, qw, finite numbers; returns the row if it is kept. Raises BadLog, which says `where`."""
         if max(map(abs, numbers)) > GREATEST:
-            raise BadLog(
-                f"the pose log, line {self._number}: a number is above {GREATEST:g}: times are in s, places in m"
-            )
+            raise BadLog(f"{where}: a number is above {GREATEST:g}: times are in s, places in m")
         t, x, y, z, *turn = numbers
         before = 0.0 if self._last is None else self._last[0]
         if t < before:
-            raise BadLog(f"the pose log, line {self._number}: time goes back from {before:g} to {t:g} s")
+            raise BadLog(f"{where}: time goes back from {before:g} to {t:g} s")
         length = math.hypot(*turn)
         if length < SHORTEST_QUATERNION:
-            raise BadLog(f"the pose log, line {self._number}: the quaternion {','.join(fields[4:])} has no length")
+            raise BadLog(f"{where}: the quaternion {','.join(f'{part:g}' for part in turn)} has no length")
         qx, qy, qz, qw = (part / length for part in turn)
-        self._keep((t, x, y, z, qw, qx, qy, qz))
-
-    def _keep(self, row: Row) -> None:
-        self._last = row
+        self._last = row = (t, x, y, z, qw, qx, qy, qz)
         # Times that are sums of steps deviate a little.
-        if self._rows and row[0] < self._rows[-1][0] + 0.999 * RECORD_PERIOD:
-            return
+        if self._rows and t < self._rows[-1][0] + 0.999 * RECORD_PERIOD:
+            return None
         self._rows.append(row)
-        if self._progress is not None:
-            self._progress(row[0], row[1:], {})
+        return row
 
     def _wrong(self, text: str) -> BadLog:
         shown = printable(text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}...")
