@@ -17,7 +17,7 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Node, PastRound, Point
+from ddenv.runfile.progress import Margins, Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
 from ddenv.runfile.store import Recorded, RunFile, uncollected
 from ddenv.text import count
@@ -132,9 +132,9 @@ def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
 
 
 def _engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
-    """An isolation that is stopped leaves the reduction before it as it was."""
-    if state.isolating is not None:
-        return _ended(state, "finished", state.isolating.before, at)
+    """An isolation, or a search for margins, that is stopped leaves the reduction before it as it was."""
+    if state.isolating is not None or state.margining is not None:
+        return _as_it_was(state, at)
     return _ended(state, "stopped", event.reason, at)
 
 
@@ -414,6 +414,13 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
         "isolations": fold_decisions.without_open(state),
         **_as_it_was(state, at),
     },
+    e.MarginsStarted: fold_claims.margins_started,
+    e.MarginRan: fold_claims.margin_ran,
+    e.MarginImpossible: fold_claims.margin_impossible,
+    e.MarginsFinished: lambda state, _, at: {
+        **_as_it_was(state, at),
+        "margins": replace(_open_margins(state), ended=True),
+    },
     e.AcceptModeChanged: _accept_mode_changed,
     e.Vetoed: _vetoed,
     e.Unvetoed: _unvetoed,
@@ -431,7 +438,14 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
 
 
 def _as_it_was(state: RunState, at: float) -> Changes:
-    """After an isolation the reduction is as it was before."""
+    """After an isolation, or a search for margins, the reduction is as it was before."""
     if state.isolating is None:
-        raise ValueError("no isolation")
+        margins = _open_margins(state)
+        return _ended(state, margins.status, margins.before, at)
     return _ended(state, "finished", state.isolating.before, at)
+
+
+def _open_margins(state: RunState) -> Margins:
+    if state.margining is None:
+        raise ValueError("neither isolation nor margins")
+    return state.margining

@@ -1,4 +1,4 @@
-"""Folds what runs show: certificates, isolation, and slices with their audits."""
+"""Folds what runs show: certificates, isolation, margins, and slices with their audits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ddenv.runfile import events as e
 from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, origin, searched_anew, without_open
 from ddenv.runfile.fold_tests import Changes, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Returned
+from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Margins, Node, NumberTried, Returned
 from ddenv.runfile.state import OUTCOMES, RunState, Test
 
 
@@ -150,6 +150,54 @@ def _open(state: RunState) -> Isolation:
     last = state.isolating
     if last is None:
         raise ValueError("no isolation")
+    return last
+
+
+# Margins.
+
+
+def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Changes:
+    """Numbers that were asked for before keep their runs, as long as they are about the same models."""
+    names = [asked.name for asked in event.numbers]
+    sound = all(one.low <= one.now <= one.high and one.low < one.high for one in event.numbers)
+    if not names or len(set(names)) != len(names) or not sound or not event.rate or state.baseline is None:
+        raise ValueError(names)
+    if not state.environments[event.environment]:
+        raise ValueError(event.environment)
+    last = state.margins if state.margins is not None and state.margins.environment == event.environment else None
+    before = () if last is None else tuple(one for one in last.numbers if one.asked.name not in names)
+    runs = () if last is None else last.runs
+    margins = Margins(
+        environment=event.environment,
+        numbers=(*before, *(NumberTried(asked, event.rate, event.error) for asked in event.numbers)),
+        wanted=tuple(names),
+        budget=event.budget,
+        before_call=len(runs),
+        certified=event.certified,
+        status=event.status,
+        before=event.before,
+        runs=runs,
+        impossible=() if last is None else last.impossible,
+    )
+    return {"margins": margins}
+
+
+def margin_ran(state: RunState, event: e.MarginRan, _: float) -> Changes:
+    """A run with a changed number has ended."""
+    last = _open_margins(state, event.name)
+    return {"margins": replace(last, runs=(*last.runs, event))}
+
+
+def margin_impossible(state: RunState, event: e.MarginImpossible, _: float) -> Changes:
+    """A number cannot have a value."""
+    last = _open_margins(state, event.name)
+    return {"margins": replace(last, impossible=(*last.impossible, event))}
+
+
+def _open_margins(state: RunState, name: str) -> Margins:
+    last = state.margining
+    if last is None or name not in last.wanted:
+        raise ValueError(name)
     return last
 
 
