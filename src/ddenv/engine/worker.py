@@ -28,6 +28,7 @@ from ddenv.robot.settled import Settled
 from ddenv.text import printable
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.numbers import part_of
 
 if TYPE_CHECKING:
     from ddenv.robot.simulation.template import Variants
@@ -44,6 +45,8 @@ LEFT_OUT = b"\n(the rest of what this test printed is left out)\n"
 END_WAIT = 5.0
 PROC = Path("/proc")
 
+# Other values of numbers, by name.
+Changes = tuple[tuple[str, float], ...]
 Make = Callable[[Scenario, World, Model], Simulator]
 
 
@@ -62,12 +65,13 @@ class Start:
 
 @dataclass(frozen=True)
 class Run:
-    """Asks for a test of at most `limit` s of real time."""
+    """Asks for a test of at most `limit` s of real time, where `changes` have other values of numbers by name."""
 
     keep: frozenset[str]
     seed: int
     full: bool
     limit: float
+    changes: Changes = ()
 
 
 @dataclass(frozen=True)
@@ -133,16 +137,41 @@ def work(line: Connection, output: Connection, parts: Any) -> None:
     except Exception as error:
         simulator = error
     line.send(Ready())
+    other = Other(make, of)
     while True:
         try:
             task = line.recv()
         except (EOFError, OSError):
             return
-        answer = answered(task, simulator, line.send)
+        there = simulator
+        if isinstance(task, Run) and task.changes and not isinstance(simulator, Exception):
+            there = other.simulator(task)
+        answer = answered(task, there, line.send)
         line.send(answer)
         if isinstance(answer, Broken):
             # Nobody knows what an exception has left behind in the simulator.
             os._exit(1)
+
+
+class Other:
+    """Simulators of worlds in which numbers have other values, each made anew of what it keeps; the last one is kept."""
+
+    def __init__(self, make: Make, of: tuple[Scenario, World, Model]) -> None:
+        self._make, self._of = make, of
+        self._last: tuple[object, Simulator | Exception] | None = None
+
+    def simulator(self, run: Run) -> Simulator | Exception:
+        """The simulator for a run, or why there is none."""
+        asked = run.keep, run.changes
+        if self._last is None or self._last[0] != asked:
+            scenario, world, robot = self._of
+            try:
+                there = part_of(scenario, world, run.keep, dict(run.changes))
+                self._last = asked, self._make(*there, robot)
+            # It breaks the test.
+            except Exception as error:
+                self._last = asked, ValueError(str(error)) if isinstance(error, UserError) else error
+        return self._last[1]
 
 
 def _settle_in(output: Connection) -> None:

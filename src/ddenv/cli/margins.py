@@ -1,0 +1,85 @@
+"""`ddenv margins`: how far the numbers of what a run has left may change before the robot no longer fails as it did."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import click
+
+from ddenv.cli import options
+from ddenv.cli.run import idle_run
+from ddenv.cli.terminal import announce, say
+from ddenv.errors import UserError
+
+
+@click.command("margins")
+@options.run_argument
+@click.option(
+    "--number",
+    "globs",
+    multiple=True,
+    metavar="GLOB",
+    help="Only numbers with such a name, such as green_patch_01.friction, '*.y' or controller.speed; may be given again. "
+    "Without it those that promise most come first.",
+)
+@click.option("--budget", type=options.whole(1), default=300, show_default=True, metavar="N", help="Runs at most.")
+@click.option("--list", "listed", is_flag=True, help="Only list the numbers, with how far each is tried.")
+@options.jobs_option("Runs")
+@options.cluster_option
+@options.trust_option
+@options.json_option
+def margins_command(
+    run: str,
+    globs: tuple[str, ...],
+    budget: int,
+    listed: bool,
+    jobs: int,
+    cluster: str | None,
+    trust: bool,
+    as_json: bool,
+) -> int:
+    """Says how far each number of what RUN (a name or a file) has left may change before f goes, and from where the robot reaches
+    its goal: places, sizes and frictions of models, the start, the goal, the speed, the sensors. It changes nothing else.
+    """
+    from ddenv.cli.follow import Interrupted, follow
+    from ddenv.engine.margins import Parts, numbers_left, refusal
+    from ddenv.evidence.margins import fixes_of, margins_of
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.programs import start_engine
+    from ddenv.runs.subject import read_subject
+    from ddenv.words.margins import lines, rows
+
+    path, state = idle_run(run, trust, cluster)
+    if why := refusal(state):
+        raise UserError(f"{path}: {why}: ddenv resume {path}")
+    with RunFile(path) as file:
+        subject = read_subject(file)
+    numbers = numbers_left(Parts(subject.scenario, subject.world, subject.robot), state, globs)
+    if listed:
+        for one in numbers:
+            say(f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip())
+        return 0
+    try:
+        engine = start_engine(path, jobs, margins=json.dumps(globs), most_runs=budget, cluster=cluster)
+        state = follow(path, engine, as_json)
+    except Interrupted as interrupted:
+        if interrupted.state.margining is not None:
+            again = " ".join(["ddenv margins", str(path), *(f"--number '{each}'" for each in globs)])
+            announce(f"interrupted, and all runs are kept; go on with: {again} --budget {budget}")
+            return 130
+        state = interrupted.state
+    with RunFile(path) as file:
+        margins = fold(file.events()).margins
+    if margins is None or not margins.ended:
+        raise UserError(f"{path}: the search for margins was stopped; go on with: ddenv resume {path}")
+    if as_json:
+        sentences = {one.name: one.sentence for one in rows(margins)}
+        found = [asdict(one) | {"words": sentences[one.asked.name]} for one in margins_of(margins)]
+        fixes = [asdict(one) for one in fixes_of(margins)]
+        print(json.dumps({"margins": found, "fixes": fixes, "certified": margins.certified}))
+    else:
+        for line in lines(margins):
+            print(line)
+    return 0

@@ -1,0 +1,241 @@
+"""Finds margins with workers and a run file: tries values of numbers as `reduction.margins` asks for them, in worlds built anew.
+
+All of it follows from the run file, so a search that was killed comes to the same table.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+from ddenv.engine.bench import MOST_BROKEN, WAIT
+from ddenv.engine.control import Control, Stopped
+from ddenv.engine.journal import Journal
+from ddenv.engine.judging import failures_of, result_data
+from ddenv.engine.limits import wall_limit
+from ddenv.engine.pool import Workers
+from ddenv.engine.worker import Broken
+from ddenv.errors import UserError
+from ddenv.evidence.claims import current
+from ddenv.evidence.margins import (
+    ERROR,
+    FIRST_FIX_RUN,
+    FIX_RUNS,
+    MOST_FIXES,
+    MOST_OF_NUMBER,
+    RAREST,
+    Rule,
+    fixes_of,
+    known_of,
+    rule_of,
+)
+from ddenv.evidence.rates import estimated_rate
+from ddenv.reduction.margins import wanted
+from ddenv.robot.result import RunResult
+from ddenv.runfile import events
+from ddenv.runfile.progress import Margins
+from ddenv.runfile.state import BROKEN, RunState
+from ddenv.text import percent
+from ddenv.world.extent import center
+from ddenv.world.model import Model, World
+from ddenv.world.scenario import Scenario, seed_of
+from ddenv.world.sdf.numbers import NotPossible, Number, check, chosen, numbers_of
+
+CHANGED = "a decision of the user ended the search for margins"
+
+# A run: the number's name, its value, and the number of the run.
+Wanted = tuple[str, float, int]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the robot runs in."""
+
+    scenario: Scenario
+    world: World
+    robot: Model
+
+
+def numbers_left(parts: Parts, state: RunState, globs: Sequence[str]) -> list[Number]:
+    """The numbers of what is left whose names match, those that promise most first. Raises UserError."""
+    f = state.f_position
+    near = {name: 0.0 if f is None else math.dist(center(parts.world.model(name)), f) for name in state.environment}
+    kept = sorted(state.environment, key=lambda name: near[name])
+    return chosen(numbers_of(parts.scenario, parts.world, parts.robot, kept), globs)
+
+
+def refusal(state: RunState) -> str:
+    """Why no margins of a run can be found now, and what to do; "" if they can."""
+    if state.baseline is None:
+        return "f is not known yet, so there are no margins"
+    if state.status not in ("finished", "stopped") and state.margining is None:
+        return "its search is not over; let it end first"
+    if state.isolating is not None:
+        return "the search for the nearest world that passes is open; end it first"
+    if not state.environment:
+        return "nothing is left, so there is no model with a margin"
+    return ""
+
+
+def find_margins(
+    parts: Parts,
+    journal: Journal,
+    pool: Workers,
+    control: Control,
+    asked: tuple[Sequence[str], int] | None,
+    stood: tuple[str, str],
+) -> None:
+    """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or goes on with the open search.
+
+    The run is then as it `stood`: its status and why. Raises Stopped, and UserError if nothing can be found.
+    """
+    open_one = journal.state.margining
+    if asked is not None:
+        numbers = numbers_left(parts, journal.state, asked[0])
+        same = open_one is not None and (open_one.wanted, open_one.budget) == (
+            tuple(one.name for one in numbers),
+            asked[1],
+        )
+        if not same:
+            _begin(journal, numbers, asked[1], stood if open_one is None else (open_one.status, open_one.before))
+    _Search(parts, journal, pool, control).carry_out()
+    journal.record(events.MarginsFinished())
+
+
+def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]) -> None:
+    state = journal.state
+    certificate, rate = current(state), journal.rate_of_whole()
+    if certificate is not None:
+        rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
+    if rate < RAREST:
+        raise UserError(
+            f"f shows in about {percent(rate)} of the runs of what is left: too rarely to say where it is gone"
+        )
+    journal.record(
+        events.MarginsStarted(
+            numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
+            environment=journal.number(journal.environment),
+            rate=rate,
+            error=_error_each(rate, min(budget, MOST_OF_NUMBER * len(numbers))),
+            budget=budget,
+            certified=certificate is not None,
+            status="stopped" if stood[0] == "stopped" else "finished",
+            before=stood[1],
+        )
+    )
+
+
+def _error_each(rate: float, runs: int) -> float:
+    """The error of each verdict, so that all that so many runs can give are right with a probability of at least 1 - `ERROR`."""
+    fewest = 1
+    while Rule(rate, ERROR / max(1, runs // (fewest + 1))).surely_needed(()) > fewest:
+        fewest += 1
+    return ERROR / max(1, runs // fewest)
+
+
+class _Search:
+    def __init__(self, parts: Parts, journal: Journal, pool: Workers, control: Control) -> None:
+        self._parts, self._journal, self._pool, self._control = parts, journal, pool, control
+        self._failures = failures_of(journal.file, journal.state, parts.scenario.failure)
+        self._running: dict[int, Wanted] = {}
+        self._kept = frozenset(journal.state.environments[self._now.environment].names(journal.state.elements))
+        self._submitted = len(journal.state.tests)
+        self._broken = 0
+        # How many of the numbers are looked at.
+        self._done = 0
+
+    @property
+    def _now(self) -> Margins:
+        """The search. Raises Stopped if a decision of the user has ended it."""
+        now = self._journal.state.margining
+        if now is None or self._journal.state.search_due:
+            raise Stopped(CHANGED)
+        return now
+
+    def carry_out(self) -> None:
+        """To the end. Raises Stopped, and UserError if all runs break."""
+        while True:
+            self._control.poll()
+            asked = list(self._wanted())
+            if not asked and not self._running:
+                return
+            for one in asked:
+                if not (self._pool.idle and self._control.may_start() and self._control.has_disk_space()):
+                    break
+                if one not in self._running.values():
+                    self._start(one)
+            if not self._running:
+                self._control.settled()
+                time.sleep(WAIT)
+            for test, result in self._pool.finished(WAIT):
+                self._record(self._running.pop(test), result)
+
+    def _wanted(self) -> Iterator[Wanted]:
+        """The runs that are needed next: of one number after the other, then of the nearest fix."""
+        now = self._now
+        while self._done < len(now.wanted):
+            name = now.wanted[self._done]
+            values = list(self._of(now, name))
+            new = {value for value, run in values if run == 0}
+            if sum(self._is_impossible(name, value) for value in sorted(new)):
+                # Others are wanted in their place.
+                now = self._now
+                continue
+            if values:
+                # Later runs may have ended before earlier ones.
+                made = {(one.value, one.run) for one in now.runs if one.name == name}
+                yield from ((name, value, run) for value, run in values if (value, run) not in made)
+                return
+            self._done += 1
+        yield from self._of_fix(now)
+
+    def _of(self, now: Margins, name: str) -> Iterator[tuple[float, int]]:
+        tried = next(one for one in now.numbers if one.asked.name == name)
+        before = set(now.wanted[: now.wanted.index(name)])
+        used = sum(one.name in before for one in now.runs[now.before_call :])
+        earlier = sum(one.name == name for one in now.runs[: now.before_call])
+        most = earlier + min(MOST_OF_NUMBER, now.budget - used)
+        return wanted(tried.asked, rule_of(tried), known_of(now, name), most)
+
+    def _is_impossible(self, name: str, value: float) -> bool:
+        """Whether a value is not possible; that is recorded then."""
+        if any((one.name, one.value) == (name, value) for one in self._now.runs):
+            return False
+        parts = self._parts
+        try:
+            check(parts.scenario, parts.world, parts.robot, self._kept, name, value)
+        except NotPossible as error:
+            self._journal.record(events.MarginImpossible(name, value, str(error)))
+            return True
+        return False
+
+    def _of_fix(self, now: Margins) -> Iterator[Wanted]:
+        for fix in fixes_of(now)[:MOST_FIXES]:
+            if fix.confirmed is None:
+                made = {one.run for one in now.runs if (one.name, one.value) == (fix.name, fix.value)}
+                runs = range(FIRST_FIX_RUN, FIRST_FIX_RUN + FIX_RUNS)
+                yield from ((fix.name, fix.value, run) for run in runs if run not in made)
+            if fix.confirmed is not False:
+                return
+
+    def _start(self, one: Wanted) -> None:
+        name, value, run = one
+        self._submitted += 1
+        self._running[self._submitted] = one
+        seed, limit = seed_of(self._parts.scenario.reduction, run), wall_limit(self._journal.state)
+        # Fresh runs are full ones, as those of a certificate.
+        full = run >= FIRST_FIX_RUN
+        self._pool.submit(self._submitted, self._kept, seed, full, limit, ((name, value),))
+        self._control.started()
+
+    def _record(self, one: Wanted, result: RunResult | Broken) -> None:
+        name, value, run = one
+        data = result_data(result, self._failures)
+        seed = seed_of(self._parts.scenario.reduction, run)
+        fields = ("outcome", "failure", "distance", "end_pose", "wall_seconds")
+        self._journal.record(events.MarginRan(name, value, run, seed, **{each: data[each] for each in fields}))
+        self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
+        if self._broken >= MOST_BROKEN:
+            raise UserError(f"{self._broken} runs in a row broke, the last one: {data['failure']}")
