@@ -24,11 +24,11 @@ from ddenv.evidence.margins import (
     FIRST_FIX_RUN,
     FIX_RUNS,
     MOST_FIXES,
-    MOST_OF_NUMBER,
     RAREST,
     Rule,
     fixes_of,
     known_of,
+    most_of_number,
     rule_of,
 )
 from ddenv.evidence.rates import estimated_rate
@@ -118,7 +118,7 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
             numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
             environment=journal.number(journal.environment),
             rate=rate,
-            error=_error_each(rate, min(budget, MOST_OF_NUMBER * len(numbers))),
+            error=_error_each(rate, min(budget, most_of_number(budget, len(numbers)) * len(numbers))),
             budget=budget,
             certified=certificate is not None,
             status="stopped" if stood[0] == "stopped" else "finished",
@@ -196,7 +196,7 @@ class _Search:
         before = set(now.wanted[: now.wanted.index(name)])
         used = sum(one.name in before for one in now.runs[now.before_call :])
         earlier = sum(one.name == name for one in now.runs[: now.before_call])
-        most = earlier + min(MOST_OF_NUMBER, now.budget - used)
+        most = earlier + min(most_of_number(now.budget, len(now.wanted)), now.budget - used)
         return wanted(tried.asked, rule_of(tried), known_of(now, name), most)
 
     def _is_impossible(self, name: str, value: float) -> bool:

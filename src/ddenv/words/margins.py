@@ -10,7 +10,6 @@ from ddenv.evidence.margins import (
     ERROR,
     FIRST_FIX_RUN,
     FIX_RUNS,
-    MOST_OF_NUMBER,
     Fix,
     Margin,
     Side,
@@ -18,6 +17,7 @@ from ddenv.evidence.margins import (
     fixes_of,
     known_of,
     margins_of,
+    most_of_number,
     rule_of,
 )
 from ddenv.evidence.rates import anytime_interval
@@ -28,7 +28,6 @@ from ddenv.text import count, duration, percent
 
 FINDING = "finding margins"
 HEAD = ("number", "now", "f until", "goal from", "runs")
-GOAL_MISSED = "no goal"
 # How many runs a number takes, about, while none is known.
 USUAL_RUNS = 40
 
@@ -56,7 +55,7 @@ def rows(margins: Margins) -> tuple[Row, ...]:
 def _row(one: Margin) -> Row:
     asked = one.asked
     until = " … ".join(_until(side) for side in one.sides if side.tried) or "-"
-    goals = [_goal(side) for side in one.sides if side.goal is not None or (side.gone and side.gone.verdict == "other")]
+    goals = [words for side in one.sides if (words := _goal(side))]
     cells = (asked.name, _with_unit(one, asked.now), until, ", ".join(goals) or "-", str(one.runs))
     said = "; ".join(_side(one, side) for side in one.sides if side.tried)
     return Row(asked.name, cells, f"{asked.name} ({_with_unit(one, asked.now)}): {said}", one)
@@ -82,11 +81,15 @@ def _value(side: Side) -> str:
 
 
 def _goal(side: Side) -> str:
+    """From where the robot reaches its goal, else what happens where f no longer shows; "" if neither is known."""
     sign = "≥" if side.up else "≤"
     if side.goal is not None:
         return f"{sign} {figure(side.goal.value)}"
-    assert side.gone is not None
-    return f"{sign} {figure(side.gone.value)}: {GOAL_MISSED}, {_instead(side.gone)}"
+    if side.gone is None or side.gone.verdict != "other":
+        return ""
+    failed = (how for how, outcome in zip(side.gone.failures, side.gone.outcomes, strict=True) if outcome == "other")
+    most = Counter(failed).most_common(1)
+    return f"{most[0][0] if most else 'f at times'} {sign} {figure(side.gone.value)}"
 
 
 def _instead(value: Value) -> str:
@@ -168,7 +171,7 @@ def finding(state: RunState) -> str:
 
 def _most(now: Margins) -> int:
     """How many runs the numbers may take."""
-    return min(now.budget, MOST_OF_NUMBER * len(now.wanted))
+    return min(now.budget, most_of_number(now.budget, len(now.wanted)) * len(now.wanted))
 
 
 def _left(state: RunState, now: Margins) -> str:
@@ -221,6 +224,38 @@ def started(_: RunState, after: RunState) -> str:
         f"{FINDING} of {count(len(now.wanted), 'number')}: how far each may change before f goes; at most "
         f"{count(_most(now), 'run')}, and {FIX_RUNS} of the nearest fix"
     )
+
+
+# What a bar shows: the change as a share of the number's scale, drawn as its root, so that small ones are seen.
+BAR_WORDS = (
+    "█ f shows   + the robot reaches its goal   · something else, or undecided   x not possible; between two values that were "
+    "tried: like the one farther out. Left and right: change as a share of the number's scale."
+)
+_SIGNS = {"f": "█", "goal": "+", "other": "·", "undecided": "·", "impossible": "x", "": "·"}
+
+
+def bar_scale(width: int) -> str:
+    """The scale above bars of so many cells: 1 %, 10 % and 100 % on both sides of the present value."""
+    cells = [" "] * width
+    for share, mark in ((0.01, "1"), (0.1, "10"), (1.0, "100 %")):
+        for sign in (-1, 1):
+            at = min(width - len(mark), max(0, round((width - 1) / 2 * (1 + sign * share**0.5) - (len(mark) - 1) / 2)))
+            cells[at : at + len(mark)] = mark
+    cells[width // 2] = "0"
+    return "".join(cells)
+
+
+def bar(one: Margin, width: int) -> str:
+    """A line of so many cells around the present value, up to the farthest one that was tried on each side."""
+    cells = []
+    for place in range(width):
+        at = 2.0 * place / (width - 1) - 1.0
+        side = one.sides[at > 0.0]
+        change = at * at * one.asked.scale
+        beyond = (each for each in side.tried if abs(each.value - one.asked.now) >= 0.999 * change)
+        cells.append(_SIGNS[each.verdict] if (each := next(beyond, None)) else " ")
+    cells[width // 2] = "|"
+    return "".join(cells)
 
 
 def lines(margins: Margins) -> Iterable[str]:
