@@ -115,7 +115,12 @@ def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, capsys):
     monkeypatch.setattr("ddenv.cli.follow.follow", interrupted)
     done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_00.y", "--budget", 50)
     assert done.returncode == 130
-    assert f"go on with: ddenv margins {run.path} --number 'crate_00.y' --budget 50" in done.stderr
+    assert f"go on with: ddenv margins {run.path}\n" in done.stderr
+    asked = []
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **more: asked.append(more))
+    in_process(monkeypatch, capsys, "margins", run.path)
+    in_process(monkeypatch, capsys, "margins", run.path, "--budget", 70)
+    assert asked == [{"cluster": None}, {"cluster": None, "margins": "[]", "most_runs": 70}]
 
 
 @pytest.mark.programs
@@ -144,7 +149,7 @@ def test_a_real_search_that_is_killed_and_interrupted_comes_to_its_end(tmp_path)
     with RunFile(run) as file:
         kept = [each.event for each in file.events() if isinstance(each.event, MarginRan)]
     assert kept
-    done = subprocess.run(margins, capture_output=True, text=True)
+    done = subprocess.run([*DDENV, "margins", run], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     with RunFile(run) as file:
         state = fold(file.events())

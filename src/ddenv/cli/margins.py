@@ -12,6 +12,8 @@ from ddenv.cli.run import idle_run
 from ddenv.cli.terminal import announce, say
 from ddenv.errors import UserError
 
+BUDGET = 300
+
 
 @click.command("margins")
 @options.run_argument
@@ -23,7 +25,7 @@ from ddenv.errors import UserError
     help="Only numbers with such a name, such as green_patch_01.friction, '*.y' or controller.speed; may be given again. "
     "Without it those that promise most come first.",
 )
-@click.option("--budget", type=options.whole(1), default=300, show_default=True, metavar="N", help="Runs at most.")
+@click.option("--budget", type=options.whole(1), metavar="N", help="Runs at most; 300 if not given.")
 @click.option("--list", "listed", is_flag=True, help="Only list the numbers, with how far each is tried.")
 @options.jobs_option("Runs")
 @options.cluster_option
@@ -32,7 +34,7 @@ from ddenv.errors import UserError
 def margins_command(
     run: str,
     globs: tuple[str, ...],
-    budget: int,
+    budget: int | None,
     listed: bool,
     jobs: int,
     cluster: str | None,
@@ -41,6 +43,7 @@ def margins_command(
 ) -> int:
     """Says how far each number of what RUN (a name or a file) has left may change before f goes, and from where the robot reaches
     its goal: places, sizes and frictions of models, the start, the goal, the speed, the sensors. It changes nothing else.
+    A search that was interrupted goes on.
     """
     from ddenv.cli.follow import Interrupted, follow
     from ddenv.engine.margins import Parts, numbers_left, refusal
@@ -62,18 +65,20 @@ def margins_command(
             say(f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip())
         return 0
     try:
-        engine = start_engine(path, jobs, margins=json.dumps(globs), most_runs=budget, cluster=cluster)
+        # One that was interrupted goes on, unless another one is asked for.
+        goes_on = state.margining is not None and not globs and budget is None
+        asked = {} if goes_on else {"margins": json.dumps(globs), "most_runs": budget or BUDGET}
+        engine = start_engine(path, jobs, cluster=cluster, **asked)
         state = follow(path, engine, as_json)
     except Interrupted as interrupted:
         if interrupted.state.margining is not None:
-            again = " ".join(["ddenv margins", str(path), *(f"--number '{each}'" for each in globs)])
-            announce(f"interrupted, and all runs are kept; go on with: {again} --budget {budget}")
+            announce(f"interrupted, and all runs are kept; go on with: ddenv margins {path}")
             return 130
         state = interrupted.state
     with RunFile(path) as file:
         margins = fold(file.events()).margins
     if margins is None or not margins.ended:
-        raise UserError(f"{path}: the search for margins was stopped; go on with: ddenv resume {path}")
+        raise UserError(f"{path}: the search for margins was stopped; go on with: ddenv margins {path}")
     if as_json:
         sentences = {one.name: one.sentence for one in rows(margins)}
         found = [asdict(one) | {"words": sentences[one.asked.name]} for one in margins_of(margins)]

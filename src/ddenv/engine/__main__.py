@@ -102,6 +102,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         options.certify
         or options.isolate is not None
         or options.margins is not None
+        or journal.state.margining is not None
         or journal.has_broken
         or file.commands(journal.state.last_command)
     )

@@ -22,13 +22,14 @@ from ddenv.evidence.claims import current
 from ddenv.evidence.margins import (
     ERROR,
     FIRST_FIX_RUN,
+    FIRST_LOOK,
     FIX_RUNS,
     MOST_FIXES,
+    MOST_OF_NUMBER,
     RAREST,
     Rule,
     fixes_of,
     known_of,
-    most_of_number,
     rule_of,
 )
 from ddenv.evidence.rates import estimated_rate
@@ -118,7 +119,7 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
             numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
             environment=journal.number(journal.environment),
             rate=rate,
-            error=_error_each(rate, min(budget, most_of_number(budget, len(numbers)) * len(numbers))),
+            error=_error_each(rate, min(budget, MOST_OF_NUMBER * len(numbers))),
             budget=budget,
             certified=certificate is not None,
             status="stopped" if stood[0] == "stopped" else "finished",
@@ -143,7 +144,7 @@ class _Search:
         self._kept = frozenset(journal.state.environments[self._now.environment].names(journal.state.elements))
         self._submitted = len(journal.state.tests)
         self._broken = 0
-        # How many of the numbers are looked at.
+        # How many looks at a number are over: the second one has the runs that are left.
         self._done = 0
 
     @property
@@ -173,10 +174,10 @@ class _Search:
                 self._record(self._running.pop(test), result)
 
     def _wanted(self) -> Iterator[Wanted]:
-        """The runs that are needed next: of one number after the other, then of the nearest fix."""
+        """The runs that are needed next: of one number after the other, twice, then of the nearest fix."""
         now = self._now
-        while self._done < len(now.wanted):
-            name = now.wanted[self._done]
+        while self._done < 2 * len(now.wanted):
+            name = now.wanted[self._done % len(now.wanted)]
             values = list(self._of(now, name))
             new = {value for value, run in values if run == 0}
             if sum(self._is_impossible(name, value) for value in sorted(new)):
@@ -193,10 +194,10 @@ class _Search:
 
     def _of(self, now: Margins, name: str) -> Iterator[tuple[float, int]]:
         tried = next(one for one in now.numbers if one.asked.name == name)
-        before = set(now.wanted[: now.wanted.index(name)])
-        used = sum(one.name in before for one in now.runs[now.before_call :])
+        used = sum(one.name != name for one in now.runs[now.before_call :])
         earlier = sum(one.name == name for one in now.runs[: now.before_call])
-        most = earlier + min(most_of_number(now.budget, len(now.wanted)), now.budget - used)
+        first_look = self._done < len(now.wanted) and len(now.wanted) > 1
+        most = earlier + min(FIRST_LOOK if first_look else MOST_OF_NUMBER, now.budget - used)
         return wanted(tried.asked, rule_of(tried), known_of(now, name), most)
 
     def _is_impossible(self, name: str, value: float) -> bool:

@@ -24,8 +24,8 @@ REACHED, MISSED = 0.9, 0.1
 ERROR = 0.05
 # After this many runs a value stays undecided.
 MOST_RUNS = 16
-# The maximum number of runs for one number in one call; where many share a budget, each may have fewer, but so many.
-MOST_OF_NUMBER, SHARED = 60, 32
+# The maximum number of runs for one number; and where several share a budget, in a first look at each of them.
+MOST_OF_NUMBER, FIRST_LOOK = 60, 32
 # Where f shows more rarely than this in what is left, no few runs say where it is gone.
 RAREST = 0.25
 # So many fresh runs judge the nearest fix, from this run on: far from all runs of a reduction, its certificates and isolations.
@@ -129,11 +129,6 @@ class Margin:
     @property
     def sides(self) -> tuple[Side, Side]:
         return self.down, self.up
-
-
-def most_of_number(budget: int, numbers: int) -> int:
-    """How many runs each of so many numbers may take where all of them have a budget: many are looked at more roughly."""
-    return min(MOST_OF_NUMBER, max(SHARED, budget // numbers))
 
 
 def rule_of(tried: NumberTried) -> Rule:

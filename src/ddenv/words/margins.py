@@ -10,6 +10,7 @@ from ddenv.evidence.margins import (
     ERROR,
     FIRST_FIX_RUN,
     FIX_RUNS,
+    MOST_OF_NUMBER,
     Fix,
     Margin,
     Side,
@@ -17,7 +18,6 @@ from ddenv.evidence.margins import (
     fixes_of,
     known_of,
     margins_of,
-    most_of_number,
     rule_of,
 )
 from ddenv.evidence.rates import anytime_interval
@@ -28,8 +28,8 @@ from ddenv.text import count, duration, percent
 
 FINDING = "finding margins"
 HEAD = ("number", "now", "f until", "goal from", "runs")
-# How many runs a number takes, about, while none is known.
-USUAL_RUNS = 40
+# How many times the runs of a first look at all numbers both looks take, about.
+SECOND_LOOK = 1.4
 
 
 def figure(value: float) -> str:
@@ -171,7 +171,7 @@ def finding(state: RunState) -> str:
 
 def _most(now: Margins) -> int:
     """How many runs the numbers may take."""
-    return min(now.budget, most_of_number(now.budget, len(now.wanted)) * len(now.wanted))
+    return min(now.budget, MOST_OF_NUMBER * len(now.wanted))
 
 
 def _left(state: RunState, now: Margins) -> str:
@@ -182,10 +182,10 @@ def _left(state: RunState, now: Margins) -> str:
     if runs[-1].run >= FIRST_FIX_RUN:
         left = max(1, FIX_RUNS - sum(one.run >= FIRST_FIX_RUN for one in runs) % FIX_RUNS)
     else:
-        over = now.wanted.index(runs[-1].name)
-        before = sum(one.name != runs[-1].name for one in runs)
-        each = before / over if over else float(USUAL_RUNS)
-        left = min(_most(now) - len(runs), round(each * (len(now.wanted) - over)) - (len(runs) - before)) + FIX_RUNS
+        # Numbers that were looked at once leave runs to the second look.
+        made = len({one.name for one in runs})
+        left = _most(now) if made < len(now.wanted) else round(len(runs) / made * len(now.wanted) * SECOND_LOOK)
+        left = min(_most(now), max(len(runs), left)) - len(runs) + FIX_RUNS
     seconds = sum(one.wall_seconds for one in runs) / len(runs) * max(1, left) / max(1, state.jobs)
     return f", about {duration(seconds)} left"
 
