@@ -1,22 +1,30 @@
 """Margins with workers and a run file: the same table whoever works on it and however often it is killed, within its budget."""
 
-from contextlib import suppress
+from contextlib import closing, suppress
 
+import numpy as np
 import pytest
 
 from ddenv.engine.control import Stopped
+from ddenv.engine.journal import Journal
 from ddenv.engine.margins import Parts, find_margins
+from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.evidence.margins import FIX_RUNS, fixes_of, margins_of
+from ddenv.runfile.events import EngineStopped
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import read_parts, read_subject
+from ddenv.runs.creation import create_run
+from ddenv.runs.export import export_world
+from ddenv.runs.subject import load_parts, read_parts
 from ddenv.words.margins import lines
+from ddenv.world.load import load_scenario
 from ddenv.world.sdf.numbers import changed
 from tests.engine.fake import FakePool, drive, engine, new_run
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs
 from tests.engine.reading import send, state_of
 from tests.tiers import slow
+from tests.wall import wall
 
 GLOBS = ["wall.y", "controller.speed"]
 
@@ -94,12 +102,25 @@ def test_whoever_works_on_it_and_however_often_it_is_killed_the_table_is_the_sam
 
 
 def test_a_stop_keeps_all_and_the_run_is_as_it_was(path):
-    before = state_of(path)
-    with engine(path, fake()) as one:
-        send(path, "stop")
-        with pytest.raises(Stopped):
-            find_margins(Parts(one.scenario, one.world, read_subject(one.journal.file).robot), one.journal, fake(), one.control,
-                         (GLOBS, 300), (before.status, before.reason))  # fmt: skip
+    before, pool = state_of(path), fake()
+    made = []
+
+    def stops(keep, seed, changes):
+        made.append(seed)
+        if len(made) == 10:
+            send(path, "stop")
+        return margins_like(keep, seed, changes)
+
+    pool.changed = stops
+    with pytest.raises(Stopped, match="stopped by the user"):
+        work(path, pool)
+    with RunFile(path) as file:
+        file.own()
+        Journal(file).record(EngineStopped("stopped by the user"))
+    state = state_of(path)
+    assert (state.status, state.reason, state.minimal) == (before.status, before.reason, before.minimal)
+    assert len(state.margining.runs) >= 8
+    assert table(work(path, fake(), globs=None)) == table(work(path, fake()))
 
 
 def test_a_budget_is_kept_and_what_was_found_before_stays(path):
@@ -144,3 +165,30 @@ def test_the_part_of_the_world_that_runs_is_what_is_exported(path):
         scenario, world, _ = read_parts(file)
     _, after = changed(scenario, world, {"wall.y": 0.25})
     assert after.text == world.text.replace(b"<pose>2 0 1.05 0 0 0</pose>", b"<pose>2 0.25 1.05 0 0 0</pose>")
+
+
+@pytest.mark.programs
+def test_a_run_with_another_value_has_the_bits_of_the_world_that_is_exported(tmp_path):
+    """Also after a run with the present value in the same worker, and before another one."""
+    run = tmp_path / "one.ddenv"
+    create_run(wall(), run)
+    with RunFile(run) as file:
+        scenario, world, robot = read_parts(file)
+    keep = frozenset(world.elements())
+    files = tmp_path / "fixed.sdf", tmp_path / "fixed.yaml"
+    export_world(run, *files, margin="wall.y=0.25")
+    fixed = load_scenario(files[1])
+    with closing(Pool(scenario, world, robot, 1)) as pool, closing(Pool(fixed, *load_parts(fixed), 1)) as other:
+        own = [simulated(pool, keep, changes) for changes in ((), (("wall.y", 0.25),), (("wall.y", 2.0),), ())]
+        exported = simulated(other, keep, ())
+    assert np.array_equal(own[1], exported)
+    assert np.array_equal(own[0], own[3])
+    assert not np.array_equal(own[0][-1], own[2][-1])
+
+
+def simulated(pool, keep, changes):
+    """The robot's trajectory with seed 1."""
+    pool.submit(1, keep, 1, changes=changes)
+    while not (ended := pool.finished(1.0)):
+        pass
+    return ended[0][1].trajectory
