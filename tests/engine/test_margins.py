@@ -7,7 +7,7 @@ import pytest
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.margins import Parts, find_margins
+from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.evidence.margins import FIX_RUNS, fixes_of, margins_of
@@ -47,7 +47,7 @@ def work(path, pool, globs=GLOBS, budget=300, prepare=lambda _: None, **options)
     before = state_of(path)
     with engine(path, pool, prepare=prepare, **options) as one:
         with RunFile(path) as file:
-            parts = Parts(*read_parts(file))
+            parts = read_parts(file)
         asked = None if globs is None else (globs, budget)
         find_margins(parts, one.journal, pool, one.control, asked, (before.status, before.reason))
         return one.journal.state

@@ -46,45 +46,39 @@ def margins_command(
     A search that was interrupted goes on.
     """
     from ddenv.cli.follow import Interrupted, follow
-    from ddenv.engine.margins import Parts, numbers_left, refusal
-    from ddenv.evidence.margins import fixes_of, margins_of
+    from ddenv.engine.margins import numbers_left, refusal
+    from ddenv.evidence.margins import fixes_of
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.programs import start_engine
-    from ddenv.runs.subject import read_subject
+    from ddenv.runs.subject import read_parts
     from ddenv.words.margins import lines, rows
 
     path, state = idle_run(run, trust, cluster)
     if why := refusal(state):
         raise UserError(f"{path}: {why}: ddenv resume {path}")
     with RunFile(path) as file:
-        subject = read_subject(file)
-    numbers = numbers_left(Parts(subject.scenario, subject.world, subject.robot), state, globs)
+        numbers = numbers_left(read_parts(file), state, globs)
     if listed:
         for one in numbers:
             say(f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip())
         return 0
+    goes_on = state.margining is not None and not globs and budget is None
+    asked = {} if goes_on else {"margins": json.dumps(globs), "most_runs": budget or BUDGET}
     try:
-        # One that was interrupted goes on, unless another one is asked for.
-        goes_on = state.margining is not None and not globs and budget is None
-        asked = {} if goes_on else {"margins": json.dumps(globs), "most_runs": budget or BUDGET}
-        engine = start_engine(path, jobs, cluster=cluster, **asked)
-        state = follow(path, engine, as_json)
+        follow(path, start_engine(path, jobs, cluster=cluster, **asked), as_json)
     except Interrupted as interrupted:
         if interrupted.state.margining is not None:
             announce(f"interrupted, and all runs are kept; go on with: ddenv margins {path}")
             return 130
-        state = interrupted.state
     with RunFile(path) as file:
         margins = fold(file.events()).margins
     if margins is None or not margins.ended:
         raise UserError(f"{path}: the search for margins was stopped; go on with: ddenv margins {path}")
     if as_json:
-        sentences = {one.name: one.sentence for one in rows(margins)}
-        found = [asdict(one) | {"words": sentences[one.asked.name]} for one in margins_of(margins)]
+        found = [asdict(one.margin) | {"words": one.sentence} for one in rows(margins)]
         fixes = [asdict(one) for one in fixes_of(margins)]
         print(json.dumps({"margins": found, "fixes": fixes, "certified": margins.certified}))
     else:
-        for line in lines(margins):
-            print(line)
+        print("\n".join(lines(margins)))
     return 0

@@ -23,7 +23,7 @@ from ddenv.engine.disturbances import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
-from ddenv.engine.margins import Parts, find_margins
+from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError
@@ -126,7 +126,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
                 isolate(world, journal, bench, options.isolate or None, before)
             elif options.margins is not None or journal.state.margining is not None:
                 asked = None if options.margins is None else (json.loads(options.margins), options.most_runs)
-                find_margins(Parts(scenario, world, robot), journal, pool, control, asked, (stood, before))
+                find_margins((scenario, world, robot), journal, pool, control, asked, (stood, before))
             else:
                 Driver(scenario, world, journal, bench, control).reduce()
     except Stopped as stop:

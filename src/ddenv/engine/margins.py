@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 from ddenv.engine.bench import MOST_BROKEN, WAIT
 from ddenv.engine.control import Control, Stopped
@@ -18,20 +18,8 @@ from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
+from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
-from ddenv.evidence.margins import (
-    ERROR,
-    FIRST_FIX_RUN,
-    FIRST_LOOK,
-    FIX_RUNS,
-    MOST_FIXES,
-    MOST_OF_NUMBER,
-    RAREST,
-    Rule,
-    fixes_of,
-    known_of,
-    rule_of,
-)
 from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.margins import wanted
 from ddenv.robot.result import RunResult
@@ -44,40 +32,26 @@ from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario, seed_of
 from ddenv.world.sdf.numbers import NotPossible, Number, check, chosen, numbers_of
 
-CHANGED = "a decision of the user ended the search for margins"
-
+# What the robot runs in.
+Parts = tuple[Scenario, World, Model]
 # A run: the number's name, its value, and the number of the run.
 Wanted = tuple[str, float, int]
 
 
-@dataclass(frozen=True)
-class Parts:
-    """What the robot runs in."""
-
-    scenario: Scenario
-    world: World
-    robot: Model
-
-
 def numbers_left(parts: Parts, state: RunState, globs: Sequence[str]) -> list[Number]:
     """The numbers of what is left whose names match, those that promise most first. Raises UserError."""
-    f = state.f_position
-    near = {name: 0.0 if f is None else math.dist(center(parts.world.model(name)), f) for name in state.environment}
-    kept = sorted(state.environment, key=lambda name: near[name])
-    return chosen(numbers_of(parts.scenario, parts.world, parts.robot, kept), globs)
+    f, world = state.f_position or (0.0, 0.0, 0.0), parts[1]
+    kept = sorted(state.environment, key=lambda name: math.dist(center(world.model(name)), f))
+    return chosen(numbers_of(*parts, kept), globs)
 
 
 def refusal(state: RunState) -> str:
-    """Why no margins of a run can be found now, and what to do; "" if they can."""
+    """Why no margins of a run can be found now; "" if they can."""
     if state.baseline is None:
         return "f is not known yet, so there are no margins"
-    if state.status not in ("finished", "stopped") and state.margining is None:
+    if state.margining is None and (state.status not in ("finished", "stopped") or state.isolating is not None):
         return "its search is not over; let it end first"
-    if state.isolating is not None:
-        return "the search for the nearest world that passes is open; end it first"
-    if not state.environment:
-        return "nothing is left, so there is no model with a margin"
-    return ""
+    return "" if state.environment else "nothing is left, so there is no model with a margin"
 
 
 def find_margins(
@@ -92,25 +66,20 @@ def find_margins(
 
     The run is then as it `stood`: its status and why. Raises Stopped, and UserError if nothing can be found.
     """
-    open_one = journal.state.margining
+    now = journal.state.margining
     if asked is not None:
-        numbers = numbers_left(parts, journal.state, asked[0])
-        same = open_one is not None and (open_one.wanted, open_one.budget) == (
-            tuple(one.name for one in numbers),
-            asked[1],
-        )
-        if not same:
-            _begin(journal, numbers, asked[1], stood if open_one is None else (open_one.status, open_one.before))
+        numbers, budget = numbers_left(parts, journal.state, asked[0]), asked[1]
+        if now is None or (now.wanted, now.budget) != (tuple(one.name for one in numbers), budget):
+            _begin(journal, numbers, budget, stood if now is None else (now.status, now.before))
     _Search(parts, journal, pool, control).carry_out()
     journal.record(events.MarginsFinished())
 
 
 def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]) -> None:
-    state = journal.state
-    certificate, rate = current(state), journal.rate_of_whole()
+    certificate, rate = current(journal.state), journal.rate_of_whole()
     if certificate is not None:
         rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
-    if rate < RAREST:
+    if rate < known.RAREST:
         raise UserError(
             f"f shows in about {percent(rate)} of the runs of what is left: too rarely to say where it is gone"
         )
@@ -119,7 +88,7 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
             numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
             environment=journal.number(journal.environment),
             rate=rate,
-            error=_error_each(rate, min(budget, MOST_OF_NUMBER * len(numbers))),
+            error=known.error_each(rate, min(budget, known.MOST_OF_NUMBER * len(numbers))),
             budget=budget,
             certified=certificate is not None,
             status="stopped" if stood[0] == "stopped" else "finished",
@@ -128,31 +97,24 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
     )
 
 
-def _error_each(rate: float, runs: int) -> float:
-    """The error of each verdict, so that all that so many runs can give are right with a probability of at least 1 - `ERROR`."""
-    fewest = 1
-    while Rule(rate, ERROR / max(1, runs // (fewest + 1))).surely_needed(()) > fewest:
-        fewest += 1
-    return ERROR / max(1, runs // fewest)
-
-
 class _Search:
     def __init__(self, parts: Parts, journal: Journal, pool: Workers, control: Control) -> None:
         self._parts, self._journal, self._pool, self._control = parts, journal, pool, control
-        self._failures = failures_of(journal.file, journal.state, parts.scenario.failure)
+        self._failures = failures_of(journal.file, journal.state, parts[0].failure)
         self._running: dict[int, Wanted] = {}
         self._kept = frozenset(journal.state.environments[self._now.environment].names(journal.state.elements))
-        self._submitted = len(journal.state.tests)
-        self._broken = 0
+        self._submitted, self._broken = len(journal.state.tests), 0
         # How many looks at a number are over: the second one has the runs that are left.
-        self._done = 0
+        self._looks = 0
+        # The values of the current number that are known to be possible.
+        self._possible: set[float] = set()
 
     @property
     def _now(self) -> Margins:
         """The search. Raises Stopped if a decision of the user has ended it."""
         now = self._journal.state.margining
         if now is None or self._journal.state.search_due:
-            raise Stopped(CHANGED)
+            raise Stopped("a decision of the user ended the search for margins")
         return now
 
     def carry_out(self) -> None:
@@ -175,48 +137,44 @@ class _Search:
 
     def _wanted(self) -> Iterator[Wanted]:
         """The runs that are needed next: of one number after the other, twice, then of the nearest fix."""
-        now = self._now
-        while self._done < 2 * len(now.wanted):
-            name = now.wanted[self._done % len(now.wanted)]
-            values = list(self._of(now, name))
-            new = {value for value, run in values if run == 0}
+        while self._looks < 2 * len(self._now.wanted):
+            name = self._now.wanted[self._looks % len(self._now.wanted)]
+            values = list(self._of(self._now, name))
+            # Later runs may have ended before earlier ones.
+            made = {(one.value, one.run) for one in self._now.runs if one.name == name}
+            new = {value for value, _ in values} - {value for value, _ in made} - self._possible
             if sum(self._is_impossible(name, value) for value in sorted(new)):
                 # Others are wanted in their place.
-                now = self._now
                 continue
+            self._possible |= new
             if values:
-                # Later runs may have ended before earlier ones.
-                made = {(one.value, one.run) for one in now.runs if one.name == name}
                 yield from ((name, value, run) for value, run in values if (value, run) not in made)
                 return
-            self._done += 1
-        yield from self._of_fix(now)
+            self._looks, self._possible = self._looks + 1, set()
+        yield from self._of_fix(self._now)
 
     def _of(self, now: Margins, name: str) -> Iterator[tuple[float, int]]:
         tried = next(one for one in now.numbers if one.asked.name == name)
         used = sum(one.name != name for one in now.runs[now.before_call :])
         earlier = sum(one.name == name for one in now.runs[: now.before_call])
-        first_look = self._done < len(now.wanted) and len(now.wanted) > 1
-        most = earlier + min(FIRST_LOOK if first_look else MOST_OF_NUMBER, now.budget - used)
-        return wanted(tried.asked, rule_of(tried), known_of(now, name), most)
+        first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
+        most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.budget - used)
+        return wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
 
     def _is_impossible(self, name: str, value: float) -> bool:
         """Whether a value is not possible; that is recorded then."""
-        if any((one.name, one.value) == (name, value) for one in self._now.runs):
-            return False
-        parts = self._parts
         try:
-            check(parts.scenario, parts.world, parts.robot, self._kept, name, value)
+            check(*self._parts, self._kept, name, value)
         except NotPossible as error:
             self._journal.record(events.MarginImpossible(name, value, str(error)))
             return True
         return False
 
     def _of_fix(self, now: Margins) -> Iterator[Wanted]:
-        for fix in fixes_of(now)[:MOST_FIXES]:
+        for fix in known.fixes_of(now)[: known.MOST_FIXES]:
             if fix.confirmed is None:
                 made = {one.run for one in now.runs if (one.name, one.value) == (fix.name, fix.value)}
-                runs = range(FIRST_FIX_RUN, FIRST_FIX_RUN + FIX_RUNS)
+                runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
                 yield from ((fix.name, fix.value, run) for run in runs if run not in made)
             if fix.confirmed is not False:
                 return
@@ -225,18 +183,16 @@ class _Search:
         name, value, run = one
         self._submitted += 1
         self._running[self._submitted] = one
-        seed, limit = seed_of(self._parts.scenario.reduction, run), wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
-        full = run >= FIRST_FIX_RUN
+        seed, full = seed_of(self._parts[0].reduction, run), run >= known.FIRST_FIX_RUN
+        limit = wall_limit(self._journal.state)
         self._pool.submit(self._submitted, self._kept, seed, full, limit, ((name, value),))
         self._control.started()
 
     def _record(self, one: Wanted, result: RunResult | Broken) -> None:
-        name, value, run = one
-        data = result_data(result, self._failures)
-        seed = seed_of(self._parts.scenario.reduction, run)
-        fields = ("outcome", "failure", "distance", "end_pose", "wall_seconds")
-        self._journal.record(events.MarginRan(name, value, run, seed, **{each: data[each] for each in fields}))
+        data, seed = result_data(result, self._failures), seed_of(self._parts[0].reduction, one[2])
+        kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
+        self._journal.record(events.MarginRan(*one, seed, **kept))
         self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(f"{self._broken} runs in a row broke, the last one: {data['failure']}")

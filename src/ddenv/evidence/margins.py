@@ -12,31 +12,27 @@ from typing import Literal
 
 from ddenv.evidence.rates import leans_to
 from ddenv.runfile.events import NumberAsked
-from ddenv.runfile.progress import Margins, NumberTried
+from ddenv.runfile.progress import Margins
+from ddenv.runfile.state import BROKEN
 
 # "f" still shows, the robot reaches its "goal" instead, "other" things happen; "undecided" after the most runs that a value gets,
 # "impossible" in the world, "" while it is open.
 Verdict = Literal["f", "goal", "other", "undecided", "impossible", ""]
 # f still shows at `SHOWS` of its rate rather than at `GONE` of it; the robot reaches its goal at the rate `REACHED`, not `MISSED`.
-SHOWS, GONE = 0.9, 0.1
-REACHED, MISSED = 0.9, 0.1
+SHOWS, GONE, REACHED, MISSED = 0.9, 0.1, 0.9, 0.25
 # The chance that any claim of a call is wrong is at most this.
 ERROR = 0.05
-# After this many runs a value stays undecided.
-MOST_RUNS = 16
-# The maximum number of runs for one number; and where several share a budget, in a first look at each of them.
-MOST_OF_NUMBER, FIRST_LOOK = 60, 32
+# The maximum number of runs of a value, of a number, and of that in a first look where several share a budget.
+MOST_RUNS, MOST_OF_NUMBER, FIRST_LOOK = 16, 60, 32
 # Where f shows more rarely than this in what is left, no few runs say where it is gone.
 RAREST = 0.25
-# So many fresh runs judge the nearest fix, from this run on: far from all runs of a reduction, its certificates and isolations.
-FIX_RUNS, FIRST_FIX_RUN = 20, 500_000_000
-# Fresh runs judge so many fixes at most.
-MOST_FIXES = 3
+# So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction, its certificates and isolations.
+FIX_RUNS, MOST_FIXES, FIRST_FIX_RUN = 20, 3, 500_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Wald's sequential tests of a value, where f shows at `rate` at the present one; a verdict is wrong with a probability of at
+    """Wald's sequential tests of a value, where f shows at `rate` at the present one: a verdict is wrong with a probability of at
     most `error`.
     """
 
@@ -46,41 +42,61 @@ class Rule:
     def verdict(self, outcomes: Sequence[str]) -> Verdict:
         """What the outcomes of runs 0, 1, ... show; "" while they do not decide. Runs beyond the decision do not change it."""
         f = goal = sound = 0
-        gone = reached = None
+        shows: bool | None = None
+        reached: bool | None = None
         for number, outcome in enumerate(outcomes, 1):
-            # A broken run says nothing, and counts only against the patience.
-            if outcome not in ("error", "timeout"):
+            # A broken run says nothing, and only counts against the patience.
+            if outcome not in BROKEN:
                 f, goal, sound = f + (outcome == "similar"), goal + (outcome == "pass"), sound + 1
-                if gone is None and (found := self._leans(f, sound, SHOWS * self.rate, GONE * self.rate)) is not None:
-                    gone = not found
+                # Two claims may be wrong.
+                error = self.error / 2.0
+                if shows is None:
+                    shows = leans_to(f, sound - f, SHOWS * self.rate, GONE * self.rate, error)
                 if reached is None:
-                    reached = self._leans(goal, sound, REACHED, MISSED)
-            if gone is False:
+                    reached = leans_to(goal, sound - goal, REACHED, MISSED, error)
+            if shows:
                 return "f"
-            if gone and reached is not None:
+            if shows is False and reached is not None:
                 return "goal" if reached else "other"
             if number >= MOST_RUNS:
-                return "other" if gone else "undecided"
+                return "undecided" if shows is None else "other"
         return ""
-
-    def _leans(self, hits: int, runs: int, rate: float, other: float) -> bool | None:
-        # Two claims may be wrong: on f, and on the goal.
-        return leans_to(hits, runs - hits, rate, other, self.error / 2.0)
 
     def surely_needed(self, outcomes: Sequence[str]) -> int:
         """How many more runs a value needs at least, whatever they show; 0 if it is decided."""
-        more = 0
-        while not any(self.verdict([*outcomes, *[each] * more]) for each in ("similar", "pass", "other")):
-            more += 1
-        return more
+        alike = ("similar", "pass", "other")
+        return next(more for more in count() if any(self.verdict([*outcomes, *[each] * more]) for each in alike))
+
+
+def error_each(rate: float, runs: int) -> float:
+    """The error of each verdict, so that all that so many runs can give are right with a probability of at least 1 - `ERROR`."""
+    fewest = 1
+    while Rule(rate, ERROR / max(1, runs // (fewest + 1))).surely_needed(()) > fewest:
+        fewest += 1
+    return ERROR / max(1, runs // fewest)
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a number's values: the outcomes of runs 0, 1, ..., how each failed, and why some are not possible."""
+
+    outcomes: Mapping[float, Sequence[str]] = field(default_factory=dict)
+    failures: Mapping[float, Sequence[str]] = field(default_factory=dict)
+    impossible: Mapping[float, str] = field(default_factory=dict)
+
+    def values(self, rule: Rule) -> list[Value]:
+        """All values that were tried, the lowest first."""
+        judged = {
+            value: Value(value, rule.verdict(found), tuple(found), tuple(self.failures.get(value, ())))
+            for value, found in self.outcomes.items()
+        }
+        judged |= {value: Value(value, "impossible", why=why) for value, why in self.impossible.items()}
+        return [judged[value] for value in sorted(judged)]
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value that was tried, and its verdict. `outcomes` are those of its runs in their order; `failures` say how each failed.
-
-    `why` it is not possible.
-    """
+    """A value that was tried, with the outcomes of its runs in their order and how each failed, or `why` it is not possible."""
 
     value: float
     verdict: Verdict
@@ -88,24 +104,14 @@ class Value:
     failures: tuple[str, ...] = ()
     why: str = ""
 
-    @property
-    def shown(self) -> int:
-        """In how many runs f showed."""
-        return self.outcomes.count("similar")
-
-    @property
-    def reached(self) -> int:
-        """In how many runs the robot reached its goal."""
-        return self.outcomes.count("pass")
-
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """The values tried on one side of the present one, `up` or down, the nearest first.
+    """The values tried above (`up`) or below the present one, the nearest first; `end` is where the range ends.
 
-    `until`: the farthest up to which f shows at all values that were decided; None where the present one is that. `gone`: the
-    nearest at which it does not show, or which is not possible. `goal`: the nearest at which the robot reaches its goal. `again`:
-    the farthest at which f shows beyond `gone`. `end` is where the range ends.
+    `until`: the farthest up to which f shows at all values that were decided; None: the present one. `gone`: the nearest at which
+    it does not show, or which is not possible. `goal`: the nearest at which the robot reaches its goal. `again`: the farthest at
+    which f shows beyond `gone`.
     """
 
     up: bool
@@ -119,7 +125,7 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """What is known of a number: on both sides of its present value, by `runs` runs in all."""
+    """What is known of a number below and above its present value, by `runs` runs in all."""
 
     asked: NumberAsked
     down: Side
@@ -131,31 +137,21 @@ class Margin:
         return self.down, self.up
 
 
-def rule_of(tried: NumberTried) -> Rule:
-    """The rule by which the values of a number are judged."""
-    return Rule(tried.rate, tried.error)
-
-
 def margin_of(asked: NumberAsked, rule: Rule, known: Known) -> Margin:
     """The margin of a number, by what is known of its values."""
-    values = sorted((_value(value, rule, known) for value in known.values()), key=lambda one: one.value)
+    values = known.values(rule)
     down = [one for one in reversed(values) if one.value < asked.now]
     up = [one for one in values if one.value > asked.now]
     runs = sum(map(len, known.outcomes.values()))
     return Margin(asked, _side(False, down, asked.low), _side(True, up, asked.high), runs)
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
-    """What is known of a number's values: the outcomes of runs 0, 1, ..., how each failed, and why some are not possible."""
-
-    outcomes: Mapping[float, Sequence[str]] = field(default_factory=dict)
-    failures: Mapping[float, Sequence[str]] = field(default_factory=dict)
-    impossible: Mapping[float, str] = field(default_factory=dict)
-
-    def values(self) -> list[float]:
-        """All values that were tried."""
-        return sorted({*self.outcomes, *self.impossible})
+def _side(up: bool, tried: Sequence[Value], end: float) -> Side:
+    gone = next((at for at, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")), len(tried))
+    shows = [[one for one in part if one.verdict == "f"] for part in (tried[:gone], tried[gone:])]
+    until, again = (part[-1] if part else None for part in shows)
+    goal = next((one for one in tried if one.verdict == "goal"), None)
+    return Side(up, tuple(tried), end, until, None if gone == len(tried) else tried[gone], goal, again)
 
 
 def known_of(margins: Margins, name: str) -> Known:
@@ -164,50 +160,26 @@ def known_of(margins: Margins, name: str) -> Known:
     for one in margins.runs:
         if one.name == name and one.run < FIRST_FIX_RUN:
             runs.setdefault(one.value, {})[one.run] = one.outcome, one.failure
-    outcomes: dict[float, list[str]] = {}
-    failures: dict[float, list[str]] = {}
-    for value, by_run in runs.items():
-        finished = [by_run[run] for run in takewhile(by_run.__contains__, count())]
-        outcomes[value], failures[value] = [one for one, _ in finished], [how for _, how in finished]
-    impossible = {one.value: one.why for one in margins.impossible if one.name == name}
-    return Known(outcomes, failures, impossible)
+    finished = {value: [by[run] for run in takewhile(by.__contains__, count())] for value, by in runs.items()}
+    return Known(
+        {value: [outcome for outcome, _ in found] for value, found in finished.items()},
+        {value: [how for _, how in found] for value, found in finished.items()},
+        {one.value: one.why for one in margins.impossible if one.name == name},
+    )
 
 
 def margins_of(margins: Margins) -> tuple[Margin, ...]:
     """The margins of all numbers with a value that was tried, in the order in which they were asked for."""
-    found = (margin_of(one.asked, rule_of(one), known_of(margins, one.asked.name)) for one in margins.numbers)
+    rules = ((one.asked, Rule(one.rate, one.error)) for one in margins.numbers)
+    found = (margin_of(asked, rule, known_of(margins, asked.name)) for asked, rule in rules)
     return tuple(one for one in found if one.up.tried or one.down.tried)
-
-
-def _value(value: float, rule: Rule, known: Known) -> Value:
-    if value in known.impossible:
-        return Value(value, "impossible", why=known.impossible[value])
-    outcomes, failures = tuple(known.outcomes[value]), tuple(known.failures.get(value, ()))
-    return Value(value, rule.verdict(outcomes), outcomes, failures)
-
-
-def _side(up: bool, tried: Sequence[Value], end: float) -> Side:
-    gone = next(
-        (place for place, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")), len(tried)
-    )
-    shows = [one for one in tried[:gone] if one.verdict == "f"]
-    again = [one for one in tried[gone:] if one.verdict == "f"]
-    return Side(
-        up=up,
-        tried=tuple(tried),
-        end=end,
-        until=shows[-1] if shows else None,
-        gone=tried[gone] if gone < len(tried) else None,
-        goal=next((one for one in tried if one.verdict == "goal"), None),
-        again=again[-1] if again else None,
-    )
 
 
 @dataclass(frozen=True, slots=True)
 class Fix:
     """A changed number with which the robot reaches its goal, by runs of the search; `share` of the number's scale it is changed.
 
-    Of `runs` fresh runs it `reached` its goal in so many; `confirmed`: they show that it does.
+    Of `runs` fresh runs it `reached` its goal in so many; `confirmed`: they show that it does. None: they are not all made.
     """
 
     name: str
@@ -220,21 +192,19 @@ class Fix:
 
 def fixes_of(margins: Margins) -> tuple[Fix, ...]:
     """All values at which the robot reached its goal, the smallest change first."""
-    values = (
+    fresh: dict[tuple[str, float], dict[int, bool]] = {}
+    for run in margins.runs:
+        if run.run >= FIRST_FIX_RUN:
+            fresh.setdefault((run.name, run.value), {})[run.run] = run.outcome == "pass"
+    found = []
+    for asked, value in (
         (one.asked, value) for one in margins_of(margins) for side in one.sides for value in side.tried
-        if value.verdict == "goal"
-    )  # fmt: skip
-    found = [_fix(margins, asked, value.value) for asked, value in values]
+    ):
+        if value.verdict == "goal":
+            made = fresh.get((asked.name, value.value), {})
+            reached, runs = sum(made.values()), len(made)
+            # A run that broke counts against it.
+            shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
+            share = abs(value.value - asked.now) / asked.scale
+            found.append(Fix(asked.name, value.value, share, reached, runs, shown if runs >= FIX_RUNS else None))
     return tuple(sorted(found, key=lambda one: (one.share, one.name)))
-
-
-def _fix(margins: Margins, asked: NumberAsked, value: float) -> Fix:
-    fresh = {
-        one.run: one.outcome
-        for one in margins.runs
-        if (one.name, one.value) == (asked.name, value) and one.run >= FIRST_FIX_RUN
-    }
-    reached, runs = sum(outcome == "pass" for outcome in fresh.values()), len(fresh)
-    # A run that broke counts against it.
-    confirmed = None if runs < FIX_RUNS else leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
-    return Fix(asked.name, value, abs(value - asked.now) / asked.scale, reached, runs, confirmed)

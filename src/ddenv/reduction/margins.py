@@ -74,14 +74,14 @@ def _between(asked: NumberAsked, up: bool, near: list[Value], limit: tuple[str, 
 
 def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER) -> Iterator[tuple[float, int]]:
     """The runs that are surely needed next, as (value, run), with at most `most` runs in all; none when the search is over."""
-    margin = margin_of(asked, rule, known)
-    lengths = [len(steps(asked, side.up)) for side in margin.sides]
-    for side, length in zip(margin.sides, lengths, strict=True):
+    sides = margin_of(asked, rule, known).sides
+    lengths = [len(steps(asked, side.up)) for side in sides]
+    for side, length in zip(sides, lengths, strict=True):
         value = next_value(asked, side.up, side.tried)
         if value is None:
             continue
-        made = {one.value: len(one.outcomes) for one in side.tried}
-        more = rule.surely_needed(known.outcomes.get(value, ()))
+        made = known.outcomes.get(value, ())
+        more = rule.surely_needed(made)
         # Each side has its part, so that no race of tests decides which one gets the last runs.
-        if sum(made.values()) + more <= most * length // sum(lengths):
-            yield from ((value, made.get(value, 0) + run) for run in range(more))
+        if sum(len(one.outcomes) for one in side.tried) + more <= most * length // sum(lengths):
+            yield from ((value, len(made) + run) for run in range(more))

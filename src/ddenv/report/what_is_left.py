@@ -16,9 +16,9 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
 from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
-from ddenv.text import as_sentence, count, first_of, plain
+from ddenv.text import count, first_of, plain
 from ddenv.words.claims import rate
-from ddenv.words.margins import HEAD, nearest_fix, rows, sureness
+from ddenv.words.margins import HEAD, rows, said
 from ddenv.world.model import is_ground
 
 # The maximum number of models in the table and with a sentence, of names in a list, of those that a removal drops, and of maps.
@@ -129,11 +129,8 @@ def margins(record: Record) -> Section | None:
     known = record.state.margins
     if known is None or not (found := rows(known)):
         return None
-    table = Table(HEAD, tuple((Name(one.name), *one.cells[1:]) for one in found), {1, 4})
-    fix = as_sentence(nearest_fix(known)) if nearest_fix(known) else ""
-    # A name keeps its first letter as it is.
-    said = [fix, *(f"{one.sentence}." for one in found), sureness(known)]
-    return Section("Margins", (table, *(say(plain(words)) for words in said if words)))
+    table = Table(HEAD, tuple((Name(one.cells[0]), *one.cells[1:]) for one in found), {1, 4})
+    return Section("Margins", (table, *(say(plain(words)) for words in said(known))))
 
 
 def _passing(record: Record, found: Nearest) -> list[Block]:

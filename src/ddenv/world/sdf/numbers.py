@@ -19,13 +19,13 @@ from ddenv.world.files.resources import Resources
 from ddenv.world.model import Box, Cylinder, Model, Sphere, World, is_ground
 from ddenv.world.placement import INSIDE, overlap_of, stands_inside
 from ddenv.world.pose import Pose
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Scenario, Sensors
 from ddenv.world.sdf.moved import Edit, edited, with_places
 from ddenv.world.sdf.read import parse_world
 from ddenv.world.sdf.xml import Element, floats, parse, tag_end
 from ddenv.world.whole import whole_of
 
-# Less than this part of a number does not matter where its kind names no smaller difference that does.
+# Less than this part of a number does not matter, unless it is a place or an angle.
 PART = 0.05
 # Two models that never move may stand so deep in each other, m: barrels on thin patches of ground do.
 SUNK = 0.1
@@ -33,66 +33,51 @@ SUNK = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a number is: `range` has its lowest and highest value that are tried, from its present one and the robot's length, m.
-
-    Differences below `matters` do not matter, nor below `PART` of the present value if they are `relative` to it.
+    """Of numbers in `unit`: less than `matters` does not matter, and `range` has the lowest and the highest value to try, from the
+    present one and the robot's length, m.
     """
 
     unit: str
     matters: float
     range: Callable[[float, float], tuple[float, float]]
-    relative: bool = True
 
 
-def _around(lengths: float, unit: str = "m") -> Kind:
-    return Kind(unit, 0.01, lambda now, length: (now - lengths * length, now + lengths * length), relative=False)
+def _times(unit: str, least: float, most: float) -> Kind:
+    return Kind(unit, 1e-6, lambda now, _: (least * now, most * now))
 
 
-def _from_zero_to(most: float, unit: str, matters: float) -> Kind:
+def _up_to(unit: str, matters: float, most: float) -> Kind:
     return Kind(unit, matters, lambda now, _: (0.0, max(most, 2.0 * now)))
 
 
-def _times(least: float, most: float, unit: str) -> Kind:
-    return Kind(unit, 1e-6, lambda now, _: (min(least * now, most * now), max(least * now, most * now)))
-
-
-_ANGLE = Kind("rad", math.radians(1.0), lambda now, _: (now - math.pi, now + math.pi), relative=False)
-_SIZE = _times(0.1, 3.0, "m")
-# The kinds of a model's numbers, those first that promise most.
-OF_MODELS = {
-    "friction": _from_zero_to(1.0, "", 0.002),
-    "x": _around(3.0),
-    "y": _around(3.0),
-    "radius": _SIZE,
-    "length": _SIZE,
-    "size_x": _SIZE,
-    "size_y": _SIZE,
-    "size_z": _SIZE,
-    "yaw": _ANGLE,
-    "z": _around(1.0),
-    "mass": _times(0.1, 10.0, "kg"),
-}
+_PLACE = Kind("m", 0.01, lambda now, length: (now - 3.0 * length, now + 3.0 * length))
+_HEIGHT = Kind("m", 0.01, lambda now, length: (now - length, now + length))
+_ANGLE = Kind("rad", math.radians(1.0), lambda now, _: (now - math.pi, now + math.pi))
+_SIZE, _ERROR = _times("m", 0.1, 3.0), _up_to("", 0.005, 0.5)
+# An option of an own controller: what it means, only its author knows.
+_OPTION = Kind(
+    "", 1e-6, lambda now, _: (min(0.1 * now, 10.0 * now), max(0.1 * now, 10.0 * now)) if now else (-1.0, 1.0)
+)
+SIZES = ("radius", "length", "size_x", "size_y", "size_z")
+# The numbers of a model, those first that promise most.
+OF_MODELS = {"friction": _up_to("", 0.002, 1.0), "x": _PLACE, "y": _PLACE, **dict.fromkeys(SIZES, _SIZE)}
+OF_MODELS |= {"yaw": _ANGLE, "z": _HEIGHT, "mass": _times("kg", 0.1, 10.0)}
 # Those of a scenario, with the keys under which it has them.
 OF_SCENARIO: dict[str, tuple[Kind, tuple[str, ...]]] = {
-    "controller.speed": (_times(0.1, 3.0, "m/s"), ("controller", "speed")),
-    "spawn.y": (_around(3.0), ("robot", "spawn", "y")),
+    "controller.speed": (_times("m/s", 0.1, 3.0), ("controller", "speed")),
+    "spawn.y": (_PLACE, ("robot", "spawn", "y")),
     "spawn.yaw": (_ANGLE, ("robot", "spawn", "yaw")),
-    "spawn.x": (_around(3.0), ("robot", "spawn", "x")),
-    "goal.y": (_around(3.0), ("goal", "y")),
-    "goal.x": (_around(3.0), ("goal", "x")),
-    "lidar.range": (_times(0.1, 3.0, "m"), ("sensors", "lidar", "range")),
-    "lidar.noise": (_from_zero_to(0.3, "m", 0.005), ("sensors", "lidar", "noise")),
-    "sensors.compass": (_from_zero_to(0.5, "rad", 0.005), ("sensors", "compass")),
-    "sensors.compass_bias": (_from_zero_to(0.5, "rad", 0.005), ("sensors", "compass_bias")),
-    "sensors.gyro": (_from_zero_to(0.5, "rad/s", 0.005), ("sensors", "gyro")),
-    "sensors.gyro_bias": (_from_zero_to(0.5, "rad/s", 0.005), ("sensors", "gyro_bias")),
-    "sensors.tilt": (_from_zero_to(0.2, "rad", 0.002), ("sensors", "tilt")),
-    "sensors.odometry": (_from_zero_to(0.5, "", 0.005), ("sensors", "odometry")),
-    "sensors.odometry_bias": (_from_zero_to(0.5, "", 0.005), ("sensors", "odometry_bias")),
+    "spawn.x": (_PLACE, ("robot", "spawn", "x")),
+    "goal.y": (_PLACE, ("goal", "y")),
+    "goal.x": (_PLACE, ("goal", "x")),
+    "lidar.range": (_times("m", 0.1, 3.0), ("sensors", "lidar", "range")),
+    "lidar.noise": (_up_to("m", 0.005, 0.3), ("sensors", "lidar", "noise")),
 }
+_NOISES = [
+    name for name in Sensors.model_fields if name.removesuffix("_bias") in ("compass", "gyro", "tilt", "odometry")
+]
+OF_SCENARIO |= {f"sensors.{name}": (_ERROR, ("sensors", name)) for name in _NOISES}
 OPTIONS = "controller.options."
-# An option of an own controller is tried from a tenth to ten times of what it is; what that may mean, only its author knows.
-_OPTION = Kind("", 1e-6, lambda now, _: tuple(sorted((0.1 * now, 10.0 * now))) if now else (-1.0, 1.0))  # type: ignore[arg-type, return-value]  # two
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,23 +105,16 @@ def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[st
     box = bounds(robot.collisions)
     length = 1.0 if box is None else float((box[1] - box[0])[:2].max())
     models = [world.model(name) for name in kept if name not in world.anchors]
-    values = [
-        (kind, f"{model.name}.{what}", value)
+    values: list[tuple[Kind, str, float | None]] = [
+        (kind, f"{model.name}.{what}", _of_model(world, model, what))
         for what, kind in OF_MODELS.items()
         for model in models
-        if (value := _of_model(world, model, what)) is not None
     ]
     data = scenario.model_dump()
-    values += [
-        (kind, name, value) for name, (kind, keys) in OF_SCENARIO.items() if (value := _at(data, keys)) is not None
-    ]
+    values += [(kind, name, _at(data, keys)) for name, (kind, keys) in OF_SCENARIO.items()]
     options = scenario.controller.options if ":" in scenario.controller.use else {}
-    values += [
-        (_OPTION, f"{OPTIONS}{name}", float(value))
-        for name, value in options.items()
-        if isinstance(value, int | float) and not isinstance(value, bool)
-    ]
-    return {name: _number(kind, name, value, length) for kind, name, value in values}
+    values += [(_OPTION, f"{OPTIONS}{name}", value) for name, value in options.items() if type(value) in (int, float)]
+    return {name: _number(kind, name, float(value), length) for kind, name, value in values if value is not None}
 
 
 def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
@@ -153,7 +131,7 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
 
 def _number(kind: Kind, name: str, now: float, length: float) -> Number:
     low, high = (float(f"{end:.9g}") for end in kind.range(now, length))
-    resolution = max(kind.matters, PART * abs(now) if kind.relative else 0.0)
+    resolution = max(kind.matters, 0.0 if kind in (_PLACE, _HEIGHT, _ANGLE) else PART * abs(now))
     return Number(name, now, low, high, max(high - now, now - low), resolution, kind.unit)
 
 
@@ -165,9 +143,8 @@ def _at(data: Any, keys: Iterable[str]) -> float | None:
 
 def _of_model(world: World, model: Model, what: str) -> float | None:
     """A number of a model; None if it has none of that kind, or if it does not stand in the world's own text."""
-    x, y, z = model.pose.position
     if what in ("x", "y", "z", "yaw"):
-        return {"x": x, "y": y, "z": z, "yaw": model.pose.yaw()}[what]
+        return model.pose.yaw() if what == "yaw" else model.pose.position["xyz".index(what)]
     if not world.text.startswith(b"<model", model.spans[0][0]):
         return None
     if what == "friction":
@@ -176,13 +153,12 @@ def _of_model(world: World, model: Model, what: str) -> float | None:
     if what == "mass":
         inertia = model.links[0].inertia if len(model.links) == 1 and not model.static else None
         return None if inertia is None else inertia.mass
-    shapes = [one.shape for one in model.collisions]
-    match shapes[0] if len(shapes) == 1 else None, what:
-        case Box(size), "size_x" | "size_y" | "size_z":
+    match [one.shape for one in model.collisions], what:
+        case [Box(size)], "size_x" | "size_y" | "size_z":
             return size["xyz".index(what[-1])]
-        case Cylinder(radius) | Sphere(radius), "radius":
+        case ([Cylinder(radius, _)], "radius") | ([Sphere(radius)], "radius"):
             return radius
-        case Cylinder(_, length), "length":
+        case [Cylinder(_, length)], "length":
             return length
     return None
 
@@ -192,21 +168,19 @@ def _of_model(world: World, model: Model, what: str) -> float | None:
 
 def changed(scenario: Scenario, world: World, changes: Mapping[str, float]) -> tuple[Scenario, World]:
     """The scenario and the world with these values of numbers. Raises NotPossible."""
-    data, places = scenario.model_dump(), dict[tuple[str, ...], float]()
+    data, of_scenario = scenario.model_dump(), False
     for name, value in changes.items():
-        if name in OF_SCENARIO:
-            places[OF_SCENARIO[name][1]] = value
-        elif name.startswith(OPTIONS):
-            places["controller", "options", name.removeprefix(OPTIONS)] = value
-        else:
+        if name not in OF_SCENARIO and not name.startswith(OPTIONS):
             world = _with(scenario, world, name, value)
-    for (*keys, last), value in places.items():
-        section = data
+            continue
+        own = ("controller", "options", name.removeprefix(OPTIONS))
+        *keys, last = OF_SCENARIO[name][1] if name in OF_SCENARIO else own
+        section, of_scenario = data, True
         for key in keys:
             section = section[key]
         section[last] = round(value) if isinstance(section[last], int) else value
     try:
-        return (Scenario.model_validate(data) if places else scenario), world
+        return (Scenario.model_validate(data) if of_scenario else scenario), world
     except ValidationError as error:
         raise NotPossible(error.errors()[0]["msg"]) from None
 
@@ -218,11 +192,10 @@ def part_of(
 
     A simulator of the user's own leaves models out of the world's text itself. Raises NotPossible.
     """
-    stays = kept | ({model.name for model in world.models} - set(world.elements(frozenset(scenario.protected))))
-    whole = whole_of(world, scenario)
+    gone, whole = set(world.elements(frozenset(scenario.protected))) - kept, whole_of(world, scenario)
     scenario, world = changed(scenario, world, changes)
     if scenario.oracle is None:
-        world = replace(world, models=tuple(model for model in world.models if model.name in stays))
+        world = replace(world, models=tuple(model for model in world.models if model.name not in gone))
     return scenario.model_copy(update={"whole": whole}), world
 
 
@@ -240,14 +213,14 @@ def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], 
     owner = name.rpartition(".")[0]
     if name in OF_SCENARIO or owner not in kept:
         return
-    model, new = world.model(owner), after.model(owner)
+    before, model = world.model(owner), after.model(owner)
     for other in after.models:
         # What stands on the ground may sink into it, and two that never move push nothing apart.
         if other.name == owner or (model.static and is_ground(other)):
             continue
         tolerance = SUNK if model.static and other.static else INSIDE
-        depth = overlap_of(new, other)
-        if depth > tolerance and depth > overlap_of(model, world.model(other.name)) + tolerance:
+        depth = overlap_of(model, other)
+        if depth > tolerance and depth > overlap_of(before, other) + tolerance:
             raise NotPossible(f"{owner} would be {depth:.2f} m inside {other.name}")
 
 
@@ -255,10 +228,11 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     """The world with a number of a model changed. What was written is read again: only that shows that it is there."""
     owner, _, what = name.rpartition(".")
     model = world.model(owner)
+    at = next(one for one in parse(world.text, world.path).iter() if one.start == model.spans[0][0])
     if what in ("x", "y", "z", "yaw"):
-        text = _moved(scenario, world, model, what, value)
+        text = _moved(scenario, world, model, at, what, value)
     else:
-        text = edited(world.text, sorted(set(_edits(world, model, what, value))))
+        text = edited(world.text, sorted(_edits(world, model, at, what, f"{value:.9g}")))
     try:
         after = parse_world(text, world.path, scenario.reading, Resources(world.resources))
     except UserError as error:
@@ -269,15 +243,11 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     return after
 
 
-def _moved(scenario: Scenario, world: World, model: Model, what: str, value: float) -> bytes:
+def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: str, value: float) -> bytes:
     """The text with a model in another place."""
-    position, turn = list(model.pose.position), 0.0
-    if what == "yaw":
-        turn = value - model.pose.yaw()
-    else:
-        position["xyz".index(what)] = value
-    x, y, z = position
-    pose = _element(world, model).find("pose")
+    turn = value - model.pose.yaw() if what == "yaw" else 0.0
+    x, y, z = (value if axis == what else now for axis, now in zip("xyz", model.pose.position, strict=True))
+    pose = at.find("pose")
     words = [] if pose is None else (pose.text or "").split()
     if pose is not None and not pose.attrib and len(words) == 6 and len(model.spans) == 1:
         # A turn about the vertical is the last one of roll, pitch and yaw.
@@ -288,51 +258,37 @@ def _moved(scenario: Scenario, world: World, model: Model, what: str, value: flo
     return with_places(world, {model.name: [move @ link.pose for link in model.links]}, scenario.reading)[0]
 
 
-def _element(world: World, model: Model) -> Element:
-    """The element of a model in the world's text."""
-    return next(one for one in parse(world.text, world.path).iter() if one.start == model.spans[0][0])
-
-
-def _edits(world: World, model: Model, what: str, value: float) -> Iterator[Edit]:
+def _edits(world: World, model: Model, at: Element, what: str, number: str) -> Iterator[Edit]:
     """How the text of a model changes."""
-    at = _element(world, model)
-    text, number = world.text, f"{value:.9g}"
-    if what == "mass":
-        for element in at.iter("mass"):
-            yield _said(text, element, number)
-    elif what == "friction":
+    text, now = world.text, _of_model(world, model, what)
+    if what == "friction":
         for collision in at.iter("collision"):
             yield from _friction(text, collision, number)
-    else:
+        return
+    tag, place = ("size", "xyz".index(what[-1])) if what in SIZES[2:] else (what, 0)
+    for element in at.iter(tag):
+        values, words = floats(element), (element.text or "").split()
+        of_shape = element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
         # What is drawn of the same size changes with it.
-        tag, place = ("size", "xyz".index(what[-1])) if what.startswith("size_") else (what, 0)
-        now = _of_model(world, model, what)
-        for element in at.iter(tag):
-            values = list(floats(element))
-            if len(values) > place and values[place] == now and _is_shape(element):
-                words = (element.text or "").split()
-                yield _said(text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
-
-
-def _is_shape(element: Element) -> bool:
-    return element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
+        if len(values) > place and values[place] == now and (of_shape or what == "mass"):
+            yield _said(text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
 
 
 def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
-    """Both directions of a collision, in the place where its file says them."""
+    """Both directions of a collision, where its file says them."""
     for engine, tags in (("ode", ("mu", "mu2")), ("bullet", ("friction", "friction2"))):
-        holder = collision.find(f"surface/friction/{engine}")
-        if holder is not None:
-            found = [(tag, holder.find(tag)) for tag in tags]
-            yield from (_said(text, each, number) for _, each in found if each is not None)
-            lacks = "".join(f"<{tag}>{number}</{tag}>" for tag, each in found if each is None)
-            if lacks:
+        if (holder := collision.find(f"surface/friction/{engine}")) is not None:
+            said = {tag: holder.find(tag) for tag in tags}
+            yield from (_said(text, each, number) for each in said.values() if each is not None)
+            if lacks := "".join(f"<{tag}>{number}</{tag}>" for tag, each in said.items() if each is None):
                 yield _inside(text, holder, lacks)
             return
-    new = f"<ode><mu>{number}</mu><mu2>{number}</mu2></ode>"
-    holders = (collision.find("surface/friction"), collision.find("surface"), collision)
-    wrapped = (new, f"<friction>{new}</friction>", f"<surface><friction>{new}</friction></surface>")
-    holder, new = next((one, words) for one, words in zip(holders, wrapped, strict=True) if one is not None)
+    holder, new = collision, f"<ode><mu>{number}</mu><mu2>{number}</mu2></ode>"
+    for path, tag in (("surface/friction", "friction"), ("surface", "surface")):
+        if (found := collision.find(path)) is not None:
+            holder = found
+            break
+        new = f"<{tag}>{new}</{tag}>"
     yield _inside(text, holder, new)
 
 
@@ -345,6 +301,4 @@ def _said(text: bytes, element: Element, words: str) -> Edit:
 def _inside(text: bytes, holder: Element, new: str) -> Edit:
     """`holder` with new elements as its first ones."""
     end = tag_end(text, holder)
-    if end == holder.end:
-        return _said(text, holder, new)
-    return end, end, new.encode()
+    return _said(text, holder, new) if end == holder.end else (end, end, new.encode())
