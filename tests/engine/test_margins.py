@@ -11,7 +11,7 @@ from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.evidence.margins import FIX_RUNS, fixes_of, margins_of
-from ddenv.runfile.events import EngineStopped
+from ddenv.runfile.events import EngineFailed, EngineStopped
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
@@ -152,12 +152,22 @@ def test_a_value_that_is_not_possible_is_said_and_makes_no_run(path):
 
 
 def test_what_is_wrong_is_said_in_one_line(path):
-    with pytest.raises(UserError, match=r"there is no number 'wal\.y' \(did you mean wall\.y\?\)"):
-        work(path, fake(), globs=["wal.y"])
     broken = fake()
     broken.changed = lambda *_: "error"
+    before = state_of(path)
     with pytest.raises(UserError, match="25 runs in a row broke, the last one: it broke"):
         work(path, broken)
+    with RunFile(path) as file:
+        file.own()
+        Journal(file).record(EngineFailed("25 runs in a row broke"))
+    # The reduction is as it was, and what broke is no claim.
+    state = state_of(path)
+    assert (state.status, state.reason, state.margining) == (before.status, before.reason, None)
+    assert not [
+        value for one in margins_of(state.margins) for side in one.sides for value in side.tried if value.verdict == "f"
+    ]
+    with pytest.raises(UserError, match=r"there is no number 'wal\.y' \(did you mean wall\.y\?\)"):
+        work(path, fake(), globs=["wal.y"])
 
 
 def test_the_part_of_the_world_that_runs_is_what_is_exported(path):

@@ -50,13 +50,13 @@ def margins_command(
     from ddenv.evidence.margins import fixes_of
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.programs import start_engine
+    from ddenv.runs.programs import last_words, start_engine
     from ddenv.runs.subject import read_parts
     from ddenv.words.margins import lines, rows
 
     path, state = idle_run(run, trust, cluster)
-    if why := refusal(state):
-        raise UserError(f"{path}: {why}: ddenv resume {path}")
+    if why := refusal(state, path):
+        raise UserError(f"{path}: {why}")
     with RunFile(path) as file:
         numbers = numbers_left(read_parts(file), state, globs)
     if listed:
@@ -73,7 +73,9 @@ def margins_command(
             return 130
     with RunFile(path) as file:
         margins = fold(file.events()).margins
-    if margins is None or not margins.ended:
+    if margins is None or margins.broken_off:
+        raise UserError(last_words(path))
+    if not margins.ended:
         raise UserError(f"{path}: the search for margins was stopped; go on with: ddenv margins {path}")
     if as_json:
         found = [asdict(one.margin) | {"words": one.sentence} for one in rows(margins)]

@@ -26,7 +26,6 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.text import percent
 from ddenv.world.extent import center
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario, seed_of
@@ -45,12 +44,17 @@ def numbers_left(parts: Parts, state: RunState, globs: Sequence[str]) -> list[Nu
     return chosen(numbers_of(*parts, kept), globs)
 
 
-def refusal(state: RunState) -> str:
-    """Why no margins of a run can be found now; "" if they can."""
+def refusal(state: RunState, where: object) -> str:
+    """Why no margins of the run `where` can be found now, and what to do; "" if they can."""
+    certificate = current(state)
     if state.baseline is None:
-        return "f is not known yet, so there are no margins"
+        return f"f is not known yet, so there are no margins; run it first: ddenv resume {where}"
     if state.margining is None and (state.status not in ("finished", "stopped") or state.isolating is not None):
-        return "its search is not over; let it end first"
+        return f"its search is not over; let it end first: ddenv resume {where}"
+    if (
+        state.baseline.rate if certificate is None else certificate.claims[0].shown / certificate.claims[0].runs
+    ) < known.RAREST:
+        return "f shows too rarely in what is left to say where it is gone; reduce a failure that shows more often (--failure)"
     return "" if state.environment else "nothing is left, so there is no model with a margin"
 
 
@@ -79,10 +83,6 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
     certificate, rate = current(journal.state), journal.rate_of_whole()
     if certificate is not None:
         rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
-    if rate < known.RAREST:
-        raise UserError(
-            f"f shows in about {percent(rate)} of the runs of what is left: too rarely to say where it is gone"
-        )
     journal.record(
         events.MarginsStarted(
             numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),

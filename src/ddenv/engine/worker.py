@@ -15,6 +15,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnContext
 from pathlib import Path
@@ -137,7 +138,14 @@ def work(line: Connection, output: Connection, parts: Any) -> None:
     except Exception as error:
         simulator = error
     line.send(Ready())
-    other = Other(make, of)
+
+    @lru_cache(maxsize=1)
+    def with_changes(keep: frozenset[str], changes: Changes) -> Simulator:
+        """The simulator of a world in which numbers have other values, made anew of what it keeps."""
+        scenario, world, robot = of
+        made: Simulator = make(*part_of(scenario, world, keep, dict(changes)), robot)
+        return made
+
     while True:
         try:
             task = line.recv()
@@ -145,33 +153,16 @@ def work(line: Connection, output: Connection, parts: Any) -> None:
             return
         there = simulator
         if isinstance(task, Run) and task.changes and not isinstance(simulator, Exception):
-            there = other.simulator(task)
+            try:
+                there = with_changes(task.keep, task.changes)
+            # It breaks this test, not all of them.
+            except Exception as error:
+                there = ValueError(str(error))
         answer = answered(task, there, line.send)
         line.send(answer)
         if isinstance(answer, Broken):
             # Nobody knows what an exception has left behind in the simulator.
             os._exit(1)
-
-
-class Other:
-    """Simulators of worlds in which numbers have other values, each made anew of what it keeps; the last one is kept."""
-
-    def __init__(self, make: Make, of: tuple[Scenario, World, Model]) -> None:
-        self._make, self._of = make, of
-        self._last: tuple[object, Simulator | Exception] | None = None
-
-    def simulator(self, run: Run) -> Simulator | Exception:
-        """The simulator for a run, or why there is none."""
-        asked = run.keep, run.changes
-        if self._last is None or self._last[0] != asked:
-            scenario, world, robot = self._of
-            try:
-                there = part_of(scenario, world, run.keep, dict(run.changes))
-                self._last = asked, self._make(*there, robot)
-            # It breaks the test.
-            except Exception as error:
-                self._last = asked, ValueError(str(error)) if isinstance(error, UserError) else error
-        return self._last[1]
 
 
 def _settle_in(output: Connection) -> None:

@@ -17,7 +17,7 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Margins, Node, PastRound, Point
+from ddenv.runfile.progress import Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
 from ddenv.runfile.store import Recorded, RunFile, uncollected
 from ddenv.text import count
@@ -136,6 +136,13 @@ def _engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Chang
     if state.isolating is not None or state.margining is not None:
         return _as_it_was(state, at)
     return _ended(state, "stopped", event.reason, at)
+
+
+def _engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
+    """What breaks in a search for margins does no harm to the reduction before it."""
+    if state.margining is None:
+        return _ended(state, "failed", event.reason, at)
+    return {**_as_it_was(state, at), "margins": replace(state.margining, broken_off=True)}
 
 
 def _finished(state: RunState, event: e.Finished, at: float) -> Changes:
@@ -378,7 +385,7 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     e.ClockJumped: _clock_jumped,
     e.Finished: _finished,
     e.EngineStopped: _engine_stopped,
-    e.EngineFailed: lambda state, event, at: _ended(state, "failed", event.reason, at),
+    e.EngineFailed: _engine_failed,
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Supports: _supports,
     e.Still: lambda *_: {"ties": ()},
@@ -416,10 +423,10 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     },
     e.MarginsStarted: fold_claims.margins_started,
     e.MarginRan: fold_claims.margin_ran,
-    e.MarginImpossible: fold_claims.margin_impossible,
+    e.MarginImpossible: fold_claims.margin_ran,
     e.MarginsFinished: lambda state, _, at: {
         **_as_it_was(state, at),
-        "margins": replace(_open_margins(state), ended=True),
+        "margins": replace(fold_claims.open_margins(state), ended=True),
     },
     e.AcceptModeChanged: _accept_mode_changed,
     e.Vetoed: _vetoed,
@@ -440,12 +447,6 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
 def _as_it_was(state: RunState, at: float) -> Changes:
     """After an isolation, or a search for margins, the reduction is as it was before."""
     if state.isolating is None:
-        margins = _open_margins(state)
+        margins = fold_claims.open_margins(state)
         return _ended(state, margins.status, margins.before, at)
     return _ended(state, "finished", state.isolating.before, at)
-
-
-def _open_margins(state: RunState) -> Margins:
-    if state.margining is None:
-        raise ValueError("neither isolation nor margins")
-    return state.margining

@@ -158,47 +158,46 @@ def _open(state: RunState) -> Isolation:
 
 def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Changes:
     """Numbers that were asked for before keep their runs, as long as they are about the same models."""
-    names = [asked.name for asked in event.numbers]
+    names = tuple(asked.name for asked in event.numbers)
     sound = all(one.low <= one.now <= one.high and one.low < one.high for one in event.numbers)
     if not names or len(set(names)) != len(names) or not sound or not event.rate or state.baseline is None:
         raise ValueError(names)
-    if not state.environments[event.environment]:
-        raise ValueError(event.environment)
-    last = state.margins if state.margins is not None and state.margins.environment == event.environment else None
-    before = () if last is None else tuple(one for one in last.numbers if one.asked.name not in names)
-    runs = () if last is None else last.runs
-    margins = Margins(
-        environment=event.environment,
-        numbers=(*before, *(NumberTried(asked, event.rate, event.error) for asked in event.numbers)),
-        wanted=tuple(names),
+    last = state.margins
+    if last is None or last.environment != event.environment:
+        if event.environment >= len(state.environments):
+            raise ValueError(event.environment)
+        last = Margins(event.environment, (), (), 0, 0, False, "", "")
+    asked = tuple(NumberTried(one, event.rate, event.error) for one in event.numbers)
+    margins = replace(
+        last,
+        numbers=(*(one for one in last.numbers if one.asked.name not in names), *asked),
+        wanted=names,
         budget=event.budget,
-        before_call=len(runs),
+        before_call=len(last.runs),
         certified=event.certified,
         status=event.status,
         before=event.before,
-        runs=runs,
-        impossible=() if last is None else last.impossible,
+        ended=False,
+        broken_off=False,
     )
     return {"margins": margins}
 
 
-def margin_ran(state: RunState, event: e.MarginRan, _: float) -> Changes:
-    """A run with a changed number has ended."""
-    last = _open_margins(state, event.name)
-    return {"margins": replace(last, runs=(*last.runs, event))}
-
-
-def margin_impossible(state: RunState, event: e.MarginImpossible, _: float) -> Changes:
-    """A number cannot have a value."""
-    last = _open_margins(state, event.name)
+def margin_ran(state: RunState, event: e.MarginRan | e.MarginImpossible, _: float) -> Changes:
+    """A run with a changed number has ended, or a number cannot have a value."""
+    last = open_margins(state)
+    if event.name not in last.wanted:
+        raise ValueError(event.name)
+    if isinstance(event, e.MarginRan):
+        return {"margins": replace(last, runs=(*last.runs, event))}
     return {"margins": replace(last, impossible=(*last.impossible, event))}
 
 
-def _open_margins(state: RunState, name: str) -> Margins:
-    last = state.margining
-    if last is None or name not in last.wanted:
-        raise ValueError(name)
-    return last
+def open_margins(state: RunState) -> Margins:
+    """The search for margins that is under way. Raises ValueError if there is none."""
+    if state.margining is None:
+        raise ValueError("no search for margins")
+    return state.margining
 
 
 # Slices.
