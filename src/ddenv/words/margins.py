@@ -64,7 +64,7 @@ def _from(side: Side) -> str:
     """From where the robot reaches its goal, else what happens where f no longer shows; "" if neither is known."""
     sign = "≥" if side.up else "≤"
     if side.goal is not None:
-        return f"{sign} {side.goal.value:.4g}"
+        return f"goal {sign} {side.goal.value:.4g}"
     if side.gone is None or side.gone.verdict != "other":
         return ""
     failed = [how for how, outcome in zip(side.gone.failures, side.gone.outcomes, strict=True) if outcome == "other"]

@@ -241,7 +241,7 @@ async def test_margins_are_one_key_away(run, size):
         assert (
             "crate_00.friction" in shown
             and "███|███" in shown
-            and "f until 0 (all) … 0.2; goal from" in " ".join(shown.split())
+            and "f until 0 (all) … 0.2; then goal ≥" in " ".join(shown.split())
         )
         await session.press("escape")
         assert isinstance(session.app.screen, WhyScreen)
