@@ -101,6 +101,7 @@ PICTURES = {
     "rounds": Picture("Rounds", "The rounds of a run"),
     "facts": Picture("FactsDialog", "The raw facts of a test"),
     "why": Picture("WhyScreen", "Why it fails: what happens without each model"),
+    "margins": Picture("MarginsDialog", "How far numbers may change before f goes"),
     "playback": Picture("Playback", "A test played over another one with the same seed"),
     "beside": Picture("Beside", "Which test to play beside another one"),
     "signs": Picture("SignsDialog", "What the signs mean"),
@@ -156,6 +157,7 @@ async def make_all() -> None:
         await tell_why(pilot)
         await export(pilot, run)
         await branch(pilot)
+    await show_margins()
     await list_runs()
     await set_up()
     await teach()
@@ -350,6 +352,18 @@ async def tell_why(pilot: Pilot[int]) -> None:
     await press(pilot, "o")
     await take(pilot, "beside")
     await press(pilot, "escape", "escape", "escape")
+
+
+async def show_margins() -> None:
+    """Margins of what is left in the friction world."""
+    run = new_run("friction")
+    for options in ({}, {"margins": '["*.friction", "barrel_0?.y"]', "most_runs": 250}):
+        await asyncio.to_thread(start_engine(run, 2, **options).wait)
+    async with opened(run) as pilot:
+        await press(pilot, "W")
+        await drawn(pilot)
+        await press(pilot, "m")
+        await take(pilot, "margins")
 
 
 async def export(pilot: Pilot[int], run: Path) -> None:

@@ -21,7 +21,7 @@ from ddenv.engine.disturbances import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.shared import Key, Place
-from ddenv.engine.worker import Broken, Start
+from ddenv.engine.worker import Broken, Changes, Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState
@@ -67,7 +67,7 @@ class FakePool:
 
     def __init__(self, oracle: Oracle, jobs: int, seed: int = 0, cut: Cut = lambda *_: "") -> None:
         self.oracle, self.jobs, self.random, self.cut = oracle, jobs, random.Random(seed), cut
-        self.running: list[tuple[int, frozenset[str], int, bool]] = []
+        self.running: list[tuple[int, frozenset[str], int, bool, Changes]] = []
         self.made: list[tuple[frozenset[str], int]] = []
         # What rests on what, and how often the driver asks before it is known.
         self.supports: list[tuple[str, str]] | Broken = []
@@ -84,6 +84,8 @@ class FakePool:
         self.limits: list[float | None] = []
         # How far running tests are, and how long they took so far, s.
         self.pace: list[tuple[Live, float]] = []
+        # What a run with other values of numbers shows.
+        self.changed: Callable[[frozenset[str], int, dict[str, float]], str] | None = None
 
     @property
     def idle(self) -> int:
@@ -93,18 +95,28 @@ class FakePool:
     def busy(self) -> int:
         return len(self.running)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
+    def submit(
+        self,
+        test: int,
+        keep: frozenset[str],
+        seed: int,
+        full: bool = True,
+        limit: float | None = None,
+        changes: Changes = (),
+    ) -> None:
         assert self.idle
         self.limits.append(limit)
-        self.running.append((test, keep, seed, full))
+        self.running.append((test, keep, seed, full, changes))
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
         if not self.running:
             return []
-        test, keep, seed, full = self.running.pop(self.random.randrange(len(self.running)))
+        test, keep, seed, full, changes = self.running.pop(self.random.randrange(len(self.running)))
         self.made.append((keep, seed))
         cut = "" if full else self.cut(keep, seed)
-        shown = cut or self.oracle(keep, seed)
+        shown = cut or (
+            self.changed(keep, seed, dict(changes)) if changes and self.changed else self.oracle(keep, seed)
+        )
         if shown == "error":
             return [(test, Broken("error", "it broke"))]
         outcome, x = ENDS[shown]

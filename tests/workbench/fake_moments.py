@@ -147,6 +147,39 @@ def isolated(run: FakeRun) -> FakeRun:
     return run
 
 
+def with_margins(run: FakeRun) -> FakeRun:
+    """Margins of two numbers are known, and a fix that fresh runs confirm."""
+    finished(run)
+    numbers = (
+        {"name": "crate_00.friction", "now": 0.1, "low": 0.0, "high": 1.0, "scale": 0.9, "resolution": 0.01},
+        {"name": "crate_01.y", "now": 0.5, "low": -2.5, "high": 3.5, "scale": 3.0, "resolution": 0.01, "unit": "m"},
+    )
+    began = {"environment": run.state.nodes[run.state.node].id, "rate": 0.95, "error": 0.004, "budget": 100}
+    run.write("margins_started", numbers=numbers, certified=True, status="finished", before=run.state.reason, **began)
+    tried = (
+        ("crate_00.friction", 0.0, "sssss"),
+        ("crate_00.friction", 0.2, "sssss"),
+        ("crate_00.friction", 0.4, "ppppppp"),
+        ("crate_01.y", 0.31, "ooooooo"),
+        ("crate_01.y", 0.69, "sssss"),
+    )
+    for name, value, outcomes in tried:
+        for number, letter in enumerate(outcomes):
+            margin_ran(run, name, value, number, letter)
+    run.write("margin_impossible", name="crate_01.y", value=1.25, why="crate_01 would be 0.20 m inside crate_00")
+    for number in range(20):
+        margin_ran(run, "crate_00.friction", 0.4, 500_000_000 + number, "p")
+    run.write("margins_finished")
+    return run
+
+
+def margin_ran(run: FakeRun, name: str, value: float, number: int, letter: str) -> None:
+    """A run with another value ends as this letter says: f, the goal, or lost."""
+    outcome, failure = {"s": ("similar", "stuck"), "p": ("pass", ""), "o": ("other", "lost")}[letter]
+    ended = {"distance": None, "end_pose": None, "wall_seconds": 2.0}
+    run.write("margin_ran", name=name, value=value, run=number, seed=number, outcome=outcome, failure=failure, **ended)
+
+
 def uncertified(run: FakeRun) -> FakeRun:
     """A run that ended with two models and without a certificate."""
     _rounds(run).write("finished", minimal=True, reason="no single model can be removed")

@@ -21,6 +21,7 @@ from ddenv import __version__
 from ddenv.cli.explain import isolate_command, why_command
 from ddenv.cli.learn import learn_command
 from ddenv.cli.lists import config_command, doctor_command, runs_command, schemas_command
+from ddenv.cli.margins import margins_command
 from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
 from ddenv.cli.run import certify_command, resume_command, run_command
 from ddenv.cli.share import CANNOT_SAY, export_command, report_command, reproduce_command
@@ -97,6 +98,7 @@ for command in (
     report_command,
     why_command,
     isolate_command,
+    margins_command,
     learn_command,
     study_command,
     schemas_command,

@@ -46,11 +46,17 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
 
 @click.command("export")
 @options.run_argument
-@click.option("--sdf", type=Path, help="Write the environment as an SDF world.")
+@click.option("--sdf", "--output", "sdf", type=Path, help="Write the environment as an SDF world.")
 @click.option(
     "--passes",
     is_flag=True,
     help="With --sdf: write the nearest world that passes, in place of what is left ('ddenv isolate RUN' finds it).",
+)
+@click.option(
+    "--margin",
+    metavar="NUMBER",
+    help="With --sdf: change this number, such as green_patch_01.friction, to the nearest value with which the robot reaches its "
+    "goal ('ddenv margins RUN' finds it), or to that of NUMBER=VALUE.",
 )
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 @click.option(
@@ -77,6 +83,7 @@ def export_command(
     run: str,
     sdf: Path | None,
     passes: bool,
+    margin: str | None,
     scenario: Path | None,
     bundle: Path | None,
     mcap: Path | None,
@@ -92,9 +99,11 @@ def export_command(
     if sdf is None and bundle is None and mcap is None and test is None:
         RunFile(path).close()
         raise UserError("nothing to export: give --sdf FILE, --bundle FOLDER, --mcap FILE or --pytest FOLDER")
-    for given, option in ((scenario is not None, "--scenario"), (passes, "--passes")):
+    for given, option in ((scenario is not None, "--scenario"), (passes, "--passes"), (margin is not None, "--margin")):
         if given and sdf is None:
             raise UserError(f"{option}: needs --sdf FILE")
+    if passes and margin is not None:
+        raise UserError("--passes and --margin: give one of them; margins are of what is left")
     if bundle is not None:
         say_written(write_bundle(path, bundle))
     if test is not None:
@@ -102,7 +111,7 @@ def export_command(
     if mcap is not None:
         _write_mcap(path, mcap, trust)
     if sdf is not None:
-        exported = export_world(path, sdf, scenario, passes)
+        exported = export_world(path, sdf, scenario, passes, margin)
         say_written(exported.files)
         announce_needs(sdf, exported.needs)
     return 0

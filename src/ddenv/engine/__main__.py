@@ -6,6 +6,7 @@ Exit codes: 0 the reduction ended by itself, 1 it was stopped, 2 it could not go
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import signal
 import sys
@@ -22,6 +23,7 @@ from ddenv.engine.disturbances import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
+from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError
@@ -63,6 +65,10 @@ def main() -> int:
         type=int,
         help="find the nearest world that passes, with at least so many fresh runs of it; 0: as many as usual",
     )
+    parser.add_argument(
+        "--margins", help="find margins of the numbers with these names, a JSON list of globs; []: of all"
+    )
+    parser.add_argument("--most-runs", type=int, default=300, help="runs that margins may take")
     parser.add_argument("--give-up", choices=("yes", "no"), default="no", help="end the isolation that is open")
     parser.add_argument("--after", type=int, help="the last command before it was asked to start")
     options = parser.parse_args()
@@ -95,6 +101,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     new = (
         options.certify
         or options.isolate is not None
+        or options.margins is not None
+        or journal.state.margining is not None
         or journal.has_broken
         or file.commands(journal.state.last_command)
     )
@@ -102,7 +110,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         return 0
     if options.anyway == "no":
         check_crash_loop(journal)
-    before = journal.state.reason
+    stood, before = journal.state.status, journal.state.reason
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
         control = Control(journal, terminated, after, disk)
@@ -116,6 +124,9 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
                 Driver(scenario, world, journal, bench, control).certify(options.certify, options.certify_rate)
             elif options.isolate is not None or journal.state.isolating is not None:
                 isolate(world, journal, bench, options.isolate or None, before)
+            elif options.margins is not None or journal.state.margining is not None:
+                asked = None if options.margins is None else (json.loads(options.margins), options.most_runs)
+                find_margins((scenario, world, robot), journal, pool, control, asked, (stood, before))
             else:
                 Driver(scenario, world, journal, bench, control).reduce()
     except Stopped as stop:

@@ -15,7 +15,19 @@ from multiprocessing.connection import wait
 from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
-from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, WorkerProcess, simulator_of
+from ddenv.engine.worker import (
+    Broken,
+    Changes,
+    Make,
+    Moment,
+    Ready,
+    Run,
+    Settle,
+    Start,
+    Task,
+    WorkerProcess,
+    simulator_of,
+)
 from ddenv.errors import UserError
 from ddenv.robot import check_drake
 from ddenv.robot.deadline import Stopwatch
@@ -83,7 +95,13 @@ class Workers(Protocol):
     @property
     def busy(self) -> int: ...
     def submit(
-        self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None
+        self,
+        test: int,
+        keep: frozenset[str],
+        seed: int,
+        full: bool = True,
+        limit: float | None = None,
+        changes: Changes = (),
     ) -> None: ...
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]: ...
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]: ...
@@ -162,13 +180,22 @@ class Pool:
         """How many tests are running."""
         return sum(slot.job is not None and slot.job.test is not None for slot in self._slots)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
-        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good.
+    def submit(
+        self,
+        test: int,
+        keep: frozenset[str],
+        seed: int,
+        full: bool = True,
+        limit: float | None = None,
+        changes: Changes = (),
+    ) -> None:
+        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other
+        values of numbers by name.
 
         It may take `limit` s of real time, without its preparation; None for what the scenario says.
         """
         limit = limit or self._limit
-        self._start(Job(test, Run(keep, seed, full, limit), limit + self._margin))
+        self._start(Job(test, Run(keep, seed, full, limit, changes), limit + self._margin))
 
     def _start(self, job: Job) -> _Slot:
         """Starts a job on an idle worker, one that has prepared if possible."""

@@ -23,6 +23,7 @@ from ddenv.runs.programs import how_to_install
 from ddenv.runs.reasons import sentence
 from ddenv.text import count, printable
 from ddenv.words.claims import meaning, rate, seeds_of, uncertified
+from ddenv.words.margins import rows, said
 from ddenv.world.access import write_file
 
 RUN, WORLD, SCENARIO = BUNDLED_RUN, "world.sdf", "scenario.yaml"
@@ -135,6 +136,8 @@ def _issue(record: Record, needs: list[str]) -> bytes:
     reasons = [printable(sentence(each)) for each in record.reasons[:MOST_NAMES]]
     if record.nearest is not None:
         reasons += ["", printable(record.nearest.sentences)]
+    if state.margins is not None and rows(state.margins):
+        reasons += ["", "How far numbers may change:", "", *(f"- {printable(words)}" for words in said(state.margins))]
     names = ", ".join(f"`{_code(uri)}`" for uri in needs[:MOST_NAMES])
     return _filled(
         ISSUE,

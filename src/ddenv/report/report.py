@@ -29,7 +29,7 @@ from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
 from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
-from ddenv.report.what_is_left import what_is_left, why
+from ddenv.report.what_is_left import margins, what_is_left, why
 from ddenv.runfile.events import DEEDS, Place, deed
 from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
@@ -47,7 +47,7 @@ MOST_NAMES = 6
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    about = (what_is_left, worth, why, way, guiding, others_met, sureness, settings, repeat)
+    about = (what_is_left, worth, why, margins, way, guiding, others_met, sureness, settings, repeat)
     sections = [each(record) for each in about]
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),

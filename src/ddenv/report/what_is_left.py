@@ -1,5 +1,5 @@
 """What is left of the world, on a map and model by model, and why the robot fails: in words and on maps, what happens without each
-model that is left, and what the nearest world that passes lacks.
+model that is left, what the nearest world that passes lacks, and how far numbers may change.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
 from ddenv.text import count, first_of, plain
 from ddenv.words.claims import rate
+from ddenv.words.margins import HEAD, rows, said
 from ddenv.world.model import is_ground
 
 # The maximum number of models in the table and with a sentence, of names in a list, of those that a removal drops, and of maps.
@@ -121,6 +122,15 @@ def why(record: Record) -> Section | None:
     if record.nearest is not None:
         blocks += _passing(record, record.nearest)
     return Section("Why it fails", tuple(blocks)) if blocks else None
+
+
+def margins(record: Record) -> Section | None:
+    """The section on how far numbers may change; None where no value was tried."""
+    known = record.state.margins
+    if known is None or not (found := rows(known)):
+        return None
+    table = Table(HEAD, tuple((Name(one.cells[0]), *one.cells[1:]) for one in found), {1, 4})
+    return Section("Margins", (table, *(say(plain(words)) for words in said(known))))
 
 
 def _passing(record: Record, found: Nearest) -> list[Block]:

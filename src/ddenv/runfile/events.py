@@ -557,6 +557,72 @@ class IsolationGivenUp(Event):
     """The user ends it."""
 
 
+# Margins.
+
+
+@dataclass(frozen=True, slots=True)
+class NumberAsked:
+    """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try.
+
+    A change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.
+    """
+
+    name: str
+    now: float
+    low: float
+    high: float
+    scale: Annotated[float, Range(1e-12)]
+    resolution: Annotated[float, Range(1e-12)]
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MarginsStarted(Event):
+    """It is sought how far each of the `numbers` may change in an environment, where f shows at `rate`, with at most `budget` runs.
+
+    Each verdict on a value is wrong with a probability of at most `error`. `certified`: fresh runs have shown the rate. `status`
+    and `before` are how the reduction stood, and why.
+    """
+
+    numbers: tuple[NumberAsked, ...]
+    environment: Natural
+    rate: Share
+    error: Annotated[float, Range(1e-9, 1)]
+    budget: Number
+    certified: bool
+    status: Annotated[str, OneOf("finished", "stopped")]
+    before: str
+
+
+@dataclass(frozen=True, slots=True)
+class MarginRan(Event):
+    """How a run ended in which the number `name` had a `value`; outcome, failure, distance and end as in `TestFinished`."""
+
+    name: str
+    value: float
+    run: Natural
+    seed: Natural
+    outcome: Outcome
+    failure: str
+    distance: float | None
+    end_pose: Pose | None
+    wall_seconds: Seconds
+
+
+@dataclass(frozen=True, slots=True)
+class MarginImpossible(Event):
+    """The number `name` cannot have this `value`, and `why`."""
+
+    name: str
+    value: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class MarginsFinished(Event):
+    """All numbers that were asked for are looked at, or the budget is used up."""
+
+
 # Decisions of the user.
 
 

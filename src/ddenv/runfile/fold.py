@@ -133,10 +133,17 @@ def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
 
 
 def _engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
-    """An isolation that is stopped leaves the reduction before it as it was."""
-    if state.isolating is not None:
-        return _ended(state, "finished", state.isolating.before, at)
+    """An isolation, or a search for margins, that is stopped leaves the reduction before it as it was."""
+    if state.isolating is not None or state.margining is not None:
+        return _as_it_was(state, at)
     return _ended(state, "stopped", event.reason, at)
+
+
+def _engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
+    """What breaks in a search for margins does no harm to the reduction before it."""
+    if state.margining is None:
+        return _ended(state, "failed", event.reason, at)
+    return {**_as_it_was(state, at), "margins": replace(state.margining, broken_off=True)}
 
 
 def _finished(state: RunState, event: e.Finished, at: float) -> Changes:
@@ -392,7 +399,7 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     e.ClockJumped: _clock_jumped,
     e.Finished: _finished,
     e.EngineStopped: _engine_stopped,
-    e.EngineFailed: lambda state, event, at: _ended(state, "failed", event.reason, at),
+    e.EngineFailed: _engine_failed,
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Supports: _supports,
     e.Still: lambda *_: {"ties": ()},
@@ -428,6 +435,13 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
         "isolations": fold_decisions.without_open(state),
         **_as_it_was(state, at),
     },
+    e.MarginsStarted: fold_claims.margins_started,
+    e.MarginRan: fold_claims.margin_ran,
+    e.MarginImpossible: fold_claims.margin_ran,
+    e.MarginsFinished: lambda state, _, at: {
+        **_as_it_was(state, at),
+        "margins": replace(fold_claims.open_margins(state), ended=True),
+    },
     e.AcceptModeChanged: _accept_mode_changed,
     e.Vetoed: _vetoed,
     e.Unvetoed: _unvetoed,
@@ -445,7 +459,8 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
 
 
 def _as_it_was(state: RunState, at: float) -> Changes:
-    """After an isolation the reduction is as it was before."""
+    """After an isolation, or a search for margins, the reduction is as it was before."""
     if state.isolating is None:
-        raise ValueError("no isolation")
+        margins = fold_claims.open_margins(state)
+        return _ended(state, margins.status, margins.before, at)
     return _ended(state, "finished", state.isolating.before, at)

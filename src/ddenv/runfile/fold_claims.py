@@ -1,4 +1,4 @@
-"""Folds what runs show: certificates, isolation, and slices with their audits."""
+"""Folds what runs show: certificates, isolation, margins, and slices with their audits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ddenv.runfile import events as e
 from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, origin, searched_anew, without_open
 from ddenv.runfile.fold_tests import Changes, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Returned
+from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Margins, Node, NumberTried, Returned
 from ddenv.runfile.state import OUTCOMES, RunState, Test
 
 
@@ -151,6 +151,53 @@ def _open(state: RunState) -> Isolation:
     if last is None:
         raise ValueError("no isolation")
     return last
+
+
+# Margins.
+
+
+def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Changes:
+    """Numbers that were asked for before keep their runs, as long as they are about the same models."""
+    names = tuple(asked.name for asked in event.numbers)
+    sound = all(one.low <= one.now <= one.high and one.low < one.high for one in event.numbers)
+    if not names or len(set(names)) != len(names) or not sound or not event.rate or state.baseline is None:
+        raise ValueError(names)
+    last = state.margins
+    if last is None or last.environment != event.environment:
+        if event.environment >= len(state.environments):
+            raise ValueError(event.environment)
+        last = Margins(event.environment, (), (), 0, 0, False, "", "")
+    asked = tuple(NumberTried(one, event.rate, event.error) for one in event.numbers)
+    margins = replace(
+        last,
+        numbers=(*(one for one in last.numbers if one.asked.name not in names), *asked),
+        wanted=names,
+        budget=event.budget,
+        before_call=len(last.runs),
+        certified=event.certified,
+        status=event.status,
+        before=event.before,
+        ended=False,
+        broken_off=False,
+    )
+    return {"margins": margins}
+
+
+def margin_ran(state: RunState, event: e.MarginRan | e.MarginImpossible, _: float) -> Changes:
+    """A run with a changed number has ended, or a number cannot have a value."""
+    last = open_margins(state)
+    if event.name not in last.wanted:
+        raise ValueError(event.name)
+    if isinstance(event, e.MarginRan):
+        return {"margins": replace(last, runs=(*last.runs, event))}
+    return {"margins": replace(last, impossible=(*last.impossible, event))}
+
+
+def open_margins(state: RunState) -> Margins:
+    """The search for margins that is under way. Raises ValueError if there is none."""
+    if state.margining is None:
+        raise ValueError("no search for margins")
+    return state.margining
 
 
 # Slices.

@@ -283,6 +283,7 @@ def left_round(state: RunState) -> Changes:
         "confirming": False,
         "certificates": past,
         "isolations": without_open(state),
+        "margins": None if state.margins is None else replace(state.margins, broken_off=not state.margins.ended),
         **waits_no_more(state),
     }
     if state.round is not None and not state.round.done:

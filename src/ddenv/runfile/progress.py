@@ -1,5 +1,5 @@
-"""What a run has found so far, as plain frozen data: searches, environments, certificates, decisions of the user, isolation;
-and what its tests were computed with.
+"""What a run has found so far, as plain frozen data: searches, environments, certificates, decisions of the user, isolation,
+margins; and what its tests were computed with.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.events import EngineStarted
+from ddenv.runfile.events import EngineStarted, MarginImpossible, MarginRan, NumberAsked
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +233,38 @@ class Isolation:
     checks: tuple[Check, ...] = ()
     ended: bool = False
     found: int | None = None
+    broken_off: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class NumberTried:
+    """A number whose values are tried where f shows at `rate`; each verdict is wrong with a probability of at most `error`."""
+
+    asked: NumberAsked
+    rate: float
+    error: float
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """How far numbers may change in environment number `environment`, as `runs` and values that are `impossible` show.
+
+    The last call asks for the numbers `wanted` with at most `budget` runs after the first `before_call` ones, and `certified` says
+    whether fresh runs had shown the rate of f. `status` and `before` are how the reduction stood then, and why. `ended`: the
+    search is over; `broken_off`: a decision of the user ended it.
+    """
+
+    environment: int
+    numbers: tuple[NumberTried, ...]
+    wanted: tuple[str, ...]
+    budget: int
+    before_call: int
+    certified: bool
+    status: str
+    before: str
+    runs: tuple[MarginRan, ...] = ()
+    impossible: tuple[MarginImpossible, ...] = ()
+    ended: bool = False
     broken_off: bool = False
 
 

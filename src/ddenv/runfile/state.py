@@ -10,7 +10,18 @@ from typing import Any
 from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.events import BaselineFinished, Forecast, Place
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Certificate, Decision, Isolation, Leg, Node, Physics, Point, Refusal, Removal
+from ddenv.runfile.progress import (
+    Certificate,
+    Decision,
+    Isolation,
+    Leg,
+    Margins,
+    Node,
+    Physics,
+    Point,
+    Refusal,
+    Removal,
+)
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]
@@ -58,7 +69,8 @@ class RunState:
     `audits` were although they were implied. Tests up to `mixed_until` were computed with something else, and imply nothing now.
     If one of these, the first of `refuted`, did not repeat the second, slices are no
     longer used.
-    `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world. `ahead` tests
+    `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world.
+    `margins` say how far numbers may change. `ahead` tests
     were made ahead of time and are not needed so far; decisions rest on those with the bits 1 << id of `rests_on`. `engines` counts
     the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one makes them again.
     `notes` say what is wrong with the whole world: a word and a sentence each.
@@ -112,6 +124,7 @@ class RunState:
     certificates: tuple[Certificate, ...] = ()
     fresh: PersistentTuple[int] = field(default_factory=PersistentTuple)
     isolations: tuple[Isolation, ...] = ()
+    margins: Margins | None = None
     removals: PersistentTuple[Removal] = field(default_factory=PersistentTuple)
     lower_bound: int = 0
     supports: Pairs = ()
@@ -232,6 +245,12 @@ class RunState:
     def isolated(self) -> Isolation | None:
         """The last isolation that has come to its end: all that is known of the nearest world that passes."""
         return next((one for one in reversed(self.isolations) if one.ended), None)
+
+    @property
+    def margining(self) -> Margins | None:
+        """The search for margins that is not over, if there is one: an engine goes on with it."""
+        last = self.margins
+        return None if last is None or last.ended or last.broken_off else last
 
     @property
     def certified(self) -> bool:

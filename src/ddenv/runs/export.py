@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
+from ddenv.evidence.margins import fixes_of
 from ddenv.runfile.fold import fold
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import removed_in_passing
 from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
+from ddenv.schemas import nearest
 from ddenv.world.access import Missing, Unusable, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.numbers import OF_SCENARIO, NotPossible, Number, changed, numbers_of
 from ddenv.world.sdf.read import parse_model, parse_world
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
@@ -30,18 +35,31 @@ class Exported:
     needs: list[str]
 
 
-def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False) -> Exported:
+def export_world(
+    run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margin: str | None = None
+) -> Exported:
     """Writes the current environment of a run, or the nearest world that `passes`, as an SDF world, and a scenario for it if asked.
 
-    Raises UserError.
+    With a `margin`, NAME or NAME=VALUE, that number is changed: to the value nearest to the present one at which the robot
+    reaches its goal if no other is given. Raises UserError.
     """
     with RunFile(run) as file:
-        scenario, world, _ = read_parts(file)
+        scenario, world, machine = read_parts(file)
         robot, documents = file.document("robot"), file.documents(RESOURCE)
         state = fold(file.events())
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
+    if margin is not None:
+        number, value = _margin(state, numbers_of(scenario, world, machine, state.environment), margin, run)
+        if scenario_file is None and number in OF_SCENARIO:
+            raise UserError(
+                f"--margin: {number} is a number of the scenario, not of the world: give --scenario FILE, too"
+            )
+        try:
+            scenario, world = changed(scenario, world, {number: value})
+        except NotPossible as error:
+            raise UserError(f"--margin: {number} cannot be {value:g}: {error}") from None
     try:
         text = without(world, removed)
     except ValueError as error:
@@ -65,6 +83,27 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
     return Exported([sdf, model, scenario_file], needs)
+
+
+def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:
+    """The number that is meant, and its new value. Raises UserError."""
+    name, _, given = margin.partition("=")
+    if name not in numbers:
+        raise UserError(f"--margin: what is left has no number '{name}'{nearest(name, list(numbers))}")
+    if given:
+        try:
+            value = float(given)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise UserError(f"--margin: expected NAME=NUMBER, found '{margin}'")
+        return name, value
+    fixes = () if state.margins is None else fixes_of(state.margins)
+    found = next((fix.value for fix in fixes if fix.name == name and fix.confirmed is not False), None)
+    if found is None:
+        again = f"look for one with: ddenv margins {run} --number '{name}', or give a value: --margin {name}=VALUE"
+        raise UserError(f"--margin: no value of {name} is known at which the robot reaches its goal; {again}")
+    return name, found
 
 
 def keys_in(folder: Path, scenario: Scenario) -> dict[str, Any]:

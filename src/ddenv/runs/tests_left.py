@@ -88,7 +88,7 @@ def _is_overdue(state: RunState) -> bool:
 
 def _expected(state: RunState) -> tuple[int, int, int] | None:
     """How many tests are left, as (low, likely, high); None if unknown, or after more than were expected."""
-    if state.isolating is not None:
+    if state.isolating is not None or state.margining is not None:
         return None
     if state.confirming:
         now = in_the_making(state)

@@ -8,6 +8,7 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, Test
 from ddenv.text import percent, plain
 from ddenv.words.claims import environment_named, of_runs, terms, usual_runs
+from ddenv.words.margins import finding
 from ddenv.words.news import isolating
 from ddenv.words.signs import bar
 
@@ -20,6 +21,11 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
         return (
             "Isolation: as few models as can be are removed from the whole world so that the robot reaches its goal.",
             f"Now {now}. The result of the reduction stays as it is.",
+        )
+    if state.margining is not None:
+        return (
+            "Margins: one number after the other is changed, to see how far it may go before f no longer shows.",
+            f"Now {plain(finding(state))}. The result of the reduction stays as it is.",
         )
     certificate = state.certificate
     if certificate is None:

@@ -83,7 +83,7 @@ def _happening(snapshot: Snapshot) -> Happening:
         return _with_pause(state, ("baseline", _SETTLING))
     if state.baseline is None:
         return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
-    if state.confirming or state.isolating is not None:
+    if state.confirming or state.isolating is not None or state.margining is not None:
         return _with_pause(state, ("returned", certifying(snapshot)))
     if state.round is None or state.round.done:
         return _with_pause(state, ("split", _between(snapshot, options)))

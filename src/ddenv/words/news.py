@@ -14,6 +14,7 @@ from ddenv.runfile.progress import Removal, Returned
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import purpose
 from ddenv.text import count, first_of, plain
+from ddenv.words import margins
 from ddenv.words.baseline import baseline
 from ddenv.words.claims import made_of_usual, of_passing, smaller_known, usual_runs, verdict_on
 from ddenv.words.signs import SETTLING, outcome
@@ -55,6 +56,8 @@ def _where(state: RunState) -> str:
         return SETTLING
     if state.isolating is not None and not state.ended:
         return isolating(state)
+    if state.margining is not None and not state.ended:
+        return margins.finding(state)
     return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
 
 
@@ -208,6 +211,10 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
         "the search for the nearest world that passes is given up; the reduction is as it was"
     ),
     "isolation_finished": lambda _, after: of_passing(after, after.isolations[-1]),
+    "margins_started": margins.started,
+    "margin_ran": margins.ran,
+    "margin_impossible": margins.impossible,
+    "margins_finished": lambda *_: "the search for margins is over",
     "finished": _ended,
     "engine_stopped": _ended,
     "engine_failed": _ended,

@@ -20,6 +20,7 @@ STATUS = {
     "running": ("▶", "running"),
     "certifying": ("▶", "certificate"),
     "isolating": ("▶", "isolation"),
+    "margins": ("▶", "margins"),
     "paused": ("‖", "paused"),
     "waiting": ("?", "waiting"),
     "finished": ("■", "finished"),

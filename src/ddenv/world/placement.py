@@ -181,6 +181,12 @@ def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]
         yield from ((min(number, other), max(number, other)) for other in others[deep & able].tolist())
 
 
+def overlap_of(model: Model, other: Model) -> float:
+    """How deep a model is inside another one, m; 0 if they do not overlap. Planes are no bodies."""
+    bodies = [hull(one) for one in model.collisions if not isinstance(one.shape, Plane)]
+    return max((_depth(body, one) for body in bodies for one in other.collisions), default=0.0)
+
+
 def drop(world: World, robot: Model, spawn: Spawn) -> float:
     """How far the robot falls at least when it starts, m; 0 where nothing is below it: then the test says that it fell.
 

@@ -19,6 +19,7 @@ from ddenv.text import percent
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.why.why_screen import WhyScreen
+from tests.tiers import slow
 
 
 async def opened(session):
@@ -222,3 +223,33 @@ async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, monkey
         await session.press("i")
         assert "watching only" in session.said()
     assert (started, run.file.commands()) == ([], [])
+
+
+def picture_of(session):
+    """The whole screen as one text."""
+    strips = session.app.screen._compositor.render_strips()
+    return " ".join(" ".join("".join(segment.text for segment in strip).split()) for strip in strips)
+
+
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)]))
+async def test_margins_are_one_key_away(run, size):
+    fake_moments.with_margins(run)
+    async with Attached(run, size=size) as session:
+        await opened(session)
+        await session.press("m")
+        shown = picture_of(session)
+        assert (
+            "crate_00.friction" in shown
+            and "███|███" in shown
+            and "f until 0 (all) … 0.2; then goal ≥" in " ".join(shown.split())
+        )
+        await session.press("escape")
+        assert isinstance(session.app.screen, WhyScreen)
+
+
+async def test_where_no_margins_are_known_the_command_is_named(run):
+    fake_moments.finished(run)
+    async with Attached(run) as session:
+        await opened(session)
+        await session.press("m")
+        assert f"ddenv margins {run.path.stem} finds that" in picture_of(session)

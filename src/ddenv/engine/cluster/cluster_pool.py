@@ -26,7 +26,7 @@ from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Start
+from ddenv.engine.worker import Broken, Changes, Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -123,13 +123,21 @@ class ClusterPool:
     def busy(self) -> int:
         return len(self._tests) + len(self._waiting) + len(self._ready)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
+    def submit(
+        self,
+        test: int,
+        keep: frozenset[str],
+        seed: int,
+        full: bool = True,
+        limit: float | None = None,
+        changes: Changes = (),
+    ) -> None:
         """Has a worker make a test, as soon as there is one; as `Pool.submit`."""
-        if self._reference is not None and full and (keep, seed) == self._whole:
+        if self._reference is not None and full and not changes and (keep, seed) == self._whole:
             # It was made here in any case.
             self._ready.append((test, self._reference))
             return
-        self._waiting.append(Asked(self._run, self._topic, test, keep, seed, full, limit))
+        self._waiting.append(Asked(self._run, self._topic, test, keep, seed, full, limit, changes))
         self._send()
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:

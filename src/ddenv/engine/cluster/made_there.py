@@ -21,7 +21,7 @@ from distributed import Worker, get_worker
 from ddenv import __version__
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken
+from ddenv.engine.worker import Broken, Changes
 from ddenv.robot.result import RunResult
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
@@ -41,7 +41,7 @@ Parts = tuple[Scenario, World, Model]
 
 @dataclass(frozen=True)
 class Asked:
-    """A test to make in the world of `run`, whose progress goes to `topic`. `limit` as in `Pool.submit`."""
+    """A test to make in the world of `run`, whose progress goes to `topic`. `limit` and `changes` as in `Pool.submit`."""
 
     run: str
     topic: str
@@ -50,6 +50,7 @@ class Asked:
     seed: int
     full: bool
     limit: float | None
+    changes: Changes = ()
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def make(parts: bytes, asked: Asked) -> RunResult | Broken:
     worker = get_worker()
     key = worker.get_current_task()
     with _child(parts, asked.run) as child:
-        child.submit(asked.test, asked.keep, asked.seed, asked.full, asked.limit)
+        child.submit(asked.test, asked.keep, asked.seed, asked.full, asked.limit, asked.changes)
         due = 0.0
         while not (ended := child.finished(LOOK)):
             if not _is_wanted(worker, key):

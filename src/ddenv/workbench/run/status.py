@@ -150,6 +150,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
     state = snapshot.state
     status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
     status = "isolating" if snapshot.status == "running" and state.isolating is not None else status
+    status = "margins" if status == "running" and state.margining is not None else status
     status = "settling" if status == "baseline" and state.settling else status
     (sign, word), way_on = STATUS.get(status, ("·", status)), ""
     if snapshot.gone:

@@ -34,6 +34,7 @@ from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
+from ddenv.workbench.why.margins_dialog import MarginsDialog
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
@@ -44,8 +45,8 @@ def _ids(names: str) -> tuple[str, ...]:
     return tuple(f"why.{name}" for name in names.split())
 
 
-SHOWN = _ids("play isolate copy closer farther fit signs help close")
-FIRST = _ids("help close play isolate copy signs closer farther fit")
+SHOWN = _ids("play isolate margins copy closer farther fit signs help close")
+FIRST = _ids("help close play isolate margins copy signs closer farther fit")
 
 
 # What the key of isolation does, as the footer says.
@@ -89,6 +90,7 @@ class WhyScreen(Screen[None]):
             id="why.isolate",
             tooltip="find the nearest world that passes, in which the robot reaches its goal; while that goes on: stop it",
         ),
+        Binding("m", "margins", "margins", id="why.margins", tooltip="how far each number may change before f goes"),
         Binding(
             "c", "copy", "copy", id="why.copy", tooltip="copy all sentences, or the command that is named (OSC 52)"
         ),
@@ -275,6 +277,9 @@ class WhyScreen(Screen[None]):
 
     def action_isolate(self) -> None:
         self._ask(Stop() if self._look_at().isolates else Isolate())
+
+    def action_margins(self) -> None:
+        self.app.push_screen(MarginsDialog(self._look_at().state, attach_name(self._file.path)))
 
     def action_copy(self) -> None:
         command = remedy(self._state, self._look_at().works, attach_name(self._file.path))

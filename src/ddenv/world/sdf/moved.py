@@ -65,7 +65,7 @@ def _written(world: World, places: Mapping[str, Sequence[Pose]]) -> tuple[bytes,
                 edits.append(_inserted(world.text, entries[0], turn @ model.pose))
         else:
             edits.append(_placed(world.text, at, model, turn))
-    return _edited(world.text, edits), wanted
+    return edited(world.text, edits), wanted
 
 
 def is_same(one: Pose, other: Pose) -> bool:
@@ -115,7 +115,8 @@ def _numbers(pose: Pose) -> bytes:
     return " ".join(f"{round(value, 9) + 0.0:.10g}" for value in (*pose.position, *pose.rpy())).encode()
 
 
-def _edited(text: bytes, edits: Sequence[Edit]) -> bytes:
+def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
+    """`text` with some bytes replaced."""
     parts, at = [], 0
     for start, end, new in sorted(edits):
         parts += [text[at:start], new]

@@ -1,0 +1,198 @@
+"""Finds margins with workers and a run file: tries values of numbers as `reduction.margins` asks for them, in worlds built anew.
+
+All of it follows from the run file, so a search that was killed comes to the same table.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+
+from ddenv.engine.bench import MOST_BROKEN, WAIT
+from ddenv.engine.control import Control, Stopped
+from ddenv.engine.journal import Journal
+from ddenv.engine.judging import failures_of, result_data
+from ddenv.engine.limits import wall_limit
+from ddenv.engine.pool import Workers
+from ddenv.engine.worker import Broken
+from ddenv.errors import UserError
+from ddenv.evidence import margins as known
+from ddenv.evidence.claims import current
+from ddenv.evidence.rates import estimated_rate
+from ddenv.reduction.margins import wanted
+from ddenv.robot.result import RunResult
+from ddenv.runfile import events
+from ddenv.runfile.progress import Margins
+from ddenv.runfile.state import BROKEN, RunState
+from ddenv.world.extent import center
+from ddenv.world.model import Model, World
+from ddenv.world.scenario import Scenario, seed_of
+from ddenv.world.sdf.numbers import NotPossible, Number, check, chosen, numbers_of
+
+# What the robot runs in.
+Parts = tuple[Scenario, World, Model]
+# A run: the number's name, its value, and the number of the run.
+Wanted = tuple[str, float, int]
+
+
+def numbers_left(parts: Parts, state: RunState, globs: Sequence[str]) -> list[Number]:
+    """The numbers of what is left whose names match, those that promise most first. Raises UserError."""
+    f, world = state.f_position or (0.0, 0.0, 0.0), parts[1]
+    kept = sorted(state.environment, key=lambda name: math.dist(center(world.model(name)), f))
+    return chosen(numbers_of(*parts, kept), globs)
+
+
+def refusal(state: RunState, where: object) -> str:
+    """Why no margins of the run `where` can be found now, and what to do; "" if they can."""
+    certificate = current(state)
+    if state.baseline is None:
+        return f"f is not known yet, so there are no margins; run it first: ddenv resume {where}"
+    if state.margining is None and (state.status not in ("finished", "stopped") or state.isolating is not None):
+        return f"its search is not over; let it end first: ddenv resume {where}"
+    if (
+        state.baseline.rate if certificate is None else certificate.claims[0].shown / certificate.claims[0].runs
+    ) < known.RAREST:
+        return "f shows too rarely in what is left to say where it is gone; reduce a failure that shows more often (--failure)"
+    return "" if state.environment else "nothing is left, so there is no model with a margin"
+
+
+def find_margins(
+    parts: Parts,
+    journal: Journal,
+    pool: Workers,
+    control: Control,
+    asked: tuple[Sequence[str], int] | None,
+    stood: tuple[str, str],
+) -> None:
+    """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or goes on with the open search.
+
+    The run is then as it `stood`: its status and why. Raises Stopped, and UserError if nothing can be found.
+    """
+    now = journal.state.margining
+    if asked is not None:
+        numbers, budget = numbers_left(parts, journal.state, asked[0]), asked[1]
+        if now is None or (now.wanted, now.budget) != (tuple(one.name for one in numbers), budget):
+            _begin(journal, numbers, budget, stood if now is None else (now.status, now.before))
+    _Search(parts, journal, pool, control).carry_out()
+    journal.record(events.MarginsFinished())
+
+
+def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]) -> None:
+    certificate, rate = current(journal.state), journal.rate_of_whole()
+    if certificate is not None:
+        rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
+    journal.record(
+        events.MarginsStarted(
+            numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
+            environment=journal.number(journal.environment),
+            rate=rate,
+            error=known.error_each(rate, min(budget, known.MOST_OF_NUMBER * len(numbers))),
+            budget=budget,
+            certified=certificate is not None,
+            status="stopped" if stood[0] == "stopped" else "finished",
+            before=stood[1],
+        )
+    )
+
+
+class _Search:
+    def __init__(self, parts: Parts, journal: Journal, pool: Workers, control: Control) -> None:
+        self._parts, self._journal, self._pool, self._control = parts, journal, pool, control
+        self._failures = failures_of(journal.file, journal.state, parts[0].failure)
+        self._running: dict[int, Wanted] = {}
+        self._kept = frozenset(journal.state.environments[self._now.environment].names(journal.state.elements))
+        self._submitted, self._broken = len(journal.state.tests), 0
+        # How many looks at a number are over: the second one has the runs that are left.
+        self._looks = 0
+        # The values of the current number that are known to be possible.
+        self._possible: set[float] = set()
+
+    @property
+    def _now(self) -> Margins:
+        """The search. Raises Stopped if a decision of the user has ended it."""
+        now = self._journal.state.margining
+        if now is None or self._journal.state.search_due:
+            raise Stopped("a decision of the user ended the search for margins")
+        return now
+
+    def carry_out(self) -> None:
+        """To the end. Raises Stopped, and UserError if all runs break."""
+        while True:
+            self._control.poll()
+            asked = list(self._wanted())
+            if not asked and not self._running:
+                return
+            for one in asked:
+                if not (self._pool.idle and self._control.may_start() and self._control.has_disk_space()):
+                    break
+                if one not in self._running.values():
+                    self._start(one)
+            if not self._running:
+                self._control.settled()
+                time.sleep(WAIT)
+            for test, result in self._pool.finished(WAIT):
+                self._record(self._running.pop(test), result)
+
+    def _wanted(self) -> Iterator[Wanted]:
+        """The runs that are needed next: of one number after the other, twice, then of the nearest fix."""
+        while self._looks < 2 * len(self._now.wanted):
+            name = self._now.wanted[self._looks % len(self._now.wanted)]
+            values = list(self._of(self._now, name))
+            # Later runs may have ended before earlier ones.
+            made = {(one.value, one.run) for one in self._now.runs if one.name == name}
+            new = {value for value, _ in values} - {value for value, _ in made} - self._possible
+            if sum(self._is_impossible(name, value) for value in sorted(new)):
+                # Others are wanted in their place.
+                continue
+            self._possible |= new
+            if values:
+                yield from ((name, value, run) for value, run in values if (value, run) not in made)
+                return
+            self._looks, self._possible = self._looks + 1, set()
+        yield from self._of_fix(self._now)
+
+    def _of(self, now: Margins, name: str) -> Iterator[tuple[float, int]]:
+        tried = next(one for one in now.numbers if one.asked.name == name)
+        used = sum(one.name != name for one in now.runs[now.before_call :])
+        earlier = sum(one.name == name for one in now.runs[: now.before_call])
+        first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
+        most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.budget - used)
+        return wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
+
+    def _is_impossible(self, name: str, value: float) -> bool:
+        """Whether a value is not possible; that is recorded then."""
+        try:
+            check(*self._parts, self._kept, name, value)
+        except NotPossible as error:
+            self._journal.record(events.MarginImpossible(name, value, str(error)))
+            return True
+        return False
+
+    def _of_fix(self, now: Margins) -> Iterator[Wanted]:
+        for fix in known.fixes_of(now)[: known.MOST_FIXES]:
+            if fix.confirmed is None:
+                made = {one.run for one in now.runs if (one.name, one.value) == (fix.name, fix.value)}
+                runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
+                yield from ((fix.name, fix.value, run) for run in runs if run not in made)
+            if fix.confirmed is not False:
+                return
+
+    def _start(self, one: Wanted) -> None:
+        name, value, run = one
+        self._submitted += 1
+        self._running[self._submitted] = one
+        # Fresh runs are full ones, as those of a certificate.
+        seed, full = seed_of(self._parts[0].reduction, run), run >= known.FIRST_FIX_RUN
+        limit = wall_limit(self._journal.state)
+        self._pool.submit(self._submitted, self._kept, seed, full, limit, ((name, value),))
+        self._control.started()
+
+    def _record(self, one: Wanted, result: RunResult | Broken) -> None:
+        data, seed = result_data(result, self._failures), seed_of(self._parts[0].reduction, one[2])
+        kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
+        self._journal.record(events.MarginRan(*one, seed, **kept))
+        self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
+        if self._broken >= MOST_BROKEN:
+            raise UserError(f"{self._broken} runs in a row broke, the last one: {data['failure']}")

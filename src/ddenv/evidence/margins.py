@@ -1,0 +1,210 @@
+"""What runs with one number changed show: whether f still shows at a value, and what a number's values add up to.
+
+Nothing is assumed between the values that were tried, or beyond them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count, takewhile
+from typing import Literal
+
+from ddenv.evidence.rates import leans_to
+from ddenv.runfile.events import NumberAsked
+from ddenv.runfile.progress import Margins
+from ddenv.runfile.state import BROKEN
+
+# "f" still shows, the robot reaches its "goal" instead, "other" things happen; "undecided" after the most runs that a value gets,
+# "impossible" in the world, "" while it is open.
+Verdict = Literal["f", "goal", "other", "undecided", "impossible", ""]
+# f still shows at `SHOWS` of its rate rather than at `GONE` of it; the robot reaches its goal at the rate `REACHED`, not `MISSED`.
+SHOWS, GONE, REACHED, MISSED = 0.9, 0.1, 0.9, 0.25
+# The chance that any claim of a call is wrong is at most this.
+ERROR = 0.05
+# The maximum number of runs of a value, of a number, and of that in a first look where several share a budget.
+MOST_RUNS, MOST_OF_NUMBER, FIRST_LOOK = 16, 60, 32
+# Where f shows more rarely than this in what is left, no few runs say where it is gone.
+RAREST = 0.25
+# So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction, its certificates and isolations.
+FIX_RUNS, MOST_FIXES, FIRST_FIX_RUN = 20, 3, 500_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """Wald's sequential tests of a value, where f shows at `rate` at the present one: a verdict is wrong with a probability of at
+    most `error`.
+    """
+
+    rate: float
+    error: float
+
+    def verdict(self, outcomes: Sequence[str]) -> Verdict:
+        """What the outcomes of runs 0, 1, ... show; "" while they do not decide. Runs beyond the decision do not change it."""
+        f = goal = sound = 0
+        shows: bool | None = None
+        reached: bool | None = None
+        for number, outcome in enumerate(outcomes, 1):
+            # A broken run says nothing, and only counts against the patience.
+            if outcome not in BROKEN:
+                f, goal, sound = f + (outcome == "similar"), goal + (outcome == "pass"), sound + 1
+                # Two claims may be wrong.
+                error = self.error / 2.0
+                if shows is None:
+                    shows = leans_to(f, sound - f, SHOWS * self.rate, GONE * self.rate, error)
+                if reached is None:
+                    reached = leans_to(goal, sound - goal, REACHED, MISSED, error)
+            if shows:
+                return "f"
+            if shows is False and reached is not None:
+                return "goal" if reached else "other"
+            if number >= MOST_RUNS:
+                return "undecided" if shows is None else "other"
+        return ""
+
+    def surely_needed(self, outcomes: Sequence[str]) -> int:
+        """How many more runs a value needs at least, whatever they show; 0 if it is decided."""
+        alike = ("similar", "pass", "other")
+        return next(more for more in count() if any(self.verdict([*outcomes, *[each] * more]) for each in alike))
+
+
+def error_each(rate: float, runs: int) -> float:
+    """The error of each verdict, so that all that so many runs can give are right with a probability of at least 1 - `ERROR`."""
+    fewest = 1
+    while Rule(rate, ERROR / max(1, runs // (fewest + 1))).surely_needed(()) > fewest:
+        fewest += 1
+    return ERROR / max(1, runs // fewest)
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a number's values: the outcomes of runs 0, 1, ..., how each failed, and why some are not possible."""
+
+    outcomes: Mapping[float, Sequence[str]] = field(default_factory=dict)
+    failures: Mapping[float, Sequence[str]] = field(default_factory=dict)
+    impossible: Mapping[float, str] = field(default_factory=dict)
+
+    def values(self, rule: Rule) -> list[Value]:
+        """All values that were tried, the lowest first."""
+        judged = {
+            value: Value(value, rule.verdict(found), tuple(found), tuple(self.failures.get(value, ())))
+            for value, found in self.outcomes.items()
+        }
+        judged |= {value: Value(value, "impossible", why=why) for value, why in self.impossible.items()}
+        return [judged[value] for value in sorted(judged)]
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A value that was tried, with the outcomes of its runs in their order and how each failed, or `why` it is not possible."""
+
+    value: float
+    verdict: Verdict
+    outcomes: tuple[str, ...] = ()
+    failures: tuple[str, ...] = ()
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """The values tried above (`up`) or below the present one, the nearest first; `end` is where the range ends.
+
+    `until`: the farthest up to which f shows at all values that were decided; None: the present one. `gone`: the nearest at which
+    it does not show, or which is not possible. `goal`: the nearest at which the robot reaches its goal. `again`: the farthest at
+    which f shows beyond `gone`.
+    """
+
+    up: bool
+    tried: tuple[Value, ...]
+    end: float
+    until: Value | None = None
+    gone: Value | None = None
+    goal: Value | None = None
+    again: Value | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """What is known of a number below and above its present value, by `runs` runs in all."""
+
+    asked: NumberAsked
+    down: Side
+    up: Side
+    runs: int
+
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        return self.down, self.up
+
+
+def margin_of(asked: NumberAsked, rule: Rule, known: Known) -> Margin:
+    """The margin of a number, by what is known of its values."""
+    values = known.values(rule)
+    down = [one for one in reversed(values) if one.value < asked.now]
+    up = [one for one in values if one.value > asked.now]
+    runs = sum(map(len, known.outcomes.values()))
+    return Margin(asked, _side(False, down, asked.low), _side(True, up, asked.high), runs)
+
+
+def _side(up: bool, tried: Sequence[Value], end: float) -> Side:
+    gone = next((at for at, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")), len(tried))
+    shows = [[one for one in part if one.verdict == "f"] for part in (tried[:gone], tried[gone:])]
+    until, again = (part[-1] if part else None for part in shows)
+    goal = next((one for one in tried if one.verdict == "goal"), None)
+    return Side(up, tuple(tried), end, until, None if gone == len(tried) else tried[gone], goal, again)
+
+
+def known_of(margins: Margins, name: str) -> Known:
+    """What the runs of the search show of a number; a value's runs count up to the first that is not finished."""
+    runs: dict[float, dict[int, tuple[str, str]]] = {}
+    for one in margins.runs:
+        if one.name == name and one.run < FIRST_FIX_RUN:
+            runs.setdefault(one.value, {})[one.run] = one.outcome, one.failure
+    finished = {value: [by[run] for run in takewhile(by.__contains__, count())] for value, by in runs.items()}
+    return Known(
+        {value: [outcome for outcome, _ in found] for value, found in finished.items()},
+        {value: [how for _, how in found] for value, found in finished.items()},
+        {one.value: one.why for one in margins.impossible if one.name == name},
+    )
+
+
+def margins_of(margins: Margins) -> tuple[Margin, ...]:
+    """The margins of all numbers with a value that was tried, in the order in which they were asked for."""
+    rules = ((one.asked, Rule(one.rate, one.error)) for one in margins.numbers)
+    found = (margin_of(asked, rule, known_of(margins, asked.name)) for asked, rule in rules)
+    return tuple(one for one in found if one.up.tried or one.down.tried)
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """A changed number with which the robot reaches its goal, by runs of the search; `share` of the number's scale it is changed.
+
+    Of `runs` fresh runs it `reached` its goal in so many; `confirmed`: they show that it does. None: they are not all made.
+    """
+
+    name: str
+    value: float
+    share: float
+    reached: int
+    runs: int
+    confirmed: bool | None
+
+
+def fixes_of(margins: Margins) -> tuple[Fix, ...]:
+    """All values at which the robot reached its goal, the smallest change first."""
+    fresh: dict[tuple[str, float], dict[int, bool]] = {}
+    for run in margins.runs:
+        if run.run >= FIRST_FIX_RUN:
+            fresh.setdefault((run.name, run.value), {})[run.run] = run.outcome == "pass"
+    found = []
+    for asked, value in (
+        (one.asked, value) for one in margins_of(margins) for side in one.sides for value in side.tried
+    ):
+        if value.verdict == "goal":
+            made = fresh.get((asked.name, value.value), {})
+            reached, runs = sum(made.values()), len(made)
+            # A run that broke counts against it.
+            shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
+            share = abs(value.value - asked.now) / asked.scale
+            found.append(Fix(asked.name, value.value, share, reached, runs, shown if runs >= FIX_RUNS else None))
+    return tuple(sorted(found, key=lambda one: (one.share, one.name)))

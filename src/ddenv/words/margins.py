@@ -1,0 +1,200 @@
+"""Margins in words: a table of numbers, a sentence for each, the nearest fix, and how far the search is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ddenv.evidence.margins import (
+    ERROR,
+    FIRST_FIX_RUN,
+    FIX_RUNS,
+    MOST_OF_NUMBER,
+    Margin,
+    Side,
+    Value,
+    fixes_of,
+    margins_of,
+)
+from ddenv.evidence.rates import anytime_interval
+from ddenv.runfile.events import deed
+from ddenv.runfile.progress import Margins
+from ddenv.runfile.state import RunState
+from ddenv.text import count, duration, percent
+
+FINDING = "finding margins"
+HEAD = ("number", "now", "f until", "goal from", "runs")
+# What a bar shows. It is drawn over the root of the change, so that small changes are seen.
+BAR_WORDS = (
+    "█ f, + goal, · something else or undecided, x not possible; between two values that were tried: like the one farther out. "
+    "From the middle to each end: the change as a share of the number's scale, drawn as its root; half way is 25 %."
+)
+_SIGNS = {"f": "█", "goal": "+", "impossible": "x"}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A number in the table: the cells below `HEAD`, those for lower values first; and a sentence without a full stop."""
+
+    cells: tuple[str, ...]
+    sentence: str
+    margin: Margin
+
+
+def rows(margins: Margins) -> tuple[Row, ...]:
+    """The table of all numbers that were looked at."""
+    return tuple(map(_row, margins_of(margins)))
+
+
+def _row(one: Margin) -> Row:
+    name, now = one.asked.name, f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
+    sides = [side for side in one.sides if side.tried]
+    until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_all(side)}" for side in sides)
+    instead = ", ".join(words for side in sides if (words := _from(side)))
+    sentence = f"{name} ({now}): {'; '.join(_said(side) for side in sides)}"
+    return Row((name, now, until, instead or "-", str(one.runs)), sentence, one)
+
+
+def _all(side: Side) -> str:
+    return " (all)" if side.gone is None and side.until is not None and side.until.value == side.end else ""
+
+
+def _from(side: Side) -> str:
+    """From where the robot reaches its goal, else what happens where f no longer shows; "" if neither is known."""
+    sign = "≥" if side.up else "≤"
+    if side.goal is not None:
+        return f"goal {sign} {side.goal.value:.4g}"
+    if side.gone is None or side.gone.verdict != "other":
+        return ""
+    failed = [how for how, outcome in zip(side.gone.failures, side.gone.outcomes, strict=True) if outcome == "other"]
+    return f"{max(failed, key=failed.count, default='f at times')} {sign} {side.gone.value:.4g}"
+
+
+def _said(side: Side) -> str:
+    """What the values on one side show: only of these."""
+    words = []
+    if side.until is not None:
+        all_of_them = ", which is as far as was tried" if _all(side) else ""
+        words.append(f"f {'up' if side.up else 'down'} to {_in(side.until, 'similar')}{all_of_them}")
+    if side.gone is not None and side.gone.verdict == "impossible":
+        words.append(f"{side.gone.value:.4g} is not possible: {side.gone.why}")
+    elif side.gone is not None and side.gone.verdict == "other":
+        words.append(f"f not at {_in(side.gone, 'similar')}, {_instead(side.gone)} instead")
+    if side.goal is not None:
+        words.append(f"the robot reaches its goal {'from' if side.up else 'at'} {_in(side.goal, 'pass')}")
+    if side.again is not None:
+        words.append(f"f again at {_in(side.again, 'similar')}")
+    if undecided := [f"{each.value:.4g}" for each in side.tried if each.verdict in ("undecided", "")]:
+        words.append(f"undecided at {', '.join(undecided)}")
+    return ", ".join(words)
+
+
+def _in(value: Value, outcome: str) -> str:
+    return f"{value.value:.4g} ({value.outcomes.count(outcome)} of {count(len(value.outcomes), 'run')})"
+
+
+def _instead(value: Value) -> str:
+    """What happened in runs that did not show f: "was lost in 5, goal in 1"."""
+    ends = zip(value.outcomes, value.failures, strict=True)
+    happened = Counter("goal" if end == "pass" else deed(how) for end, how in ends if end in ("pass", "other"))
+    return ", ".join(f"{what} in {runs}" for what, runs in happened.most_common())
+
+
+def nearest_fix(margins: Margins) -> str:
+    """The smallest change with which the robot reaches its goal, as a sentence; "" while there is none."""
+    judged = [one for one in fixes_of(margins) if one.confirmed is not None]
+    if not judged:
+        return ""
+    one = next((one for one in judged if one.confirmed), judged[-1])
+    now = next(each.asked.now for each in margins.numbers if each.asked.name == one.name)
+    low, high = anytime_interval(one.reached, one.runs)
+    change = f"{one.name} from {now:.4g} to {one.value:.4g}, {100.0 * one.share:.2g} % of its scale"
+    only, first = ("", "The nearest fix") if one.confirmed else (" only", "No fix is certified")
+    fresh = f"in {one.reached} of {count(one.runs, 'fresh run')} ({percent(low)} to {percent(high)})"
+    return f"{first}: {change}; the robot reaches its goal{only} {fresh}."
+
+
+def sureness(margins: Margins) -> str:
+    """What the table's claims are worth."""
+    less = "" if margins.certified else " No certificate has shown yet how often f shows in what is left."
+    return (
+        "Claims are about the values that were tried, not those between; the chance that any of one call is wrong is at most "
+        f"{percent(ERROR)}.{less}"
+    )
+
+
+def said(margins: Margins) -> list[str]:
+    """All sentences: the nearest fix, each number, and what that is worth."""
+    return [*filter(None, [nearest_fix(margins)]), *(f"{one.sentence}." for one in rows(margins)), sureness(margins)]
+
+
+def lines(margins: Margins) -> Iterator[str]:
+    """The table as lines of text, with the sentences below it."""
+    table = [HEAD, *(one.cells for one in rows(margins))]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+    yield from ("", *said(margins))
+
+
+def bar(one: Margin, width: int) -> str:
+    """A line of so many cells around the present value, up to the farthest one that was tried on each side."""
+    cells = []
+    for place in range(width):
+        at = 2.0 * place / (width - 1) - 1.0
+        change = at * at * one.asked.scale
+        beyond = (each for each in one.sides[at > 0.0].tried if abs(each.value - one.asked.now) >= 0.999 * change)
+        cells.append(" " if (each := next(beyond, None)) is None else _SIGNS.get(each.verdict, "·"))
+    cells[width // 2] = "|"
+    return "".join(cells)
+
+
+# While the search goes on.
+
+
+def finding(state: RunState) -> str:
+    """How far the search for margins is: its number, its runs, and about how long it takes by the runs so far."""
+    now = state.margining
+    if now is None:
+        return FINDING
+    runs = now.runs[now.before_call :]
+    most = min(now.budget, MOST_OF_NUMBER * len(now.wanted)) + FIX_RUNS
+    if not runs:
+        return f"{FINDING}: at most {count(most, 'run')}"
+    left = most - len(runs)
+    if runs[-1].run >= FIRST_FIX_RUN:
+        left = -sum(one.run >= FIRST_FIX_RUN for one in runs) % FIX_RUNS
+    seconds = sum(one.wall_seconds for one in runs) / len(runs) * left / max(1, state.jobs)
+    done = f"{len(runs)} of at most {count(most, 'run')}"
+    return f"{FINDING}: {runs[-1].name}, {done}, at most about {duration(seconds)} left"
+
+
+def ran(_: RunState, after: RunState) -> str:
+    """The line on a run: what it decides about its value; "" while that is open."""
+    assert after.margins is not None
+    last = after.margins.runs[-1]
+    if last.run >= FIRST_FIX_RUN:
+        fixes = {(one.name, one.value): one for one in fixes_of(after.margins)}
+        known = fixes.get((last.name, last.value))
+        return "" if known is None or known.confirmed is None else f"  {nearest_fix(after.margins)}"
+    one = next(one for one in margins_of(after.margins) if one.asked.name == last.name)
+    value = next(each for side in one.sides for each in side.tried if each.value == last.value)
+    if not value.verdict:
+        return ""
+    instead = f"; {_instead(value)}" if _instead(value) else ""
+    shown = f"f in {value.outcomes.count('similar')} of {count(len(value.outcomes), 'run')}{instead}"
+    return f"  {last.name} = {last.value:.4g}: {shown} · {finding(after).partition(', ')[2]}"
+
+
+def impossible(_: RunState, after: RunState) -> str:
+    """The line on a value that is not possible."""
+    assert after.margins is not None
+    last = after.margins.impossible[-1]
+    return f"  {last.name} = {last.value:.4g}: not possible: {last.why}"
+
+
+def started(_: RunState, after: RunState) -> str:
+    """The line on the beginning."""
+    assert after.margins is not None
+    return f"{finding(after)}; how far may each of {count(len(after.margins.wanted), 'number')} change before f goes?"

@@ -1,0 +1,157 @@
+"""`ddenv margins`, and where its table is shown: with the report, the issue of a bundle, the workbench; and a fix as a world."""
+
+import json
+import signal
+import subprocess
+
+import pytest
+
+from ddenv.cli.follow import Interrupted
+from ddenv.report.bundle import write_bundle
+from ddenv.report.report import write_report
+from ddenv.runfile.events import MarginRan
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.words.margins import bar, lines, rows
+from tests.command import DDENV, in_process, is_one_line
+from tests.conftest import ROOT
+from tests.waiting import PATIENCE
+from tests.workbench import fake_moments
+
+FRICTION = (
+    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), which is as far as was tried; f up to 0.2 (5 of 5 runs), the robot "
+    "reaches its goal from 0.4 (7 of 7 runs)"
+)
+FIX = "The nearest fix: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot reaches its goal in 20 of 20 fresh runs"
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """The engines that were asked for; none starts."""
+    asked = []
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: asked.append((*words, more)))
+    monkeypatch.setattr("ddenv.cli.follow.follow", lambda *_: None)
+    return asked
+
+
+def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch, capsys, tmp_path):
+    fake_moments.with_margins(run)
+    done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_0*", "--jobs", 1)
+    asked = {"margins": '["crate_0*"]', "most_runs": 300, "cluster": None}
+    assert (done.returncode, started) == (0, [(run.path, 1, asked)])
+    said = done.stdout.splitlines()
+    assert said[0].split() == ["number", "now", "f", "until", "goal", "from", "runs"]
+    assert said[1].split() == ["crate_00.friction", "0.1", "0", "(all)", "…", "0.2", "goal", "≥", "0.4", "17"]
+    assert f"{FRICTION}." in said
+    assert "f not at 0.31 (0 of 7 runs), was lost in 7 instead" in done.stdout
+    assert "1.25 is not possible: crate_01 would be 0.20 m inside crate_00" in done.stdout
+    assert FIX in done.stdout
+    assert "at most 5 %" in said[-1]
+    found = json.loads(in_process(monkeypatch, capsys, "margins", run.path, "--json").stdout)
+    assert [one["asked"]["name"] for one in found["margins"]] == ["crate_00.friction", "crate_01.y"]
+    assert found["margins"][0]["words"] == FRICTION
+    assert (found["fixes"][0]["value"], found["fixes"][0]["confirmed"]) == (0.4, True)
+    write_report(run.path, tmp_path / "report.md")
+    write_bundle(run.path, tmp_path / "handed")
+    for text in ((tmp_path / "report.md").read_text(), (tmp_path / "handed" / "ISSUE.md").read_text()):
+        assert FRICTION in text.replace("\\", "")
+        assert FIX in text.replace("\\", "")
+
+
+def test_bars_stand_on_one_scale(run):
+    fake_moments.with_margins(run)
+    friction, place = (one.margin for one in rows(run.state.margins))
+    lines_of = [bar(friction, 41), bar(place, 41)]
+    assert {len(line) for line in lines_of} == {41}
+    # 0.2 is 11 % of the scale away, 0.4 a third; roots of these are drawn.
+    assert lines_of[0].strip() == "██████|██████+++++"
+    assert lines_of[1].index("·") < lines_of[1].index("|") < lines_of[1].index("█") < lines_of[1].index("x")
+
+
+def test_what_cannot_be_is_refused_in_one_line(run, started, monkeypatch, capsys):
+    fake_moments.with_margins(run)
+    is_one_line(in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_00.frction"), "did you mean")
+    for words, why in (
+        (["--bundle", "a.zip", "--margin", "crate_00.x"], "--margin: needs --sdf FILE"),
+        (["--sdf", "a.sdf", "--margin", "nothing.x"], "has no number 'nothing.x'"),
+        (["--sdf", "a.sdf", "--margin", "crate_01.y"], "no value of crate_01.y is known"),
+        (["--sdf", "a.sdf", "--margin", "crate_01.y=far"], "expected NAME=NUMBER"),
+        (["--sdf", "a.sdf", "--margin", "crate_00.friction=-1"], "friction must not be negative"),
+        (["--sdf", "a.sdf", "--margin", "spawn.x=1"], "give --scenario FILE, too"),
+        (["--sdf", "a.sdf", "--margin", "crate_01.y=1", "--passes"], "give one of them"),
+    ):
+        is_one_line(in_process(monkeypatch, capsys, "export", run.path, *words), why)
+    assert started == []
+
+
+def test_a_run_whose_failure_is_not_known_is_refused(run, started, monkeypatch, capsys):
+    run.created()
+    is_one_line(in_process(monkeypatch, capsys, "margins", run.path), "f is not known yet")
+
+
+def test_the_fix_is_written_as_a_world_that_differs_by_one_number(run, monkeypatch, capsys, tmp_path):
+    fake_moments.with_margins(run)
+    left, fixed = tmp_path / "left.sdf", tmp_path / "fixed.sdf"
+    in_process(monkeypatch, capsys, "export", run.path, "--sdf", left)
+    done = in_process(monkeypatch, capsys, "export", run.path, "--margin", "crate_01.y=1.5", "--output", fixed)
+    assert done.returncode == 0, done.stderr
+    pairs = list(zip(left.read_text().splitlines(), fixed.read_text().splitlines(), strict=True))
+    ((before, after),) = [pair for pair in pairs if pair[0] != pair[1]]
+    differ = [words for words in zip(before.split(), after.split(), strict=True) if words[0] != words[1]]
+    assert [words[1] for words in differ] == ["1.5"]
+
+
+def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, capsys):
+    fake_moments.finished(run)
+    numbers = ({"name": "crate_00.y", "now": 0.0, "low": -3.0, "high": 3.0, "scale": 3.0, "resolution": 0.01},)
+    began = {"environment": run.state.nodes[run.state.node].id, "rate": 0.9, "error": 0.01, "budget": 50}
+    run.write("margins_started", numbers=numbers, certified=True, status="finished", before="done", **began)
+    state = run.state
+
+    def interrupted(*_):
+        raise Interrupted(state)
+
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **__: None)
+    monkeypatch.setattr("ddenv.cli.follow.follow", interrupted)
+    done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_00.y", "--budget", 50)
+    assert done.returncode == 130
+    assert f"go on with: ddenv margins {run.path}\n" in done.stderr
+    asked = []
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **more: asked.append(more))
+    in_process(monkeypatch, capsys, "margins", run.path)
+    in_process(monkeypatch, capsys, "margins", run.path, "--budget", 70)
+    assert asked == [{"cluster": None}, {"cluster": None, "margins": "[]", "most_runs": 70}]
+
+
+@pytest.mark.programs
+def test_a_real_search_that_is_killed_and_interrupted_comes_to_its_end(tmp_path):
+    """In the user's own simulator, which reads the changed number in the world's text."""
+    run = tmp_path / "one.ddenv"
+    words = [
+        *DDENV,
+        "run",
+        ROOT / "docs/examples/any_simulator/scenario.yaml",
+        "--output",
+        run,
+        "--trust",
+        "--jobs",
+        "2",
+    ]
+    assert subprocess.run(words, capture_output=True, text=True).returncode == 0
+    with RunFile(run) as file:
+        left = fold(file.events()).environment
+    margins = [*DDENV, "margins", run, "--number", f"{left[0]}.y", "--budget", "40", "--jobs", "2"]
+    program = subprocess.Popen(margins, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert program.stdout is not None
+    next(line for line in program.stdout if "runs; " in line)
+    program.send_signal(signal.SIGINT)
+    program.communicate(timeout=PATIENCE)
+    with RunFile(run) as file:
+        kept = [each.event for each in file.events() if isinstance(each.event, MarginRan)]
+    assert kept
+    done = subprocess.run([*DDENV, "margins", run], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with RunFile(run) as file:
+        state = fold(file.events())
+    assert list(state.margins.runs[: len(kept)]) == kept
+    assert done.stdout.endswith("\n".join(lines(state.margins)) + "\n")
