@@ -188,7 +188,7 @@ class Reduction:
     )
     accept_rate: Literal["first", "kept", "exact"] = setting(
         "kept",
-        "when a candidate is taken: at its first run with f (first), once its runs show that it keeps the rate of f (kept), "
+        "when a candidate is taken: at its first run with f (first), at a run with f if all its runs fit the rate of f (kept), "
         "or if a failing run of the baseline, repeated with its seed, still shows f (exact)",
         printed="first",
         shown="more",

@@ -28,7 +28,9 @@ class Engine:
     def __init__(self, lab: Lab, run: Path, jobs: int, share: Path | None = None) -> None:
         self._lab, self._run = lab, run
         given = {"jobs": jobs, "cluster": None, "share": share, "after": None, "anyway": "no"}
-        self._options = Namespace(accept_mode="automatic", bits="same", certify=None, isolate=None, **given)
+        self._options = Namespace(
+            accept_mode="automatic", bits="same", certify=None, isolate=None, margins=None, **given
+        )
         self._terminated = threading.Event()
         self._code: int | None = None
         threading.Thread(target=self._work, daemon=True).start()

@@ -60,6 +60,20 @@ async def test_enter_writes_all_and_says_where(run, folder):
         assert not isinstance(pilot.app.screen, ExportScreen)
 
 
+async def test_arrows_go_from_tick_to_tick_and_space_replaces_no_name(run, folder):
+    async with dialog(run) as pilot:
+        await pilot.press("down", "down", "down", "space", "up", "space", "enter")
+        await settled(pilot)
+        assert names(folder) == (
+            "crates-1.minimal.robot.sdf",
+            "crates-1.minimal.sdf",
+            "crates-1.minimal.yaml",
+            "crates-1.zip",
+        )
+        await pilot.press("down", "tab", "up")
+        assert pilot.app.screen.focused.id == "export-report"
+
+
 async def test_nothing_is_replaced_before_it_is_asked_for(run, folder):
     mine = [folder / name for name in ("crates-1.minimal.robot.sdf", "b.html")]
     for path in mine:

@@ -125,7 +125,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
-    more += f"; {state.ahead} run ahead, not needed" if state.ahead and state.status == "finished" else ""
+    more += f"; {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
     names = first_of(state.environment, MOST_NAMES)
     said = [
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",

@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
 from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
-from ddenv.guiding.situation import Situation, waiting
+from ddenv.guiding.situation import Situation, named, waiting
 from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
@@ -43,7 +43,9 @@ def drops(command: Command, state: RunState) -> str:
     if waits is None:
         return ""
     sizes = f"{len(state.environment)} → {count(waits.size, 'model')}"
-    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it."
+    gone = named([name for name in command.new(state) if name not in waits.models]) if isinstance(command, Pin) else ""
+    lost = f" Accepting it removes {gone}, which you want to pin." if gone else ""
+    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it.{lost}"
 
 
 def _begins_anew(command: Command, state: RunState) -> bool:

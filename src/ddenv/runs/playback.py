@@ -77,7 +77,9 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         else:
             moving[name] = table
     if not rows:
-        lacks.append(f"The run file has no way of the robot in test {number}: nothing moves here.")
+        lacks.append(
+            f"The run file has no path of the robot in test {number}, as bundles have none: nothing moves here."
+        )
     return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
 
 

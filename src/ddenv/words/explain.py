@@ -14,7 +14,7 @@ from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.text import as_sentence, count, first_of, plain
 from ddenv.words.baseline import baseline_sentence
 from ddenv.words.certifying import certifying
-from ddenv.words.claims import ended, instead, of_runs, promise
+from ddenv.words.claims import ended, instead, of_passing, of_runs, promise
 from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
 from ddenv.words.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
 from ddenv.words.signs import metres
@@ -308,7 +308,11 @@ def _finished(state: RunState) -> Happening:
     stays = ("p unpins.",) if state.pinned.intersection(state.environment) else ()
     certificate = current(state)
     means = () if certificate is None else (as_sentence(promise(state, certificate)),)
+    passing = (
+        () if state.isolated is None else (f"{as_sentence(plain(of_passing(state, state.isolated)))} W shows it.",)
+    )
     return "returned", (
+        *passing,
         f"Minimal: {kept} left. {_reason(state, '')}",
         f"Kept: {first_of([plain(name) for name in state.environment], NAMED)}.",
         *_instead_of_f(state),

@@ -67,9 +67,10 @@ def isolating(state: RunState) -> str:
     last = next((test.removal for test in running if test.removal is not None), None)
     if last is None or now is None:
         return ISOLATING
-    gone = count(len(state.removals[last - 1].models), "model")
+    gone = state.removals[last - 1].models
+    tried = f"without {count(len(gone), 'model')}" if gone else "whether the whole world still fails"
     made = sum(test.run >= now.first_run and test.is_finished for test in state.tests if test.phase == ISOLATE)
-    return f"{ISOLATING}: without {gone}{f', {made} fresh runs' if made else ''}"
+    return f"{ISOLATING}: {tried}{f', {made} fresh runs' if made else ''}"
 
 
 def news(kind: str, before: RunState, after: RunState, attached: bool = False) -> str:

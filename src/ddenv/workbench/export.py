@@ -8,9 +8,11 @@ from typing import ClassVar
 
 from textual import on, work
 from textual.app import ComposeResult
+from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
+from textual.widget import Widget
 from textual.widgets import Button, Checkbox, Input, Static
 from textual.worker import get_current_worker
 
@@ -42,7 +44,9 @@ Wanted = Mapping[str, Path]
 
 
 class Tick(Checkbox):
-    """A checkbox that is empty when it is off, so that nothing depends on colour alone."""
+    """A checkbox that is empty when it is off, so that nothing depends on colour alone. Only space ticks it: enter writes."""
+
+    BINDINGS: ClassVar = [Binding("enter", "screen.write", show=False)]
 
     def render(self) -> Content:
         self.BUTTON_INNER = "X" if self.value else " "
@@ -53,14 +57,14 @@ class ExportScreen(ModalScreen[None]):
     """Asks what to write and where, writes it, and says what was written."""
 
     CSS_PATH = "export.tcss"
-    AUTO_FOCUS = "#export-write"
+    AUTO_FOCUS = "#export-world"
     BINDINGS: ClassVar = [
         *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
         *keys(
             "export",
             ("close", "escape", "dismiss", "close", "close this dialog"),
-            ("previous", "up", "app.focus_previous", "", "the field before"),
-            ("next", "down", "app.focus_next", "", "the next field"),
+            ("previous", "up", "row(-1)", "", "the row above"),
+            ("next", "down", "row(1)", "", "the row below"),
         ),
     ]
 
@@ -73,7 +77,7 @@ class ExportScreen(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         names = suggested(self._file)
-        with Framed("Export", "ctrl+s writes   escape closes", id="export"):
+        with Framed("Export", "↑ ↓ rows   space ticks   tab to its name   enter writes   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)
@@ -91,6 +95,15 @@ class ExportScreen(ModalScreen[None]):
 
     def on_mount(self) -> None:
         self._look()
+
+    def action_row(self, by: int) -> None:
+        """To what stands first in another row: its tick, and not the name, which a key would replace."""
+        rows = [self.query_one("#export-folder"), *self.query(Tick), self.query_one("#export-write")]
+        here = next((number for number, row in enumerate(rows) if self._is_beside(row)), 0)
+        rows[(here + by) % len(rows)].focus()
+
+    def _is_beside(self, first: Widget) -> bool:
+        return self.focused is not None and first.parent is self.focused.parent
 
     @work(thread=True, group="look")
     def _look(self) -> None:

@@ -201,7 +201,7 @@ async def test_without_trajectories_it_says_what_is_missing_and_shows_the_rest(t
         await session.press("P")
         screen = await settled(session)
         said = screen.query_one(Met).render().plain
-        assert "▲ The run file has no way of the robot" in " ".join(said.split())
+        assert "▲ The run file has no path of the robot" in " ".join(said.split())
         assert "○ pass" in said or "●" in said
         await session.press("space", "right", "p", "o", "enter")
         assert session.app.is_running

@@ -42,7 +42,7 @@ def test_tests_and_time_are_told():
     assert words.startswith("about ")
     assert "with 2 jobs at 3.0 s a test, as before; baseline 4, certificate 70" in words
     unknown = whole_cost(scenario(), 43, 2, Past())
-    assert unknown == "about 100 tests (45 to 250) if f always shows; baseline 4, certificate 70"
+    assert unknown == "about 100 tests (45 to 250) if the failure always shows; baseline 4, certificate 70"
     assert whole_cost(scenario(budget=9), 43, 1, known) == (
         "9 tests at most, 25 s with 1 job at 3.0 s a test, as before; baseline 4"
     )

@@ -28,6 +28,12 @@ def signs() -> dict[str, Signs]:
         "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
         "Verdicts of a certificate": _joined(CLAIM),
+        "What a certificate has shown": (
+            ("≥", "what is left keeps at least this share of the rate of f"),
+            ("≤", "without the model f shows at most this often, as a share of the rate with it"),
+            ("whole, missed", "the whole world, with the seeds with which what is left missed f"),
+            ("step 3", "what was left after reduction 3: the history has its number"),
+        ),
         "States of a run": tuple((sign, words) for sign, words in STATUS.values()),
         "In the history": (
             (branches.HERE, "where the run is"),

@@ -25,15 +25,17 @@ class Viewport:
     def resize(self, columns: int, rows: int, fitting: Callable[[int, int], View]) -> None:
         """Changes the size or the important places: `fitting` returns a view of these for a size."""
         view = self.view
+        new = fitting(columns, rows) if view is None or self.fitted else replace(view, columns=columns, rows=rows)
+        # Drawings are reused for a view, so an equal view stays the same object.
+        if new == view:
+            return
         if view is None or self.cursor == (view.rows // 2, view.columns // 2):
-            # The crosshair is in the middle until the user moves it.
+            # The crosshair is in the middle until the user moves it; then it keeps its place in the world.
             self.cursor = rows // 2, columns // 2
         else:
-            self.cursor = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)
-        keep = view if not self.fitted else None
-        new = replace(keep, columns=columns, rows=rows) if keep else fitting(columns, rows)
-        # Drawings are reused for a view, so an equal view stays the same object.
-        self.view = view if new == view else new
+            clipped = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)
+            self.cursor = new.cell(*view.point(self.cursor)) or clipped
+        self.view = new
 
     def zoom(self, factor: float, about: Cell | None) -> None:
         """Closer by `factor`, about a cell, or about the middle."""

@@ -244,7 +244,7 @@ class Playback(Screen[None]):
     def _words(self) -> str:
         playing = self.playing
         if not playing.length:
-            return "no way is stored"
+            return "no path is stored"
         words = f"{'▶' if playing.on else '‖'} {playing.time:.1f} s of {playing.length:.1f} s · {playing.speed:g} × real time"
         ends = [place for way in self._ways if (place := way.place(playing.time)) is not None]
         if len(ends) == 2:

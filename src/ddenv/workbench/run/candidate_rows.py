@@ -9,7 +9,7 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.evidence.claims import FreshRuns, failing_instead, fresh_runs, fresh_runs_made, in_the_making
+from ddenv.evidence.claims import FreshRuns, failing_instead, fresh_runs, in_the_making
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
@@ -264,12 +264,11 @@ def certificate_title(state: RunState) -> tuple[str, str]:
     if certificate is None:
         return "", ""
     number = f" {certificate.number}" if certificate.number > 1 else ""
-    left, aim = fresh_runs(state)[0], percent(certificate.certify_rate)
+    rows, aim = fresh_runs(state), percent(certificate.certify_rate)
+    left = rows[0]
     keeps = f"keeps {left.shows_at_least}, aim {aim}" if left.shows_at_least else f"has to show {aim}"
     keeps = "chosen seeds" if certificate.seeds else keeps
-    far = (
-        made_of_usual(state, certificate) if in_the_making(state) else count(fresh_runs_made(state, certificate), "run")
-    )
+    far = made_of_usual(state, certificate) if in_the_making(state) else count(sum(one.runs for one in rows), "run")
     return f"Certificate{number}: {keeps}", far
 
 

@@ -206,9 +206,9 @@ def tests_said(state: RunState) -> tuple[str, ...]:
     said = count(total, "test") if state.budget is None else f"{state.made} of {count(state.budget, 'test')}"
     said += f", {state.implied} implied" if state.implied else ""
     # Before its end, anything may still come to be needed.
-    said += f", {state.ahead} run ahead, not needed" if state.ahead and state.status == "finished" else ""
+    said += f", {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
     parts = " ".join(f"{counts[name]} {name}" for name in OUTCOME_ORDER if counts.get(name))
-    return (f"{said}: {parts}" if parts else said, f"{said}: {counts['similar']} similar", said, "")
+    return (f"{said}: {parts}" if parts else said, said, "")
 
 
 def drift_said(state: RunState) -> tuple[str, ...]:

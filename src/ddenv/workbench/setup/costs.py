@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # The maximum number of runs to read, and how many of the same scenario are enough.
 LOOKED_AT, ENOUGH = 30, 3
 # What the numbers assume before the first run of a scenario.
-UNKNOWN_RATE = "if f always shows"
+UNKNOWN_RATE = "if the failure always shows"
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,6 +85,8 @@ class Preview(Vertical):
         self.picked_next = ""
         # Where the robot has room, m, if it stands inside a model.
         self._free: Point | None = None
+        # The spawn's z as the ground gave it: it follows x and y until the user types another one.
+        self._ground_z = ""
         self.border_title = "World"
 
     def compose(self) -> ComposeResult:
@@ -183,11 +185,21 @@ class Preview(Vertical):
     def show_places(self) -> None:
         """Shows the form's start and goal, on the map and in words, and what is wrong with the start."""
         if self.choice is not None:
+            self._fill_z(self.choice)
             spawn, goal = self.spawn, self.goal
             start = (spawn[0], spawn[1], spawn[3]) if spawn else None
             self.map.set_marks(start, (goal[0], goal[1]) if goal else None)
             self._show_picking()
             self._look_at_start(self.choice, spawn)
+
+    def _fill_z(self, choice: Choice) -> None:
+        texts = self._form.texts
+        at = form.numbers(form.SPAWN[:2], texts)
+        if choice.scenario is not None or at is None or texts["spawn_z"] not in ("", self._ground_z):
+            return
+        z = spawn_height(choice.world, choice.clearance, *at)
+        self._ground_z = "" if z is None else _metres(z)
+        self._form.set_texts({"spawn_z": self._ground_z, "spawn_yaw": texts["spawn_yaw"] or "0"})
 
     def places_for(self, keep: bool) -> dict[str, str]:
         """Start and goal of a world without a scenario: as the last time, or as they are if the user wants to `keep` them."""

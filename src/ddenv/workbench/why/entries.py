@@ -57,9 +57,17 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
     found = reasons(file, state) if current(state) is not None else ()
     listed = found[:LISTED]
-    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
-    models = tuple(_of_model(state, number, each, snapshot) for number, each in enumerate(listed))
+    letters = _letters(state, listed)
+    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed), letters)
+    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in zip(letters, listed, strict=True))
     return (*models, *_nearest(file, state)), len(found) - len(listed)
+
+
+def _letters(state: RunState, listed: Sequence[Reason]) -> tuple[int, ...]:
+    """The numbers of the letters that the models have on the map of the run, if each is a part of its last round."""
+    of_run = {} if state.round is None else state.round.split.letter_of
+    letters = tuple(of_run.get(each.without, -1) for each in listed)
+    return letters if len({*letters, -1}) > len(letters) else tuple(range(len(letters)))
 
 
 def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
@@ -67,14 +75,14 @@ def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
     return () if passing is None else (_of_nearest(state, passing),)
 
 
-def _of_model(state: RunState, number: int, reason: Reason, snapshot: Snapshot) -> Entry:
+def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
     certificate = current(state)
     claims = () if certificate is None else certificate.claims
     claim = next((each for each in claims if each.without == reason.without), None)
     rates = f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
     return Entry(
         reason.without,
-        partition_letter(number),
+        partition_letter(letter),
         reason.gone,
         sentence(reason),
         (rates, parting_sentence(reason)),

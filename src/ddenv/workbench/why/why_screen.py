@@ -183,7 +183,10 @@ class WhyScreen(Screen[None]):
         if head != self._head:
             self._head = head
             self.query_one("#why-header", Static).update(Text(f" {plain(head)}", no_wrap=True, overflow="ellipsis"))
-        self.query_one(KeyFooter).say("why.isolate", STOP if now.isolates else GO_ON if begun else BEGIN)
+        done = now.state.isolated is not None and not begun
+        self.query_one(KeyFooter).say(
+            "why.isolate", STOP if now.isolates else GO_ON if begun else "" if done else BEGIN
+        )
         if now.trouble != self._trouble:
             self._trouble = now.trouble
             if now.trouble:

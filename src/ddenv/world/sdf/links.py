@@ -196,7 +196,7 @@ def read_friction(collision: Element, context: Context) -> float:
             raise complain(element, f"friction must not be negative, found {mu:g}")
         both.append(mu)
     if both[0] != both[1]:
-        why = f"friction of {both[0]:g} and {both[1]:g} in two directions by {min(both):g} in all"
+        why = f"friction of {both[0]:g} and {both[1]:g} in two directions by {min(both):g} in both"
         context.note("replaced", engine, why)
     return min(both)
 
