@@ -100,11 +100,11 @@ def test_progress_is_reported_while_it_runs(simulator_of, tmp_path):
 @pytest.mark.parametrize(
     ("code", "ends_at", "within"),
     [
-        (SLEEP, 0, 0.6),
-        (STUBBORN, 0, 0.6),
+        pytest.param(SLEEP, 0, 0.6, marks=pytest.mark.programs),
+        pytest.param(STUBBORN, 0, 0.6, marks=pytest.mark.programs),
         # Time enough to have one.
         (FAMILY + SLEEP, 7, 3.0),
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSTOP)", 0, 0.6),
+        pytest.param("import os, signal; os.kill(os.getpid(), signal.SIGSTOP)", 0, 0.6, marks=pytest.mark.programs),
     ],
     ids=["hangs", "ignores SIGTERM", "has a family", "is stopped"],
 )
@@ -173,6 +173,7 @@ def test_an_exception_is_no_failure_of_the_robot(simulator_of, code, outcome):
     assert result.end_pose[:3] == (1, 2, 3)
 
 
+@pytest.mark.programs
 def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkeypatch):
     monkeypatch.setattr(simulator, "MOST_BYTES", 3_000_000)
     monkeypatch.setattr("ddenv.robot.external.simulator.MOST_BYTES", 3_000_000)
