@@ -133,17 +133,23 @@ def test_names_never_steer_the_terminal(tmp_path):
     assert not any("\u202e" in line for line in lines(world))
 
 
-def test_the_commands(tmp_path):
+def test_the_commands(tmp_path, monkeypatch, capsys):
     wall = DATA / "wall.sdf"
     table = ddenv("world", "check", wall)
     assert table.returncode == 0
     assert table.stdout.rstrip().endswith("7 models, 6 can be removed; nothing was replaced or ignored")
-    assert len(json.loads(ddenv("world", "check", wall, "--json").stdout)["models"]) == 7
-    drawn = ddenv("world", "show", wall)
+    assert len(json.loads(in_process(monkeypatch, capsys, "world", "check", wall, "--json").stdout)["models"]) == 7
+    drawn = in_process(monkeypatch, capsys, "world", "show", wall)
     assert drawn.returncode == 0 and "wall" in drawn.stdout and "\x1b" not in drawn.stdout
-    assert ddenv("world", "show", wall, "--svg", tmp_path / "map.svg").stdout == f"wrote {tmp_path / 'map.svg'}\n"
+    assert (
+        in_process(monkeypatch, capsys, "world", "show", wall, "--svg", tmp_path / "map.svg").stdout
+        == f"wrote {tmp_path / 'map.svg'}\n"
+    )
     assert (tmp_path / "map.svg").read_text().startswith("<svg") or "<svg" in (tmp_path / "map.svg").read_text()[:200]
-    assert ddenv("world", "convert", wall, "-o", tmp_path / "out.sdf").stdout == f"wrote {tmp_path / 'out.sdf'}\n"
+    assert (
+        in_process(monkeypatch, capsys, "world", "convert", wall, "-o", tmp_path / "out.sdf").stdout
+        == f"wrote {tmp_path / 'out.sdf'}\n"
+    )
 
 
 def test_a_scenario_stands_for_its_world(monkeypatch, capsys):
