@@ -20,7 +20,8 @@ FREE = (
     "the variables have the values of this moment. Press `p` to predict what comes next."
 )
 LATER = "The race to come shows how the algorithms do."
-LETTERS = "abcdef"
+# Without f, which is the failure, and h, the key of the hint.
+LETTERS = "abcdegi"
 DUE = {
     "try": "Press `enter` to search yourself, or `s` to skip it.",
     "race": "Press `enter` to watch the race, or `s` to skip it.",
