@@ -65,7 +65,8 @@ def summary(asked: int, score: Score) -> list[str]:
     """The end of a lesson with so many questions `asked`, in sentences."""
     skipped = max(0, asked - len(score.answered))
     more = f"; {skipped} skipped" if skipped else ""
-    lines = [f"You answered {score.right} of {len(score.answered)} questions right{more}."]
+    right = f"{score.right} of {len(score.answered)} questions right" if score.answered else "no question"
+    lines = [f"You answered {right}{more}."]
     if score.best > 1:
         lines.append(f"Your longest streak: {score.best} right answers in a row.")
     if not score.misconceptions and score.answered:
