@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.learn.foretelling import SAID, at_hand, foretelling
-from ddenv.learn.lesson_course import Course
+from ddenv.learn.lesson_course import LETTERS, Course
 from ddenv.runfile.position import position_in
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile
@@ -35,6 +35,11 @@ def of_outcome(position, moment, found):
     assert ("that is not f." in right.why) == (test.outcome == "other")
     reason = found.reason.answers[found.reason.right]
     assert any(words in reason.text for words in REASONS[test.outcome].split("|"))
+    # Nobody calls four misses a single test.
+    same = [(each.round, each.candidate) for each in position.end.tests[:number]].count((test.round, test.candidate))
+    if test.outcome == "pass" and settings(moment.after).accept_rate == "first" and same > 1:
+        said = " ".join(answer.why for answer in found.reason.answers)
+        assert "one test" not in said
     # Where more runs decide, one with f does not let anything go.
     if test.outcome == "similar" and settings(moment.after).accept_rate != "first":
         assert "can go" not in reason.why
@@ -54,6 +59,9 @@ def of_winner(position, moment, found):
         assert one.verdict == "similar" and right.text.startswith(f"{one.label}: ")
         assert f"{one.label[1:]} showed f" in found.reason.text
         assert ("before it" in found.reason.answers[found.reason.right].why) == (end.winner > 0)
+    all_shown = len(found.question.answers) == len(end.candidates) + 1
+    assert ("tested in this order" in found.question.text) == all_shown
+    assert len(found.question.answers) <= len(LETTERS)
     labels = {one.label: one for one in end.candidates}
     for answer in found.question.answers[:-1]:
         one = labels[answer.text.partition(":")[0]]

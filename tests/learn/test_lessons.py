@@ -49,6 +49,23 @@ def test_everything_can_be_skipped(number):
     assert end.score.done and not end.score.answered
 
 
+def test_a_search_without_success_is_no_question_that_was_skipped():
+    walk = course(0)
+    while walk.activity != "try":
+        walk.answer(walk.page.question.right) if walk.is_open else None
+        walk.go_on()
+    attempt = walk.attempt
+    attempt.end()
+    walk.keep(attempt)
+    end = through(walk, lambda question: question.right)
+    assert not attempt.found and end.score.right == len(end.score.answered) == opened(0).asked - 1
+    assert (
+        summary(opened(0).asked - 1, end.score)[0]
+        == f"You answered {end.score.right} of {end.score.right} questions right."
+    )
+    assert end.page.text[0].spans[0][0].endswith("questions right.")
+
+
 def test_a_prediction_leaves_the_question_of_its_step_and_its_score_alone():
     walk = course(0)
     while walk.page.question is None:

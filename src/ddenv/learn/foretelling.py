@@ -23,7 +23,7 @@ SAID = {
     "pass": "the goal is reached",
 }
 # Candidates of a round to choose from, and models of a candidate that are named there.
-MOST, FEW = 5, 3
+MOST, FEW = 6, 3
 # Why something came about, as questions and answers.
 REASONS = Path(__file__).with_name("reasons.yaml")
 # By the setting `growth`, what n does.
@@ -87,7 +87,9 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
         return None
     answers = tuple(Answer(words, outcome == test.outcome, _seen(test)) for outcome, words in SAID.items())
     what = f"Test {number} runs {_what(candidate)}. How does it end?"
-    reason = _why_ended(test, candidate, settings(moment.after))
+    runs = [position.end.tests[id - 1] for id in {*candidate.tests, number} if id <= number]
+    missed = len(runs) if all(each.outcome in ("pass", "other") for each in runs) else 1
+    reason = _why_ended(test, candidate, settings(moment.after), missed)
     return Foretelling(Question(what, answers, _hint(candidate)), until, reason, test.outcome)
 
 
@@ -149,8 +151,11 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
     none = round.winner is None
     why = "No candidate showed f." if round.winner is None else f"{_name(round.candidates[round.winner])} showed f."
     answers.append(Answer("none of them", none, why, "" if none else "stuck"))
+    order = (
+        "tested in this order" if shown == listed else f"of which {len(shown)} stand here in the order of their tests"
+    )
     question = Question(
-        f"Round {round.number}: {count(len(listed), 'candidate')}, tested in this order. Which is the first to show f?",
+        f"Round {round.number}: {count(len(listed), 'candidate')}, {order}. Which is the first to show f?",
         tuple(answers),
         "The first candidate that has everything f needs wins. 'part A' is A alone, 'without A' is all the rest.",
     )
@@ -224,13 +229,15 @@ def _is_regular(round: Round, after: Round) -> bool:
     return as_many and set(after.environment) == set(left)
 
 
-def _why_ended(test: Test, candidate: Candidate, options: Settings) -> Question:
-    """What the outcome of a candidate's test means."""
+def _why_ended(test: Test, candidate: Candidate, options: Settings, missed: int) -> Question:
+    """What the outcome of a candidate's test means, the last one of so many that `missed` f."""
     if test.outcome == "pass" and options.most_runs == 1 and options.accept_rate != "kept":
         return _reason("only pass", test.id)
     # Of a single model nobody would be wrong to call it the smallest world.
     most = 2 if test.outcome == "similar" and candidate.size == 1 else None
-    return _reason(test.outcome, test.id, most, goes=_goes(candidate, options))
+    often = f"All {missed} runs missed f. That makes it likely, but it proves nothing."
+    luck = often if missed > 1 else "It may have been bad luck: one test proves little."
+    return _reason(test.outcome, test.id, most, goes=_goes(candidate, options), luck=luck)
 
 
 def _goes(candidate: Candidate, options: Settings) -> str:

@@ -20,7 +20,8 @@ FREE = (
     "the variables have the values of this moment. Press `p` to predict what comes next."
 )
 LATER = "The race to come shows how the algorithms do."
-LETTERS = "abcdef"
+# Without f, which is the failure, and h, the key of the hint.
+LETTERS = "abcdegi"
 DUE = {
     "try": "Press `enter` to search yourself, or `s` to skip it.",
     "race": "Press `enter` to watch the race, or `s` to skip it.",
@@ -112,7 +113,9 @@ class Course:
         if self._opened is None:
             return FREE
         if self.step == self.last:
-            return "\n\n".join((*summary(self._opened.asked, self.score), *self._searches()))
+            # A search is no question: it counts only where it succeeds.
+            alone = sum(bool(step.budget) and str(n) not in self.score.answered for n, step in enumerate(self._steps))
+            return "\n\n".join((*summary(self._opened.asked - alone, self.score), *self._searches()))
         return self._said(self._opened.lesson.steps[self.step].text)
 
     def _searches(self) -> Iterator[str]:
@@ -175,6 +178,14 @@ class Course:
         self._come(self.step - 1)
         return True
 
+    def again(self) -> bool:
+        """From the end to the first step, with a new score; False anywhere else."""
+        if self._opened is None or self.step < self.last:
+            return False
+        self.score = Score(done=True)
+        self._come(0)
+        return True
+
     def _return(self) -> None:
         """From a prediction back to the step, as it was."""
         assert self._own is not None
@@ -216,10 +227,12 @@ class Course:
     def _come(self, step: int) -> None:
         self.step, self._asked, self.due, self._own = step, None, False, None
         self.score = self.score.at(step, self.last)
-        if self._opened is None or step == self.last:
+        if self._opened is None:
+            return
+        self.position.go(self._opened.places[min(step, self.last - 1)])
+        if step == self.last:
             return
         here = self._steps[step]
-        self.position.go(self._opened.places[step])
         if here.question is not None:
             self._asked = Asked(str(step), _filled(here.question, self._said))
         elif (found := self._opened.foretold[step]) is not None:

@@ -64,7 +64,9 @@ def score_of(data: Any) -> Score:
 def summary(asked: int, score: Score) -> list[str]:
     """The end of a lesson with so many questions `asked`, in sentences."""
     skipped = max(0, asked - len(score.answered))
-    lines = [f"You answered {score.right} of {asked} questions right; {skipped} skipped."]
+    more = f"; {skipped} skipped" if skipped else ""
+    right = f"{score.right} of {len(score.answered)} questions right" if score.answered else "no question"
+    lines = [f"You answered {right}{more}."]
     if score.best > 1:
         lines.append(f"Your longest streak: {score.best} right answers in a row.")
     if not score.misconceptions and score.answered:

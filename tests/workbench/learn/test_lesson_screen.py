@@ -3,11 +3,13 @@
 import pytest
 from textual.widgets import OptionList, Static
 
+from ddenv.learn.lesson_course import LETTERS
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.runfile.store import RunFile
 from ddenv.runs.remembered import state_file
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
 from ddenv.workbench.learn.lesson_screen import LessonScreen
@@ -23,6 +25,10 @@ def text(pilot):
     return str(pilot.app.screen.query_one("#lesson-text", Static).content)
 
 
+def footer(pilot):
+    return [f"{entry.shown} {entry.words}" for entry in pilot.app.screen.query_one(KeyFooter).entries]
+
+
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_a_lesson_from_start_to_end(size):
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=size) as pilot:
@@ -35,7 +41,7 @@ async def test_a_lesson_from_start_to_end(size):
             if page.question is not None and page.chosen is None:
                 right = page.question.right
                 wrong = (right + 1) % len(page.question.answers)
-                key = ("abcdef"[right], "abcdef"[wrong], "s")[turn % 3]
+                key = (LETTERS[right], LETTERS[wrong], "s")[turn % 3]
                 await pilot.press("enter")
                 assert screen.course.page.chosen is None, "an open question is not passed over unseen"
                 await pilot.press(key)
@@ -124,16 +130,48 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         pane = pilot.app.screen.query_one(LessonPane)
-        assert pane.parent.border_subtitle == "a to c, or ↑ ↓ and enter: answers"
+        assert pane.parent.border_subtitle == "a to c, or ↑ ↓ and enter; s skips"
+        assert footer(pilot)[:3] == ["a to c answer", "s skip", "h hint"] and "enter go on" not in footer(pilot)
         await pilot.press("enter")
+        assert not pilot.app._notifications, "it would hide the answers"
+        await pilot.press("backspace", "backspace", "backspace")
         assert len(pilot.app._notifications) == 1
-        await pilot.press("a")
+        await pilot.press("enter", "enter", "a")
         await pilot.pause()
         assert not pilot.app._notifications
         # Lines of a remark after its first stand below its words.
         remark = next(line for line in text(pilot).splitlines() if line[1:4] == " ✓ " and line[0] in "abc")
         after = text(pilot).splitlines()[text(pilot).splitlines().index(remark) + 1]
         assert after.startswith("    ") and len(remark) <= 76
+
+
+async def test_a_lesson_that_is_done_shows_the_end_of_its_run_and_can_be_started_again():
+    keep_score("what-delta-debugging-is", Score(step=99, done=True, answered={"2": True, "5": False}))
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        screen = pilot.app.screen
+        assert screen.course.position.now.status == "finished"
+        assert "1 of 2 questions right" in text(pilot) and "r starts it again" in text(pilot)
+        await pilot.press("r")
+        assert screen.course.step == 0 and not screen.course.score.answered
+        await pilot.press("enter", "r")
+        assert screen.course.step == 1, "anywhere else the key does nothing"
+    assert all_scores()["what-delta-debugging-is"].done
+
+
+async def test_the_letters_of_answers_leave_out_f_and_the_key_of_the_hint():
+    lesson = open_lesson(bundled()[0]).lesson
+    round_2 = next(number for number, step in enumerate(lesson.steps) if step.foretell == "winner")
+    keep_score(lesson.name, Score(step=round_2))
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        question = pilot.app.screen.course.page.question
+        assert "6 candidates, tested in this order" in question.text and len(question.answers) == 7
+        assert footer(pilot)[0] == "a b c d e g i answer"
+        await pilot.press("f")
+        assert pilot.app.screen.course.page.chosen is None
+        await pilot.press("i")
+        assert pilot.app.screen.course.page.chosen == 6
 
 
 async def test_a_lesson_goes_on_where_it_was_left():

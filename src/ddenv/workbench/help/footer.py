@@ -51,15 +51,15 @@ class KeyFooter(Keys):
         super().__init__()
         self._instead = instead
         self._order, self._first = tuple(shown), tuple(first)
-        self._words: dict[str, str] = {}
+        self._words: dict[str, tuple[str, str]] = {}
         self.entries: tuple[Entry, ...] = ()
         self._hovered = ""
         self._due = False
 
-    def say(self, id: str, words: str) -> None:
-        """Other words for a key; with "" it is not shown."""
-        if self._words.get(id) != words:
-            self._words[id] = words
+    def say(self, id: str, words: str, shown: str = "") -> None:
+        """Other words for a key, and maybe another way to write it; with "" it is not shown."""
+        if self._words.get(id) != (words, shown):
+            self._words[id] = words, shown
             self.renew()
 
     def on_mount(self) -> None:
@@ -90,8 +90,8 @@ class KeyFooter(Keys):
             if id not in active:
                 continue
             binding = active[id].binding
-            words = self._words.get(id, binding.description)
-            entry = Entry(binding.key, self.app.get_key_display(binding), words, active[id].enabled)
+            words, shown = self._words.get(id, (binding.description, ""))
+            entry = Entry(binding.key, shown or self.app.get_key_display(binding), words, active[id].enabled)
             if words and entry.width <= room:
                 found[id] = entry
                 room -= entry.width

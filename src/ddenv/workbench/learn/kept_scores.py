@@ -26,7 +26,7 @@ def keep_score(lesson: str, score: Score) -> None:
 
 def in_words(score: Score | None) -> str:
     """How far a student is, for a list."""
-    if score is None or not (score.step or score.answered):
+    if score is None or not (score.done or score.step or score.answered):
         return "not begun"
     state = "done" if score.done else f"at step {score.step + 1}"
     return f"{state}, {score.right} of {count(len(score.answered), 'answer')} right"

@@ -80,7 +80,7 @@ class LessonPane(VerticalScroll):
         if self.scroll_y < self.max_scroll_y:
             said = "enter shows the rest"
         elif self._page is not None and self._page.question is not None and self._page.chosen is None:
-            said = f"{LETTERS[0]} to {LETTERS[len(self._page.question.answers) - 1]}, or ↑ ↓ and enter: answers"
+            said = f"{letters(self._page.question)}, or ↑ ↓ and enter; s skips"
         self.parent.border_subtitle = said
 
     def read_on(self) -> bool:
@@ -89,6 +89,13 @@ class LessonPane(VerticalScroll):
             return False
         self.scroll_page_down(animate=False)
         return True
+
+
+def letters(question: Question) -> str:
+    """Which letters are its answers."""
+    used = LETTERS[: len(question.answers)]
+    # After e there are gaps.
+    return f"{used[0]} to {used[-1]}" if used[-1] <= "e" else " ".join(used)
 
 
 def page_text(page: Page, room: int = 0, cursor: int | None = None) -> Text:

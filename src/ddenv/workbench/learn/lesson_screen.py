@@ -29,7 +29,7 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.learn_screen import LearnScreen
-from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
+from ddenv.workbench.learn.lesson_pane import LessonPane, Variables, letters
 from ddenv.workbench.learn.race_screen import RaceScreen
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.map_words import MapLines
@@ -47,8 +47,8 @@ class LessonScreen(LearnScreen[bool]):
 
     AUTO_FOCUS = "LessonPane"
     NAME = "lesson"
-    SHOWN = "on back skip activity hint run_back run_on next_decision next_reduction predict variables help close"
-    FIRST = "help close on skip activity run_back run_on predict hint variables next_reduction next_decision back"
+    SHOWN = "on skip hint again back activity run_back run_on next_decision next_reduction predict variables help close"
+    FIRST = "help close on skip again activity run_back run_on predict hint variables next_reduction next_decision back"
     BINDINGS: ClassVar = keys(
         "lesson",
         ("on", "enter,space", "on", "go on", "on to what comes next in the lesson", "enter"),
@@ -69,6 +69,7 @@ class LessonScreen(LearnScreen[bool]):
         ("reduction_before", "left_curly_bracket", "move('reduction', -1)", "", "the run: to the reduction before"),
         ("activity", "t", "activity", "try", "search yourself, or watch the race, where a step has one"),
         ("predict", "p", "predict", "predict", "predict what comes next in the run"),
+        ("again", "r", "again", "start again", "at the end of a lesson: start it again, with a new score"),
         ("variables", "v", "variables", "variables", "the variables in place of the map (80 columns)"),
         *(
             (letter, letter, f"answer({place})", letter, f"give answer {letter}")
@@ -122,18 +123,22 @@ class LessonScreen(LearnScreen[bool]):
     def _show(self) -> None:
         self._show_run()
         course, page = self.course, self.course.page
-        if self._at_next:
-            page = replace(page, after=blocks(f"`enter` opens the next lesson: **{self._following}**."))
+        ended = self._opened is not None and course.step == course.last
+        if ended:
+            following = f"\n\n`enter` opens the next lesson: **{self._following}**." if self._following else ""
+            done = f"Done. `backspace` goes back through it, `r` starts it again.{following}"
+            page = replace(page, after=blocks(done))
         self.query_one(LessonPane).show(page)
         self.query_one("#lesson-header", Static).update(self._heading())
         footer, due = self.query_one(KeyFooter), course.due and not course.is_open
-        asked = page.question is not None and page.chosen is None
+        asked = page.question if page.chosen is None else None
         plain = not self._algorithm_is_due()
         self.set_class(plain, "-plain")
         can = {
             "lesson.activity": course.activity or "",
             "lesson.skip": "skip" if asked or course.due else "",
-            "lesson.hint": "hint" if asked and page.question is not None and page.question.hint else "",
+            "lesson.hint": "hint" if asked and asked.hint else "",
+            "lesson.again": "start again" if ended else "",
             "lesson.back": "step back" if course.step else "",
             "lesson.predict": "" if plain or course.must_answer else "predict",
         }
@@ -142,7 +147,8 @@ class LessonScreen(LearnScreen[bool]):
         can |= {f"lesson.{key}": "" if plain else words for key, words in (of_run | {"variables": "variables"}).items()}
         for id, words in can.items():
             footer.say(id, words)
-        footer.say("lesson.on", f"{course.activity}" if due else "next lesson" if self._at_next else "go on")
+        on = f"{course.activity}" if due else "next lesson" if self._at_next else "" if ended else "go on"
+        footer.say("lesson.on", "answer" if asked else on, letters(asked) if asked else "")
         self._keep_score()
 
     def _algorithm_is_due(self) -> bool:
@@ -217,11 +223,9 @@ class LessonScreen(LearnScreen[bool]):
             self.dismiss(True)
         elif self.course.go_on():
             self._moved()
-        elif self.course.page.question is not None and self.course.page.chosen is None:
-            place = self.query_one(LessonPane).cursor
-            if place is None:
-                self.say("choose an answer by its letter or with ↑ ↓, or skip the question with s")
-            else:
+        elif self.course.is_open:
+            # Without a cursor the frame says how to answer.
+            if (place := self.query_one(LessonPane).cursor) is not None:
                 self.action_answer(place)
         elif self._opened is None:
             self.action_move("moment", 1)
@@ -235,6 +239,10 @@ class LessonScreen(LearnScreen[bool]):
             self.say(
                 "the lesson begins here" if self._opened else "no lesson is open: the left arrow goes back in the run"
             )
+
+    def action_again(self) -> None:
+        if self.course.again():
+            self._moved()
 
     def action_answer(self, place: int) -> None:
         if self.course.answer(place) is not None:
