@@ -129,4 +129,4 @@ def test_the_first_search_that_ends_counts_and_the_end_says_it():
     end = course(0, Score(step=walk.last, moves=walk.score.moves))
     words = " ".join(part for block in end.page.text for part, _ in block.spans)
     assert "Your own search: After 1 test you stopped at 7 models" in words
-    assert "questions right" in summary(opened(0).asked, end.score)[0]
+    assert "questions right" in summary(opened(0).asked, walk.score)[0]
