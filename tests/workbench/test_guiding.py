@@ -98,6 +98,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
     async with Attached(run) as session:
         await session.press("p", "slash", *"04", "enter")
         assert "Part A shows f and waits for you (11 → 4 models)" in session.dialog()
+        assert "Accepting it removes crate_04, which you want to pin." in " ".join(session.dialog().split())
         assert session.asked() == []
         await session.press(answer)
         decided = [] if first is None else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]

@@ -152,6 +152,17 @@ async def test_the_crosshair_moves_by_cells_and_pans_at_the_border(busy):
         assert "┼" in text_of(world)
 
 
+async def test_the_crosshair_keeps_its_place_in_the_world_where_the_map_changes_its_size(busy):
+    async with Shown(busy) as (pilot, world):
+        await pilot.press(*["left"] * 4, *["up"] * 2)
+        before, port = world.viewport.view, world.viewport
+        x, y = before.point(port.cursor)
+        await pilot.resize_terminal(64, 20)
+        await pilot.pause()
+        assert port.view != before
+        assert port.view.cell(x, y) == port.cursor
+
+
 async def test_a_model_outside_the_view_comes_into_it(busy):
     async with Shown(busy) as (pilot, world):
         world.zoom(8)

@@ -2,6 +2,7 @@
 
 import fake_run
 import pytest
+from textual.widgets import Input
 
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.files import remember
@@ -102,6 +103,26 @@ async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size
             assert words in places.says()
         assert float(session.value("spawn_z")) == pytest.approx(0.167, abs=0.005)
         assert session.told("command").startswith("$ ddenv run")
+
+
+async def test_the_ground_gives_the_z_of_a_start_that_is_typed_until_one_types_that(scenarios, tmp_path):
+    path = tmp_path / "bare.sdf"
+    path.write_bytes((scenarios / "crates.sdf").read_bytes())
+    async with Opened() as session:
+        await session.open(path)
+
+        async def typed(id, text):
+            session.screen.query_one(f"#{id}", Input).value = text
+            await session.pilot.pause()
+
+        await typed("spawn_x", "-6")
+        assert session.value("spawn_z") == ""
+        await typed("spawn_y", "0")
+        assert float(session.value("spawn_z")) == pytest.approx(0.167, abs=0.005)
+        assert session.value("spawn_yaw") == "0"
+        await typed("spawn_z", "0.3")
+        await typed("spawn_x", "-5")
+        assert session.value("spawn_z") == "0.3"
 
 
 async def test_the_crosshair_and_the_mouse_pick(scenarios):
