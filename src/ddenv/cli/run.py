@@ -13,6 +13,7 @@ from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
 from ddenv.settings import SETTINGS
 from ddenv.text import count, first_of, printable, shortened
+from ddenv.world.access import is_world
 
 if TYPE_CHECKING:
     from ddenv.runfile.state import RunState
@@ -53,7 +54,7 @@ def run_command(
     path, world = create_named(scenario, given, asking(trust), name, output, announce)
     announce_notes(world, as_json)
     code, state = follow_to_summary(path, start_engine(path, jobs), as_json)
-    if output is not None and output.suffix in (".sdf", ".world") and state.baseline is not None:
+    if output is not None and is_world(output) and state.baseline is not None:
         announce_needs(output, export_world(path, output, None).needs)
     return code
 

@@ -153,7 +153,10 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     below = ["", "notes", *notes] if notes else []
     wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
     gravity = " ".join(f"{part:g}" for part in world.gravity)
-    title = printable(f"{world.path}: SDF {world.version}, world '{world.name}', gravity {gravity} m/s^2")
+    from ddenv.world.access import is_directives
+
+    what = world.version if is_directives(world.path) else f"SDF {world.version}"
+    title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
     return [*wrapped(title, columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
 
 
@@ -325,6 +328,10 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     from ddenv.robot import check_drake
 
     world, read_as = _read(file, reading)
+    from ddenv.world.access import is_directives
+
+    if is_directives(world.path):
+        raise UserError(f"{world.path}: only SDF worlds can be written settled; 'ddenv world convert' makes one")
     check_drake()
     from ddenv.robot.settled import moved, notes_on
     from ddenv.robot.simulation.template import Variants

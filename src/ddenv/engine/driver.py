@@ -485,7 +485,7 @@ class Driver:
         certificate = current(journal.state)
         if certificate is None or journal.state.search_due:
             raise Stopped(CHANGED)
-        together = self._reduction.keep_supports
+        together = self._reduction.keep_supports or bool(journal.state.welds)
         pinned = self._leg.pinned & journal.environment
         reason = verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]

@@ -67,4 +67,7 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 def _write(scenario: Scenario, world: World, path: Path, documents: dict[str, bytes]) -> None:
     documents["scenario"] = scenario.model_dump_json().encode()
     elements = world.elements(frozenset(scenario.protected))
-    create(path, documents, Created(scenario.model_dump(mode="json"), elements))
+    number = {name: at for at, name in enumerate(elements)}
+    # What is welded to a model that stays is tied to nothing.
+    welds = tuple((number[one], number[other]) for one, other in world.ties if one in number and other in number)
+    create(path, documents, Created(scenario.model_dump(mode="json"), elements, welds))

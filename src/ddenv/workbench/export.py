@@ -20,11 +20,11 @@ from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import without_tilde
+from ddenv.world.access import WORLD_ENDINGS, without_tilde
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
-    ("world", "world (SDF)", (".sdf", ".world")),
+    ("world", "world", WORLD_ENDINGS),
     ("scenario", "scenario (YAML)", (".yaml", ".yml")),
     ("report", "report (HTML)", (".html", ".htm", ".md")),
     ("bundle", "bundle (ZIP)", (".zip",)),
@@ -145,7 +145,7 @@ class ExportScreen(ModalScreen[None]):
         if not name or not f"{folder}{name}".isprintable():
             raise UserError(f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}")
         path = folder / without_tilde(name)
-        if endings[0] and path.suffix.lower() not in endings:
+        if endings[0] and not path.name.lower().endswith(endings):
             raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
         return path
 

@@ -11,6 +11,19 @@ from pathlib import Path
 from ddenv.errors import UserError
 
 MAX_BYTES = 100_000_000  # of a file that the user names
+# How the names of worlds end: SDF, and Drake's model directives.
+SDF_ENDINGS, DIRECTIVES_ENDINGS = (".sdf", ".world"), (".dmd.yaml", ".dmd.yml")
+WORLD_ENDINGS = (*SDF_ENDINGS, *DIRECTIVES_ENDINGS)
+
+
+def is_world(path: Path) -> bool:
+    """Whether the name of `path` is that of a world."""
+    return path.name.lower().endswith(WORLD_ENDINGS)
+
+
+def is_directives(path: Path) -> bool:
+    """Whether the name of `path` is that of a file of Drake's model directives."""
+    return path.name.lower().endswith(DIRECTIVES_ENDINGS)
 
 
 class Missing(Exception):
