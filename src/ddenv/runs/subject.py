@@ -140,7 +140,7 @@ def reading_of(
 def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
-        "name": world.stem[:80] or "world",
+        "name": world.stem.removesuffix(".dmd")[:80] or "world",
         "world": str(world.resolve()),
         "robot": {
             "model": str(SDF / "robots" / "husky.sdf"),

@@ -20,7 +20,7 @@ from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import WORLD_ENDINGS, without_tilde
+from ddenv.world.access import WORLD_ENDINGS, ending_of, without_tilde
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
@@ -64,15 +64,15 @@ class ExportScreen(ModalScreen[None]):
         ),
     ]
 
-    def __init__(self, run: Path) -> None:
+    def __init__(self, run: Path, world: Path = Path()) -> None:
         super().__init__()
         # Not `run`, which is a method of every screen.
-        self._file = run
+        self._file, self._world = run, world
         self._agreed: frozenset[Path] = frozenset()
         self._busy = False
 
     def compose(self) -> ComposeResult:
-        names = suggested(self._file)
+        names = suggested(self._file, self._world)
         with Framed("Export", "ctrl+s writes   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
@@ -189,10 +189,17 @@ class ExportScreen(ModalScreen[None]):
         self.query_one("#export-wrong", Static).update(wrong)
 
 
-def suggested(run: Path) -> tuple[str, ...]:
-    """Names for what can be written of a run, in the order of `KINDS`."""
+def suggested(run: Path, world: Path = Path()) -> tuple[str, ...]:
+    """Names for what can be written of a run of `world`, in the order of `KINDS`."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
-    return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html", f"{stem}.zip", f"{stem}.mcap", "."
+    return (
+        f"{stem}.minimal{ending_of(world)}",
+        f"{stem}.minimal.yaml",
+        f"{stem}.html",
+        f"{stem}.zip",
+        f"{stem}.mcap",
+        ".",
+    )
 
 
 def _here() -> Path:

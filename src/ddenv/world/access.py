@@ -26,6 +26,17 @@ def is_directives(path: Path) -> bool:
     return path.name.lower().endswith(DIRECTIVES_ENDINGS)
 
 
+def ending_of(world: Path) -> str:
+    """How the names of files end that hold a part of `world`."""
+    return DIRECTIVES_ENDINGS[0] if is_directives(world) else SDF_ENDINGS[0]
+
+
+def check_ending(file: Path, world: Path) -> None:
+    """Whether `file` can hold a part of `world`: only its name says how it is read. Raises UserError."""
+    if is_directives(file) != is_directives(world):
+        raise UserError(f"{file}: what is left of {world.name} needs a name that ends in {ending_of(world)}")
+
+
 class Missing(Exception):
     """No file was found for a URI; the text says where we looked."""
 
