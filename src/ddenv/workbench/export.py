@@ -20,11 +20,11 @@ from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import WORLD_ENDINGS, ending_of, without_tilde
+from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
-    ("world", "world", WORLD_ENDINGS),
+    ("world", "world (SDF)", WORLD_ENDINGS),
     ("scenario", "scenario (YAML)", (".yaml", ".yml")),
     ("report", "report (HTML)", (".html", ".htm", ".md")),
     ("bundle", "bundle (ZIP)", (".zip",)),
@@ -80,6 +80,7 @@ class ExportScreen(ModalScreen[None]):
                 yield PathEntry(str(_here()), id="export-folder")
             for (id, title, _), name in zip(KINDS, names, strict=True):
                 with Horizontal(classes="row"):
+                    title = title.replace("SDF", "YAML") if is_directives(self._world) else title
                     yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")
                     yield Input(name, id=f"export-{id}-name", compact=True)
             with VerticalScroll(id="export-results", can_focus=False):

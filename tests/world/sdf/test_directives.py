@@ -36,6 +36,7 @@ ROOM = """directives:
     X_PF: {base_frame: arm::lower, translation: [0.1, 0.2, 0.3]}
 - add_weld: {parent: world, child: arm::foot, X_PC: {translation: [1, 1, 0]}}
 - add_weld: {parent: crate::corner, child: crate::lid}
+- add_collision_filter_group: {name: own, members: [crate::base, arm::foot], ignored_collision_filter_groups: [own]}
 """
 FLOOR = """directives:
 - add_directives: {file: package://things/room.dmd.yaml, model_namespace: room}

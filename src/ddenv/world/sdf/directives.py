@@ -170,10 +170,14 @@ class Directive:
 
 @dataclass
 class Opened:
-    """The directives of a file and of all that it opens, in order. `flat` is one text for all of them, if others were opened."""
+    """The directives of a file and of all that it opens, in order. `flat` is one text for all of them, if others were opened.
+
+    `files` are the parsed ones: the items with their places, and whether commas separate them.
+    """
 
     directives: list[Directive] = field(default_factory=list)
     flat: bytes | None = None
+    files: dict[Path, list[tuple[Node, Span, bool]]] = field(default_factory=dict)
 
 
 class _Loader(yaml.SafeLoader):
@@ -196,9 +200,11 @@ def opened(text: bytes, path: Path, context: Context) -> Opened:
 
 
 def _open(source: Source, files: tuple[Path, ...], context: Context, found: Opened) -> list[tuple[Span, str]]:
-    """Adds the directives of `source` to `found`; returns what to write in place of each `add_directives`."""
+    """Adds the directives of `source` to `found`; returns what to write in place of each `add_directives` of the outermost file."""
     pieces = []
-    for node, (start, end), in_flow in _nodes(source):
+    if source.path not in found.files:
+        found.files[source.path] = list(_nodes(source))
+    for node, (start, end), in_flow in found.files[source.path]:
         if len(source.pairs(node)) != 1:
             raise source.complain(node, f"expected one directive: {', '.join(KEYS)}")
         ((kind, value),) = source.pairs(node).items()
@@ -212,6 +218,8 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: Open
             first = len(found.directives)
             inner = _inner(one, files, context)
             _open(inner, (*files, inner.path), context, found)
+            if len(files) > 1:
+                continue
             texts = [_flat(each) for each in found.directives[first:] if each.kind != "add_directives"]
             new_line = "\n" + " " * (start - source.text.rfind("\n", 0, start) - 1)
             block = new_line.join(f"- {each}" for each in texts)

@@ -168,7 +168,8 @@ class _Builder:
             instance = source.scoped(instance)
             if instance not in self.instances:
                 raise source.complain(one.keys["name"], f"there is no model instance '{instance[:80]}'")
-            owners |= {name for name in self.models if f"{instance}::".startswith(f"{name}::")}
+            words = instance.split("::")
+            owners |= {name for end in range(len(words)) if (name := "::".join(words[: end + 1])) in self.models}
         else:
             inner = there.link.rpartition("::")[0]
             instance = "::".join(each for each in (there.model or WORLD_INSTANCE, inner) if each)
@@ -238,7 +239,8 @@ class _Builder:
         model = self.models[name]
         place = {link.name: self._place((name, self.roots[name, link.name])) for link in model.links}
         joints = [_moved_joint(joint, place[joint.child]) for joint in model.joints]
-        for fixing in (one for (own, _), one in self.fixings.items() if own == name):
+        groups = dict.fromkeys((name, self.roots[name, link.name]) for link in model.links)
+        for fixing in (self.fixings[group] for group in groups if group in self.fixings):
             base = fixing.base
             others = (fixing.own.owners | base.owners) - {name}
             if not fixing.weld:
