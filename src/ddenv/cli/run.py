@@ -43,7 +43,7 @@ LONGEST_URI = 80
 def run_command(
     scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
 ) -> int:
-    """Reduces SCENARIO (ditch, rubble, friction, a YAML file or an SDF world) without a screen."""
+    """Reduces SCENARIO (ditch, rubble, friction, a YAML file, an SDF world or model directives) without a screen."""
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runs.creation import create_named
     from ddenv.runs.export import export_world

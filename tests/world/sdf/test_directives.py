@@ -284,3 +284,40 @@ def test_what_cannot_be_read_is_refused_in_one_line(text, things, tmp_path):
         read(tmp_path, text)
     assert REFUSED[text] in str(error.value)
     assert "\n" not in str(error.value)
+
+
+JSON = '{"directives": [%s, %s]}'
+IN_JSON = '{"add_model": {"name": "%s", "file": "package://things/crate.sdf"}}'
+WRITTEN = {
+    "json": JSON % (IN_JSON % "a", IN_JSON % "b"),
+    "crlf": f"directives:\n{CRATES}".replace("\n", "\r\n"),
+    "bom": f"\ufeffdirectives:\n{CRATES}",
+    "indented": f"directives: # all\n\n{CRATES}".replace("- add", "   # one - each\n   - add"),
+    "words": f"directives:\n{CRATES}".replace("things/crate.sdf}", "things/crate.sdf} # größer").replace(
+        "{name: c", "{name: Häuser"
+    ),
+    "far apart": f"directives:\n{CRATES}".replace("- add", "-\n    # of its own\n  add"),
+}
+
+
+@pytest.mark.parametrize("how", WRITTEN)
+def test_however_it_is_written_the_right_text_goes(how, things, tmp_path):
+    file = tmp_path / "world.dmd.yaml"
+    file.write_bytes(WRITTEN[how].encode())
+    world = read_world(file, Reading(model_path=(things,)))
+    names = [model.name for model in world.models]
+    for gone in names:
+        text = without(world, frozenset([gone]))
+        again = parse_world(text, file, Reading(model_path=(things,)))
+        assert [model.name for model in again.models] == [name for name in names if name != gone]
+        assert_same(as_read(again), in_drake(text, things))
+    in_drake(without(world, frozenset(names)), things)
+
+
+def test_packages_are_found_by_the_name_in_their_package_xml(things, tmp_path, monkeypatch):
+    file = written(tmp_path, CRATES)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(things))
+    assert [model.name for model in read_world(file).models] == ["a", "b", "c"]
+    (things / "package.xml").rename(things / "other.xml")
+    with pytest.raises(UserError, match=r"world\.dmd\.yaml:2: .*'package://things/crate\.sdf' was not found"):
+        read_world(file)

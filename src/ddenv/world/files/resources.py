@@ -10,7 +10,6 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote
@@ -244,7 +243,6 @@ def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
             yield folder / rest
 
 
-@lru_cache(maxsize=1000)
 def _package(folder: Path) -> str:
     """The name of the ROS package in `folder`; empty if it holds none."""
     from defusedxml import DefusedXmlException
