@@ -19,6 +19,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.text import printable
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.context import Context
@@ -55,7 +56,7 @@ class Source:
 
     def complain(self, node: Node, message: str) -> UserError:
         """A UserError with file and line of `node`."""
-        return UserError(f"{self.path}:{node.start_mark.line + 1}: {message}")
+        return UserError(f"{self.path}:{node.start_mark.line + 1}: {printable(message)}")
 
     def scoped(self, name: str) -> str:
         """`name` with the namespace before it; `world` has none."""
