@@ -24,6 +24,8 @@ ARM = f"""<sdf version='1.9'><model name='arm'><link name='foot'>{MASS}{BOX.form
 <axis><xyz>0 1 0</xyz><limit><lower>-2</lower><upper>2</upper></limit></axis></joint>
 <joint name='wrist' type='prismatic'><parent>lower</parent><child>hand::palm</child><axis><xyz>1 0 1</xyz></axis></joint>
 </model></sdf>"""
+PAIR = f"""<sdf version='1.9'><model name='pair'><link name='p'><pose>1 2 3 0 0 0</pose>{MASS}{BOX.format("p")}</link>
+<link name='q'>{MASS}{BOX.format("q")}</link></model></sdf>"""
 SHELF = """<robot name='shelf'><link name='board'><inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0'
 iyz='0'/></inertial></link><link name='rail'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>
 </inertial></link><joint name='slide' type='prismatic'><parent link='board'/><child link='rail'/><origin xyz='1 0 0.5'
@@ -88,6 +90,12 @@ WORLDS = {
 - add_weld: {parent: arm::hand::palm, child: tool::base, X_PC: {translation: [0, 0, 0.2]}}
 - add_weld: {parent: tool::lid, child: tip::base, X_PC: {rotation: !Rpy {deg: [0, 90, 0]}}}
 """,
+    "parts": """
+- add_model: {name: one, file: package://things/pair.sdf}
+- add_model: {name: two, file: package://things/pair.sdf, default_free_body_pose: {q: {translation: [7, 0, 0]}}}
+- add_weld: {parent: one::p, child: one::q, X_PC: {translation: [0, 0, 1]}}
+- add_weld: {parent: world, child: two::p}
+""",
     "urdf": """
 - add_model: {name: low, file: package://things/shelf.urdf, default_joint_positions: {slide: [0.25]}}
 - add_model: {name: high, file: package://things/shelf.urdf, default_free_body_pose: {board: {translation: [0, 0, 2]}}}
@@ -116,6 +124,7 @@ FILES = {
     "crate.sdf": CRATE,
     "arm.sdf": ARM,
     "shelf.urdf": SHELF,
+    "pair.sdf": PAIR,
     "room.dmd.yaml": ROOM,
     "floor.dmd.yaml": FLOOR,
 }
@@ -249,6 +258,7 @@ def test_collision_filter_groups_lose_the_models_that_went(things, tmp_path):
 
 
 LOOP = "- add_weld: {parent: a::lid, child: b::lid}\n- add_weld: {parent: b::lid, child: a::lid}"
+PAIRS = CRATES.replace("crate", "pair")
 REFUSED = {
     "- add_modle: {name: a}": "2: unknown directive 'add_modle' (did you mean add_model?)",
     "- add_model: {name: a, file: package://nowhere/crate.sdf}": "2: /add_model[@name='a']: 'package://nowhere",
@@ -265,6 +275,10 @@ REFUSED = {
     CRATES
     + "- add_weld: {parent: world, child: a::lid, X_PC: {translation: [0, .nan, 0]}}": "5: expected a finite number, found '.nan'",
     CRATES + "- add_weld: {parent: world, child: a::lid, X_PC: {rotation: !Uniform {}}}": "5: !Uniform is random",
+    PAIRS
+    + "- add_weld: {parent: b::p, child: a::p}\n- add_weld: {parent: c::p, child: a::q}": "6: 'a' is welded to two models",
+    PAIRS
+    + "- add_weld: {parent: b::p, child: a::p}\n- add_weld: {parent: a::q, child: b::q}": "[@name='a']: its welds form a loop",
     "- add_directives: {file: package://things/loop.dmd.yaml}": "loop.dmd.yaml:2: add_directives form a cycle: loop.dmd.yaml",
     "- add_directives: {file: package://things/none.dmd.yaml}": "2: 'package://things/none.dmd.yaml' was not found",
     "- add_directives: {file: package://things/room.dmd.yaml, model_namespace: x}": "2: there is no model instance 'x'",

@@ -14,7 +14,6 @@ from pathlib import Path
 
 from yaml.nodes import Node
 
-from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
 from ddenv.world.pose import HERE, Pose
@@ -25,7 +24,7 @@ from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.includes import included
 from ddenv.world.sdf.joints import check_tree, link_of
 from ddenv.world.sdf.urdf import is_urdf, without_mass
-from ddenv.world.sdf.xml import Element
+from ddenv.world.sdf.xml import Element, complain
 
 GRAVITY = (0.0, 0.0, -9.81)  # Drake's default, m/s^2
 OWN_FRAME = "__model__"
@@ -232,7 +231,7 @@ class _Builder:
             self.finished[name] = self._finished(name)
         model = self.finished[name]
         if model is None:
-            raise UserError(f"the welds of '{name[:80]}' form a loop")
+            raise complain(self.elements[name], "its welds form a loop")
         return model
 
     def _finished(self, name: str) -> Model:
@@ -248,8 +247,12 @@ class _Builder:
                 continue
             at = fixing.own.link
             joints = _hung_from(at, joints)
-            carrier = self.finish(base.model) if base.model else None
-            if carrier is not None and base.model != name and not _holds(carrier, base.link):
+            if base.model == name:
+                joints.append(Joint(f"{at} (weld)", "fixed", base.link, at, self._pose(base)))
+            elif base.model and not _holds(self.finish(base.model), base.link):
+                if name in self.carriers:
+                    why = f"'{name[:80]}' is welded to two models that can move"
+                    raise fixing.source.complain(fixing.node, why)
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
