@@ -89,7 +89,10 @@ def test_what_is_left_is_directives_again_and_the_run_file_needs_no_other_file(h
 def test_directives_are_worlds_on_the_command_line(hall, monkeypatch, capsys):
     assert named_file(str(hall)) == ("world", hall)
     said = in_process(monkeypatch, capsys, "world", "check", hall)
-    assert (said.returncode, "3 models, 3 can be removed" in said.stdout) == (0, True)
+    assert (said.returncode, "3 can be removed; welded, so they go together: lamp to table;" in said.stdout) == (
+        0,
+        True,
+    )
     hall.write_text(HALL.replace("lamp::l", "lamp::k"))
     said = in_process(
         monkeypatch, capsys, "run", hall, "--spawn", "0,0,0.2,0", "--goal", "6,0", "--output", hall.parent

@@ -227,6 +227,8 @@ def _totals(world: World) -> str:
     stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
     why = f"; {they} since others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
+    welds = [f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}" for one, other in world.ties]
+    why += f"; welded, so they go together: {first_of(welds, MOST_NAMES)}" if welds else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
     return f"{models}; {', '.join(said) or 'nothing was replaced or ignored'}"
 
