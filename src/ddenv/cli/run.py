@@ -13,6 +13,7 @@ from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
 from ddenv.settings import SETTINGS
 from ddenv.text import count, first_of, printable, shortened
+from ddenv.world.access import is_world
 
 if TYPE_CHECKING:
     from ddenv.runfile.state import RunState
@@ -42,7 +43,7 @@ LONGEST_URI = 80
 def run_command(
     scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
 ) -> int:
-    """Reduces SCENARIO (ditch, rubble, friction, a YAML file or an SDF world) without a screen."""
+    """Reduces SCENARIO (ditch, rubble, friction, a YAML file, an SDF world or model directives) without a screen."""
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runs.creation import create_named
     from ddenv.runs.export import export_world
@@ -53,7 +54,7 @@ def run_command(
     path, world = create_named(scenario, given, asking(trust), name, output, announce)
     announce_notes(world, as_json)
     code, state = follow_to_summary(path, start_engine(path, jobs), as_json)
-    if output is not None and output.suffix in (".sdf", ".world") and state.baseline is not None:
+    if output is not None and is_world(output) and state.baseline is not None:
         announce_needs(output, export_world(path, output, None).needs)
     return code
 

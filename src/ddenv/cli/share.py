@@ -46,7 +46,13 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
 
 @click.command("export")
 @options.run_argument
-@click.option("--sdf", "--output", "sdf", type=Path, help="Write the environment as an SDF world.")
+@click.option(
+    "--sdf",
+    "--output",
+    "sdf",
+    type=Path,
+    help="Write the environment as a world: SDF, or directives (.dmd.yaml) if the world is.",
+)
 @click.option(
     "--passes",
     is_flag=True,

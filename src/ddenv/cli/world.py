@@ -153,7 +153,10 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     below = ["", "notes", *notes] if notes else []
     wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
     gravity = " ".join(f"{part:g}" for part in world.gravity)
-    title = printable(f"{world.path}: SDF {world.version}, world '{world.name}', gravity {gravity} m/s^2")
+    from ddenv.world.access import is_directives
+
+    what = world.version if is_directives(world.path) else f"SDF {world.version}"
+    title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
     return [*wrapped(title, columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
 
 
@@ -224,6 +227,8 @@ def _totals(world: World) -> str:
     stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
     why = f"; {they} since others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
+    welds = [f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}" for one, other in world.ties]
+    why += f"; welded, so they go together: {first_of(welds, MOST_NAMES)}" if welds else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
     return f"{models}; {', '.join(said) or 'nothing was replaced or ignored'}"
 
@@ -325,6 +330,10 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     from ddenv.robot import check_drake
 
     world, read_as = _read(file, reading)
+    from ddenv.world.access import is_directives
+
+    if is_directives(world.path):
+        raise UserError(f"{world.path}: only SDF worlds can be written settled; 'ddenv world convert' makes one")
     check_drake()
     from ddenv.robot.settled import moved, notes_on
     from ddenv.robot.simulation.template import Variants

@@ -485,14 +485,14 @@ class Driver:
         certificate = current(journal.state)
         if certificate is None or journal.state.search_due:
             raise Stopped(CHANGED)
-        together = self._reduction.keep_supports
+        stacks = stacks_of(journal.state, journal.state.environment)
+        together = self._reduction.keep_supports or any(len(stack) > 1 for stack in stacks)
         pinned = self._leg.pinned & journal.environment
         reason = verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
             reason += "; to leave it out was vetoed or rejected"
         if together:
-            stacks = stacks_of(journal.state, journal.state.environment)
             reason += f"; stacks were kept together ({count(len(stacks), 'stack')})"
         self._end(is_minimal(certificate), reason)
 

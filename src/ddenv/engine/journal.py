@@ -185,7 +185,7 @@ class Journal:
         if state.ties is None or state.refuted is not None or not read(state.scenario, SETTINGS["slice"]):
             return None
         if self._ties[0] is not state.ties:
-            self._ties = state.ties, Ties.among(self.pairs(state.ties))
+            self._ties = state.ties, Ties.among(self.pairs((*state.ties, *state.welds)))
         return self._ties[1]
 
     def rate_of_whole(self) -> float:

@@ -177,9 +177,12 @@ class Try:
         state, names = now.state, _names_of(now.state, self.models, empty=True)
         if names is None:
             return NO_MODELS
+        keep = frozenset(names)
+        loose = next((pair for pair in state.welds if pair[0] in keep and pair[1] not in keep), None)
+        if loose is not None:
+            return f"{named(loose[:1])} is welded to {named(loose[1:])}: they stay or go together"
         if state.baseline is None:
             return NO_FAILURE
-        keep = frozenset(names)
         if keep == frozenset(state.environment):
             return "that is the current environment: nothing is left out"
         under_way = (trial for trial in state.trials if not trial.verdict)

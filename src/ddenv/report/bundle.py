@@ -24,9 +24,9 @@ from ddenv.runs.reasons import sentence
 from ddenv.text import count, printable
 from ddenv.words.claims import meaning, rate, seeds_of, uncertified
 from ddenv.words.margins import rows, said
-from ddenv.world.access import write_file
+from ddenv.world.access import ending_of, write_file
 
-RUN, WORLD, SCENARIO = BUNDLED_RUN, "world.sdf", "scenario.yaml"
+RUN, SCENARIO = BUNDLED_RUN, "scenario.yaml"
 REPORT, ISSUE, AGAIN = "report.html", "ISSUE.md", "repro.py"
 MOST_NAMES = 20
 NEEDS = f"needs ddenv {__version__}: {how_to_install()}"
@@ -105,10 +105,14 @@ def _copy_run(run: Path, target: Path, record: Record) -> None:
 
 def _fill(folder: Path, run: Path, record: Record) -> None:
     _copy_run(run, folder / RUN, record)
-    needs = export_world(run, folder / WORLD, folder / SCENARIO).needs
+    needs = export_world(run, folder / _world(record), folder / SCENARIO).needs
     write_report(run, folder / REPORT)
     write_file(folder / AGAIN, _filled("repro.py.txt", run=RUN, needs=NEEDS))
     write_file(folder / ISSUE, _issue(record, needs))
+
+
+def _world(record: Record) -> str:
+    return f"world{ending_of(Path(str(record.state.scenario.get('world', ''))))}"
 
 
 def _filled(template: str, **words: str) -> bytes:
@@ -151,9 +155,9 @@ def _issue(record: Record, needs: list[str]) -> bytes:
         needs=NEEDS,
         report=REPORT,
         run=RUN,
-        world=WORLD,
+        world=_world(record),
         scenario=SCENARIO,
-        files=f"Other programs also need the files that `{WORLD}` names: {names}.\n" if needs else "",
+        files=f"Other programs also need the files that `{_world(record)}` names: {names}.\n" if needs else "",
         maker=f"ddenv {__version__}; {_code(state.simulator)}",
     )
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 from typing import Any
 
 from ddenv.page.blocks import Block, Code, Name, Section, Table, say, section
 from ddenv.report.run_data import Record
 from ddenv.settings import JOBS, OPTIONS, PRINTED, SETTINGS, Setting, read
 from ddenv.text import plain
+from ddenv.world.access import ending_of
 
 LONGEST_VALUE = 120
 
@@ -80,13 +82,14 @@ def repeat(record: Record) -> Section:
     blocks: list[Block] = []
     if state.baseline is not None:
         kept = "minimal world" if state.certified else "world that is left"
+        world = f"minimal{ending_of(Path(str(state.scenario.get('world', ''))))}"
         blocks += [
             say(f"See the failure in the {kept}, and that it needs each of its models:"),
             Code((f"ddenv test {run} --minimal --leave-each-out",)),
             say("Run it more often with fresh seeds, for a narrower interval:"),
             Code((f"ddenv certify {run} --runs 100",)),
             say(f"Take the {kept} elsewhere, with a scenario that runs the robot in it:"),
-            Code((f"ddenv export {run} --sdf minimal.sdf --scenario minimal.yaml",)),
+            Code((f"ddenv export {run} --sdf {world} --scenario minimal.yaml",)),
         ]
     again = "Reduce it again from the beginning"
     again += " (without what was decided by hand):" if state.decisions else ":"

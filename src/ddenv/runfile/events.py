@@ -59,10 +59,13 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Created(Event):
-    """The first event: the scenario as plain data, and the names of all models that may go."""
+    """The first event: the scenario as plain data, and the names of all models that may go. In `welds` the first one is welded to
+    the second.
+    """
 
     scenario: dict[str, Any]
     elements: tuple[str, ...]
+    welds: tuple[Pair, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,6 +83,7 @@ def _created(state: RunState, event: e.Created, _: float) -> Changes:
     return {
         "scenario": recorded_scenario(event.scenario),
         "elements": names,
+        "welds": tuple((names[first], names[second]) for first, second in event.welds),
         "environments": PersistentTuple.of([Environment.whole(len(names))]),
         "environment": names,
         "history": (Point(0, len(names)),),

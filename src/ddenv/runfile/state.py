@@ -64,7 +64,8 @@ class RunState:
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
     `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
-    `settling`; `unsettled` says why it could not be found. `ties` has (model, other)
+    `settling`; `unsettled` says why it could not be found. `welds` has (model, other) where the files weld a model to another:
+    these always stay or go together. `ties` has (model, other)
     where a model is tied to another; None if that is unknown. Of the tests, `implied` ones were not simulated, and
     `audits` were although they were implied. Tests up to `mixed_until` were computed with something else, and imply nothing now.
     If one of these, the first of `refuted`, did not repeat the second, slices are no
@@ -128,6 +129,7 @@ class RunState:
     removals: PersistentTuple[Removal] = field(default_factory=PersistentTuple)
     lower_bound: int = 0
     supports: Pairs = ()
+    welds: Pairs = ()
     ties: Pairs | None = None
     implied: int = 0
     ahead: int = 0

@@ -26,19 +26,19 @@ def drops_without(state: RunState, models: frozenset[str]) -> Names:
 
 
 def stacks_of(state: RunState, environment: Names) -> tuple[Names, ...]:
-    """The models of `environment` in groups that stay or go together: single models, unless the run keeps stacks whole."""
-    return stacks(environment, state.supports if _keeps_stacks(state) else ())
+    """The models of `environment` in groups that stay or go together: what is welded, and stacks if the run keeps them whole."""
+    return stacks(environment, _kept(state))
 
 
 def stack_with(state: RunState, environment: Names, name: str | None) -> Names:
     """The models that go together with a model, itself included; none for None."""
-    if name is None or not _keeps_stacks(state):
+    if name is None or not _kept(state):
         return () if name is None else (name,)
     return next((stack for stack in stacks_of(state, environment) if name in stack), (name,))
 
 
-def _keeps_stacks(state: RunState) -> bool:
-    return bool(read(state.scenario, SETTINGS["keep_supports"]))
+def _kept(state: RunState) -> Pairs:
+    return (*state.welds, *state.supports) if read(state.scenario, SETTINGS["keep_supports"]) else state.welds
 
 
 def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) -> Names:

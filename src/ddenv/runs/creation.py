@@ -12,7 +12,7 @@ from ddenv.runs.clusters import check_cluster
 from ddenv.runs.folder import run_path
 from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts, scenario_named
 from ddenv.runs.trust import check_named, trust_cluster
-from ddenv.world.access import read_bytes
+from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 
@@ -30,6 +30,8 @@ def create_named(
     `asks` whether what it starts is trusted. `name` and `output` as for `run_path`. Raises UserError, with nothing written.
     """
     scenario = scenario_named(subject, given, announce)
+    if output is not None and is_world(output):
+        check_ending(output, scenario.world)
     if given["cluster"]:
         trust_cluster(scenario)
     check_named(scenario, subject, asks)
@@ -67,4 +69,7 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 def _write(scenario: Scenario, world: World, path: Path, documents: dict[str, bytes]) -> None:
     documents["scenario"] = scenario.model_dump_json().encode()
     elements = world.elements(frozenset(scenario.protected))
-    create(path, documents, Created(scenario.model_dump(mode="json"), elements))
+    number = {name: at for at, name in enumerate(elements)}
+    # What is welded to a model that stays is tied to nothing.
+    welds = tuple((number[one], number[other]) for one, other in world.ties if one in number and other in number)
+    create(path, documents, Created(scenario.model_dump(mode="json"), elements, welds))

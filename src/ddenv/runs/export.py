@@ -17,7 +17,7 @@ from ddenv.runs.nearest import removed_in_passing
 from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
-from ddenv.world.access import Missing, Unusable, write_file
+from ddenv.world.access import Missing, Unusable, check_ending, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
@@ -38,7 +38,7 @@ class Exported:
 def export_world(
     run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margin: str | None = None
 ) -> Exported:
-    """Writes the current environment of a run, or the nearest world that `passes`, as an SDF world, and a scenario for it if asked.
+    """Writes the current environment of a run, or the nearest world that `passes`, to `sdf`, and a scenario for it if asked.
 
     With a `margin`, NAME or NAME=VALUE, that number is changed: to the value nearest to the present one at which the robot
     reaches its goal if no other is given. Raises UserError.
@@ -47,6 +47,7 @@ def export_world(
         scenario, world, machine = read_parts(file)
         robot, documents = file.document("robot"), file.documents(RESOURCE)
         state = fold(file.events())
+    check_ending(sdf, scenario.world)
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))

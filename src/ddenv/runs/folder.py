@@ -13,6 +13,7 @@ import platformdirs
 
 from ddenv.errors import UserError
 from ddenv.text import plain
+from ddenv.world.access import WORLD_ENDINGS, is_world
 
 SUFFIX = ".ddenv"
 # The run in the folder of a bundle.
@@ -71,13 +72,15 @@ def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
     if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
         raise UserError(f"--name: '{name}' is not a valid file name; use letters, digits, - and _")
-    if output is not None and output.suffix in (".sdf", ".world"):
+    if output is not None and is_world(output):
         if not output.parent.is_dir():
             raise UserError(f"--output: there is no folder {output.parent}")
         output = None
     if output is not None and not output.is_dir():
         if output.suffix != SUFFIX:
-            raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
+            raise UserError(
+                f"--output: '{output}' is neither a folder nor a {', '.join((SUFFIX, *WORLD_ENDINGS))} file"
+            )
         return output
     folder = output or runs_folder()
     return free_run_path(scenario_name, folder) if name is None else folder / f"{name.removesuffix(SUFFIX)}{SUFFIX}"

@@ -18,7 +18,7 @@ from ddenv.runs.folder import SUFFIX, find_run
 from ddenv.runs.remedies import with_remembered
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
-from ddenv.world.access import read_bytes, write_file
+from ddenv.world.access import is_world, read_bytes, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SCENARIOS, SDF, bundled_names, find_scenario, load_scenario, validate
@@ -29,7 +29,7 @@ from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_world
 from ddenv.world.sdf.standin import parse_option
 
 Announce = Callable[[str], None]
-SCENARIO_FILES, WORLD_FILES = (".yaml", ".yml"), (".sdf", ".world")
+SCENARIO_FILES = (".yaml", ".yml")
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
@@ -75,7 +75,7 @@ def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
     A run comes before a bundled scenario, and every file before both.
     """
     run = find_run(name)
-    if (run.is_file() and run.suffix.lower() not in (*SCENARIO_FILES, *WORLD_FILES)) or name.endswith(SUFFIX):
+    if (run.is_file() and not is_world(run) and run.suffix.lower() not in SCENARIO_FILES) or name.endswith(SUFFIX):
         return "run", run
     return named_file(name)
 
@@ -83,7 +83,7 @@ def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
 def named_file(name: str) -> tuple[Literal["scenario", "world"], Path] | None:
     """The same where no run is meant."""
     path = Path(name)
-    if path.suffix.lower() in WORLD_FILES:
+    if is_world(path):
         return "world", path
     if path.suffix.lower() in SCENARIO_FILES:
         return "scenario", path
@@ -104,13 +104,13 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     remembered = others.pop("remembered", False)
     reading = {option: others.pop(option) for option in READING}
     spawn, goal = given["spawn"], given["goal"]
-    if Path(name).suffix.lower() not in WORLD_FILES:
+    if not is_world(Path(name)):
         scenario = load_scenario(find_scenario(name))
     elif spawn is None or goal is None:
         # A file that is no world needs no places either.
         read_world(Path(name), reading_of(**reading), announce)
         example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
-        raise UserError(f"{name}: an SDF world needs a start and a goal, such as {example}")
+        raise UserError(f"{name}: a world needs a start and a goal, such as {example}")
     elif given["world"] is not None:
         raise UserError(f"--world: only for a scenario; {name} is a world")
     else:
@@ -140,7 +140,7 @@ def reading_of(
 def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
-        "name": world.stem[:80] or "world",
+        "name": world.stem.removesuffix(".dmd")[:80] or "world",
         "world": str(world.resolve()),
         "robot": {
             "model": str(SDF / "robots" / "husky.sdf"),

@@ -22,11 +22,11 @@ from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import without_tilde
+from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
-    ("world", "world (SDF)", (".sdf", ".world")),
+    ("world", "world (SDF)", WORLD_ENDINGS),
     ("scenario", "scenario (YAML)", (".yaml", ".yml")),
     ("report", "report (HTML)", (".html", ".htm", ".md")),
     ("bundle", "bundle (ZIP)", (".zip",)),
@@ -68,15 +68,15 @@ class ExportScreen(ModalScreen[None]):
         ),
     ]
 
-    def __init__(self, run: Path) -> None:
+    def __init__(self, run: Path, world: Path = Path()) -> None:
         super().__init__()
         # Not `run`, which is a method of every screen.
-        self._file = run
+        self._file, self._world = run, world
         self._agreed: frozenset[Path] = frozenset()
         self._busy = False
 
     def compose(self) -> ComposeResult:
-        names = suggested(self._file)
+        names = suggested(self._file, self._world)
         with Framed("Export", "↑ ↓ rows   space ticks   tab to its name   enter writes   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
@@ -84,6 +84,7 @@ class ExportScreen(ModalScreen[None]):
                 yield PathEntry(str(_here()), id="export-folder")
             for (id, title, _), name in zip(KINDS, names, strict=True):
                 with Horizontal(classes="row"):
+                    title = title.replace("SDF", "YAML") if is_directives(self._world) else title
                     yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")
                     yield Input(name, id=f"export-{id}-name", compact=True)
             with VerticalScroll(id="export-results", can_focus=False):
@@ -158,7 +159,7 @@ class ExportScreen(ModalScreen[None]):
         if not name or not f"{folder}{name}".isprintable():
             raise UserError(f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}")
         path = folder / without_tilde(name)
-        if endings[0] and path.suffix.lower() not in endings:
+        if endings[0] and not path.name.lower().endswith(endings):
             raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
         return path
 
@@ -202,10 +203,17 @@ class ExportScreen(ModalScreen[None]):
         self.query_one("#export-wrong", Static).update(wrong)
 
 
-def suggested(run: Path) -> tuple[str, ...]:
-    """Names for what can be written of a run, in the order of `KINDS`."""
+def suggested(run: Path, world: Path = Path()) -> tuple[str, ...]:
+    """Names for what can be written of a run of `world`, in the order of `KINDS`."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
-    return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html", f"{stem}.zip", f"{stem}.mcap", "."
+    return (
+        f"{stem}.minimal{ending_of(world)}",
+        f"{stem}.minimal.yaml",
+        f"{stem}.html",
+        f"{stem}.zip",
+        f"{stem}.mcap",
+        ".",
+    )
 
 
 def _here() -> Path:

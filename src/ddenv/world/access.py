@@ -11,6 +11,30 @@ from pathlib import Path
 from ddenv.errors import UserError
 
 MAX_BYTES = 100_000_000  # of a file that the user names
+# How the names of worlds end: SDF, and Drake's model directives.
+SDF_ENDINGS, DIRECTIVES_ENDINGS = (".sdf", ".world"), (".dmd.yaml", ".dmd.yml")
+WORLD_ENDINGS = (*SDF_ENDINGS, *DIRECTIVES_ENDINGS)
+
+
+def is_world(path: Path) -> bool:
+    """Whether the name of `path` is that of a world."""
+    return path.name.lower().endswith(WORLD_ENDINGS)
+
+
+def is_directives(path: Path) -> bool:
+    """Whether the name of `path` is that of a file of Drake's model directives."""
+    return path.name.lower().endswith(DIRECTIVES_ENDINGS)
+
+
+def ending_of(world: Path) -> str:
+    """How the names of files end that hold a part of `world`."""
+    return DIRECTIVES_ENDINGS[0] if is_directives(world) else SDF_ENDINGS[0]
+
+
+def check_ending(file: Path, world: Path) -> None:
+    """Whether `file` can hold a part of `world`: only its name says how it is read. Raises UserError."""
+    if is_directives(file) != is_directives(world):
+        raise UserError(f"{file}: what is left of {world.name} needs a name that ends in {ending_of(world)}")
 
 
 class Missing(Exception):

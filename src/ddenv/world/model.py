@@ -203,11 +203,22 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True)
+class Shared:
+    """A byte range (start, end) of a world's text that goes when all of `models` are gone, and what is written `instead`."""
+
+    span: tuple[int, int]
+    models: frozenset[str]
+    instead: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
 class World:
     """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 
     `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
     everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
+    `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
+    that go when several models are gone.
     """
 
     path: Path
@@ -219,6 +230,8 @@ class World:
     notes: tuple[Note, ...] = ()
     anchors: frozenset[str] = frozenset()
     resources: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    ties: tuple[tuple[str, str], ...] = ()
+    shared: tuple[Shared, ...] = ()
 
     def model(self, name: str) -> Model:
         for model in self.models:
@@ -228,7 +241,10 @@ class World:
 
     def elements(self, protected: frozenset[str] = frozenset()) -> tuple[str, ...]:
         """Names of the models that a reduction may remove, in the file's order."""
-        stay = protected | self.anchors
+        stay, new = protected | self.anchors, protected | self.anchors
+        while new:
+            new = frozenset(other for model, other in self.ties if model in new) - stay
+            stay |= new
         return tuple(model.name for model in self.models if model.name not in stay and not is_ground(model))
 
 

@@ -282,7 +282,7 @@ class Whole(Section):
 
 
 class Scenario(Section):
-    """Everything one reduction needs to know. `world` is an SDF file, relative to the scenario's folder.
+    """Everything one reduction needs to know. `world` is an SDF file or model directives, relative to the scenario's folder.
 
     `folder` is where an own controller's module and an oracle's command or module are found, by default the scenario's folder.
     """

@@ -25,7 +25,7 @@ from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import RECORD_PERIOD, Progress, RunResult
 from ddenv.text import printable
 from ddenv.world.command import command_words, filled, has_placeholder, start_folder
-from ddenv.world.files.resources import ENVIRONMENT
+from ddenv.world.files.resources import ENVIRONMENT, PACKAGES
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario, Whole
@@ -115,7 +115,7 @@ class ExternalSimulator:
         known["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
         known["DDENV_GOAL"] = _numbers(goal.x, goal.y, goal.tolerance)
         folders = [self._scenario.world.parent, *self._scenario.reading.model_path]
-        for name in ENVIRONMENT:
+        for name in (*ENVIRONMENT, PACKAGES):
             before = os.environ.get(name)
             known[name] = os.pathsep.join([*map(str, folders), *([before] if before else [])])
         return {**os.environ, **known}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -157,7 +158,8 @@ class Opening:
         """Asks what to export."""
         from ddenv.workbench.export import ExportScreen
 
-        self._screen.app.push_screen(ExportScreen(self._poll.path))
+        world = Path(str(self._poll.snapshot.state.scenario.get("world", "")))
+        self._screen.app.push_screen(ExportScreen(self._poll.path, world))
 
     def method(self) -> None:
         """Explains how the run is reduced."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 from ddenv.text import count, plain
 from ddenv.workbench.setup.missing_files import Missing, read_with_remedies
+from ddenv.world.access import is_world
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, World
@@ -97,7 +98,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN
 
-    scenario = load_scenario(path) if path.suffix.lower() in (".yaml", ".yml") else None
+    scenario = None if is_world(path) else load_scenario(path)
     own = scenario.reading if scenario else PLAIN
     settings = scenario or scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
     world, chosen, missing = read_with_remedies(settings.world, own, options)

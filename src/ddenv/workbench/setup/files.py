@@ -20,11 +20,12 @@ from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.path_entry import PathEntry
+from ddenv.world.access import SDF_ENDINGS, is_world
 
 # The maximum number of recent files: in a longer list files are hard to find.
 RECENT, KEPT = "recent.json", 12
 SCENARIO = (".yaml", ".yml")
-SUFFIXES = (*SCENARIO, ".sdf", ".world")
+SUFFIXES = (*SCENARIO, *SDF_ENDINGS)
 
 
 def recent_files() -> list[Path]:
@@ -97,7 +98,7 @@ class FileList(OptionList):
 
 
 def _name(path: Path) -> str:
-    return path.stem if path.suffix.lower() in SCENARIO else path.name
+    return path.name if is_world(path) else path.stem
 
 
 def _option(path: Path, name: str, where: str) -> Option:
@@ -132,7 +133,8 @@ class OpenFile(ModalScreen[Path | None]):
 
     def compose(self) -> ComposeResult:
         with Framed(
-            "Open a scenario (.yaml) or a world (.sdf, .world)", "tab completes   enter opens   escape cancels"
+            "Open a scenario (.yaml) or a world (.sdf, .world, .dmd.yaml)",
+            "tab completes   enter opens   escape cancels",
         ):
             yield PathEntry(placeholder="path of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)

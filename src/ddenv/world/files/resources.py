@@ -239,8 +239,19 @@ def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
     name, _, rest = path.partition(os.sep)
     for folder in folders:
         yield folder / path
-        if folder.name == name:
+        if name in (folder.name, _package(folder)):
             yield folder / rest
+
+
+def _package(folder: Path) -> str:
+    """The name of the ROS package in `folder`; empty if it holds none."""
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        return (fromstring(read(folder / "package.xml", MODEL_CONFIG_LIMIT)).findtext("name") or "").strip()
+    except (Unusable, ElementTree.ParseError, DefusedXmlException, LookupError, ValueError):
+        return ""
 
 
 def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:

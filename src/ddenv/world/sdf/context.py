@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -39,7 +40,7 @@ QUIET: dict[str, frozenset[str]] = {
         "velocity_decay": "linear angular",
     }.items()
 }
-QUIET["axis2"] = QUIET["axis"]
+QUIET["axis2"], QUIET["add_model"] = QUIET["axis"], QUIET["include"]
 ONCE = {"pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"}
 ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {
@@ -97,6 +98,13 @@ class Context:
         """Notes that `element` was replaced or ignored."""
         self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
 
+    def note_unused(self, root: Element) -> None:
+        """Notes the stand-ins that nothing asked for: probably typing errors."""
+        # `auto` asks for nothing as long as nothing is missing.
+        asked = {uri for uri, stand_in in self.stand_ins.items() if stand_in != AUTO}
+        for uri in sorted(asked - self.used):
+            self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
+
     def complain_of_missing(self) -> None:
         """Raises MissingFiles with the first error, and the names of the other files."""
         if not self.missing:
@@ -123,14 +131,14 @@ class Context:
         key = matching(self.stand_ins, uri)
         return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
 
-    def root(self, element: Element, uri: str) -> Element:
-        """The `<sdf>` of the file that `element` includes. Raises Missing, and UserError for a file that is not SDF."""
+    def root(self, element: Element, uri: str, convert: Callable[[bytes, Path, Context], Element]) -> Element:
+        """The `<sdf>` that `convert` makes of the file that `element` includes. Raises Missing, and UserError for another file."""
         try:
             path, text = self.resources.sdf(uri, element.source.parent)
         except Unusable as error:
             raise complain(element, f"'{uri[:200]}' cannot be included: {error}") from None
         if path not in self.files:
-            self.files[path] = sdf_root(text, path)
+            self.files[path] = convert(text, path, self)
         return self.files[path]
 
 

@@ -10,6 +10,7 @@ from ddenv.world.access import Missing
 from ddenv.world.files.resources import FOLDER
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
+from ddenv.world.sdf.urdf import root_of
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 from ddenv.world.write import primitive
 
@@ -52,13 +53,14 @@ def parts(element: Element, files: tuple[Path, ...], context: Context) -> list[P
         if child.tag == "model":
             found.append(Part(child, child, name_of(child), files))
         elif child.tag == "include":
-            part = _included(child, files, context)
+            part = included(child, files, context)
             if part is not None:
                 found.append(part)
     return found
 
 
-def _included(include: Element, files: tuple[Path, ...], context: Context) -> Part | None:
+def included(include: Element, files: tuple[Path, ...], context: Context) -> Part | None:
+    """The model that `include` names by its URI; None if it is left out or missing. Raises UserError."""
     uri = text_of(include.find("uri"))
     if not uri:
         raise complain(include, "has no <uri>")
@@ -100,7 +102,7 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         _note(include, uri, f"the stand-in {text}", context)
         return _stand_in_root(include, text, stand_in)
     try:
-        root = context.root(include, uri)
+        root = context.root(include, uri, root_of)
         if root.source.parent == FOLDER and root.find("model") is not None:
             _note(include, uri, "the one built into ddenv, which is like Gazebo's", context)
         return root

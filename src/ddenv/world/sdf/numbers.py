@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.world.access import is_directives
 from ddenv.world.extent import bounds
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Box, Cylinder, Model, Sphere, World, is_ground
@@ -104,6 +105,8 @@ def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[st
     """The numbers by name, of the models `kept` and of the scenario. Those that promise most come first."""
     box = bounds(robot.collisions)
     length = 1.0 if box is None else float((box[1] - box[0])[:2].max())
+    # Those of directives stand in files of their own.
+    kept = () if is_directives(world.path) else kept
     models = [world.model(name) for name in kept if name not in world.anchors]
     values: list[tuple[Kind, str, float | None]] = [
         (kind, f"{model.name}.{what}", _of_model(world, model, what))

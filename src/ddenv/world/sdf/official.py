@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ddenv.world.access import is_directives
 from ddenv.world.model import World
 from ddenv.world.sdf.context import sdf_root, version
 from ddenv.world.sdf.xml import Element, number_or_nan, place
@@ -20,6 +21,8 @@ RESERVED_IN = frozenset(["world", "model", "link", "joint", "frame", "collision"
 
 def refused(world: World) -> list[tuple[str, str]]:
     """What the official checker would refuse in the file of `world`: the reason, and file, line and XPath; in the file's order."""
+    if is_directives(world.path):
+        return []
     root = sdf_root(world.text, world.path)
     return [(why, place(at)) for why, at in _inside(root, version(root) >= (1, 8))]
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.world.access import read_bytes
+from ddenv.world.access import is_directives, read_bytes
 from ddenv.world.files.resources import Resources, on_disk
 from ddenv.world.model import Model, World
 from ddenv.world.pose import vector
@@ -20,9 +20,9 @@ from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.standin import AUTO
-from ddenv.world.sdf.urdf import ROOT, to_sdf, without_mass
-from ddenv.world.sdf.xml import complain, name_of, numbers, parse
+from ddenv.world.sdf.urdf import root_of, without_mass
+from ddenv.world.sdf.welds import parse_directives
+from ddenv.world.sdf.xml import complain, name_of, numbers
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # Elements that add or join models in a way that is not supported, with the error message.
@@ -45,7 +45,7 @@ def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
     """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources or disk_of(path, reading, None), reading)
     try:
-        return _world(text, path, context)
+        return parse_directives(text, path, context) if is_directives(path) else _world(text, path, context)
     except UserError:
         # The error may only be a consequence of a missing file, such as a pose relative to a model in it.
         context.complain_of_missing()
@@ -62,17 +62,13 @@ def read_model(path: Path, reading: Reading = PLAIN, announce: Callable[[str], N
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
     """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources or disk_of(path, reading, None), reading)
-    urdf = parse(text, path) if f"<{ROOT}".encode() in text else None
-    if urdf is not None and urdf.tag != ROOT:
-        urdf = None
-    root = sdf_root(text, path) if urdf is None else to_sdf(urdf, context)
-    scope = Scope(root, (path,), context)
+    scope = Scope(root_of(text, path, context), (path,), context)
     if len(scope.parts) != 1:
         raise UserError(f"{path}: expected one <model> inside <sdf>, found {len(scope.parts)}")
     try:
         model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
         context.complain_of_missing()
-        return model if urdf is None else without_mass(model, urdf)
+        return without_mass(model, scope.parts[0].element)
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
@@ -101,10 +97,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     models = _models(scope, read_state(world, context), context)
     context.complain_of_missing()
     context.model = ""
-    # An unused stand-in is probably a typing error; `auto` asks for nothing as long as nothing is missing.
-    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in != AUTO}
-    for uri in sorted(asked - context.used):
-        context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")
+    context.note_unused(root)
     anchors = scope.references()
     gravity = next(
         (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None

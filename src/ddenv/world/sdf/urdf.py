@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from ddenv.schemas import nearest
 from ddenv.world.model import Model
-from ddenv.world.sdf.context import VERSIONS, Context
-from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
+from ddenv.world.sdf.context import VERSIONS, Context, sdf_root
+from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse, text_of
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
 LIMITED = ("revolute", "prismatic")
@@ -49,8 +50,22 @@ def to_sdf(robot: Element, context: Context) -> Element:
     return element("sdf", robot, "", model, version=VERSIONS[-1])
 
 
-def without_mass(model: Model, robot: Element) -> Model:
-    """`model` with the links that have no mass in `robot` as mere frames, since the SDF reader gives every link a mass."""
+def root_of(text: bytes, path: Path, context: Context) -> Element:
+    """The `<sdf>` of an SDF or URDF file. Raises UserError."""
+    robot = parse(text, path) if f"<{ROOT}".encode() in text else None
+    return sdf_root(text, path) if robot is None or robot.tag != ROOT else to_sdf(robot, context)
+
+
+def is_urdf(element: Element) -> bool:
+    """Whether a `<model>` was made of a URDF robot."""
+    return element.parent is not None and element.parent.tag == ROOT
+
+
+def without_mass(model: Model, element: Element) -> Model:
+    """`model` with the links that have no mass in its URDF robot as mere frames, since the SDF reader gives every link a mass."""
+    robot = element.parent
+    if robot is None or robot.tag != ROOT:
+        return model
     names = {name_of(link) for link in robot.findall("link") if not has_mass(link)}
     links = (replace(link, inertia=None) if link.name in names else link for link in model.links)
     return replace(model, links=tuple(links))
