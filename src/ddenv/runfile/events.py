@@ -581,7 +581,7 @@ class NumberAsked:
 
 @dataclass(frozen=True, slots=True)
 class MarginsStarted(Event):
-    """It is sought how far each of the `numbers` may change in an environment, where f shows at `rate`, with at most `budget` runs.
+    """A search for how far each of the `numbers` may change in an environment where f shows at `rate`, with at most `budget` runs.
 
     Each verdict on a value is wrong with a probability of at most `error`. `certified`: fresh runs have shown the rate. `status`
     and `before` are how the reduction stood, and why.

@@ -77,7 +77,7 @@ class ExportScreen(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         names = suggested(self._file, self._world)
-        with Framed("Export", "↑ ↓ rows   space ticks   tab to its name   enter writes   escape closes", id="export"):
+        with Framed("Export", "↑ ↓ rows   space ticks   tab its name   enter writes   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)

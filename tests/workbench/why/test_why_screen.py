@@ -252,4 +252,4 @@ async def test_where_no_margins_are_known_the_command_is_named(run):
     async with Attached(run) as session:
         await opened(session)
         await session.press("m")
-        assert f"ddenv margins {run.path.stem} finds that" in picture_of(session)
+        assert f"ddenv margins {run.path.stem} finds how far" in picture_of(session)

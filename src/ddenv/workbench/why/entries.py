@@ -57,17 +57,20 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
     found = reasons(file, state) if current(state) is not None else ()
     listed = found[:LISTED]
-    letters = _letters(state, listed)
+    letters, listed = _lettered(state, listed)
     snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed), letters)
     models = tuple(_of_model(state, letter, each, snapshot) for letter, each in zip(letters, listed, strict=True))
     return (*models, *_nearest(file, state)), len(found) - len(listed)
 
 
-def _letters(state: RunState, listed: Sequence[Reason]) -> tuple[int, ...]:
-    """The numbers of the letters that the models have on the map of the run, if each is a part of its last round."""
+def _lettered(state: RunState, listed: Sequence[Reason]) -> tuple[tuple[int, ...], tuple[Reason, ...]]:
+    """The models in the order of their letters: those of the map of the run, if each is a part of its last round."""
     of_run = {} if state.round is None else state.round.split.letter_of
     letters = tuple(of_run.get(each.without, -1) for each in listed)
-    return letters if len({*letters, -1}) > len(letters) else tuple(range(len(letters)))
+    if len({*letters, -1}) <= len(letters):
+        return tuple(range(len(listed))), tuple(listed)
+    order = sorted(range(len(listed)), key=letters.__getitem__)
+    return tuple(letters[place] for place in order), tuple(listed[place] for place in order)
 
 
 def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:

@@ -31,9 +31,11 @@ class MarginsDialog(Reading):
                 (name, bar(one.margin, WIDTH)),
                 ("", f"now {now}; f until {until}; then {goal}; {runs} runs"),
             ]
-        groups = [
-            ("How far each number may change before f goes", lines or [("", f"ddenv margins {plain(run)} finds that")])
-        ]
+        groups = [("How far each number may change before f goes", lines)]
+        if not lines:
+            groups = [
+                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number may change")])
+            ]
         if known is not None and found:
             groups += [
                 ("What this says", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
