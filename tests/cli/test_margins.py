@@ -143,7 +143,8 @@ def test_a_real_search_that_is_killed_and_interrupted_comes_to_its_end(tmp_path)
     margins = [*DDENV, "margins", run, "--number", f"{left[0]}.y", "--budget", "40", "--jobs", "2"]
     program = subprocess.Popen(margins, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert program.stdout is not None
-    next(line for line in program.stdout if "runs; " in line)
+    # A value is decided.
+    next(line for line in program.stdout if f"{left[0]}.y = " in line)
     program.send_signal(signal.SIGINT)
     program.communicate(timeout=PATIENCE)
     with RunFile(run) as file:
