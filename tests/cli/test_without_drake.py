@@ -7,6 +7,7 @@ import pytest
 from ddenv.learn.shelf import LESSONS
 from tests.command import ddenv
 from tests.conftest import DATA
+from tests.tiers import slow
 
 COMMANDS = {
     "run": ["run", DATA / "wall.yaml"],
@@ -28,15 +29,16 @@ def without(home, modules, words):
     return ddenv(*words, cwd=home, env=os.environ | {"PYTHONPATH": path, "DDENV_HOME": str(home)})
 
 
-@pytest.mark.parametrize(("words", "said"), LOOKS.values(), ids=LOOKS)
-def test_what_only_looks_needs_none_of_them(home, words, said):
+@pytest.mark.parametrize("name", slow(pytest.mark.programs, LOOKS, but=["show"]))
+def test_what_only_looks_needs_none_of_them(home, name):
+    words, said = LOOKS[name]
     done = without(home, ("pydrake", "fcntl", "termios", "sklearn"), words)
     assert done.returncode == 0 and said in done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
-def test_what_needs_drake_says_so(home, words):
-    done = without(home, ("pydrake",), words)
+@pytest.mark.parametrize("name", slow(pytest.mark.programs, COMMANDS, but=["run"]))
+def test_what_needs_drake_says_so(home, name):
+    done = without(home, ("pydrake",), COMMANDS[name])
     assert done.returncode == 2
     last = done.stderr.strip().splitlines()[-1]
     assert "Drake, which is not installed here: pip install drake" in last

@@ -174,6 +174,7 @@ def competing(rate: float, salt: int):
     return oracle
 
 
+@pytest.mark.rates
 def test_where_failures_compete_the_rate_of_the_luckiest_is_not_too_high(tmp_path):
     oracles = [competing(0.45, salt) for salt in range(100)]
     found = [last_baseline(tmp_path, oracle, 1, 10_000, 10) for oracle in oracles]

@@ -77,6 +77,7 @@ def test_nothing_is_replaced_and_nothing_is_written_where_a_certificate_lacks(ru
     assert not (tmp_path / name).exists()
 
 
+@pytest.mark.programs
 def test_without_this_ddenv_nothing_is_said_of_the_failure(run, tmp_path):
     write_bundle(run, tmp_path / "handed")
     (tmp_path / "ddenv").mkdir()

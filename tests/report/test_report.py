@@ -131,6 +131,7 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
     assert "ddenv run crates.yaml --pair model2model/failure-proximal --iterations 3" in text
 
 
+@pytest.mark.programs
 def test_the_nearest_world_that_passes_has_its_map_and_two_runs_side_by_side(run, tmp_path):
     fake_moments.isolated(run)
     assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in page(run, tmp_path).text

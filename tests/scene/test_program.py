@@ -242,6 +242,7 @@ def test_ends_with_its_parent(writer):
             os.kill(int(parent.stdout.split()[0]), signal.SIGKILL)
 
 
+@pytest.mark.programs
 def test_a_scene_that_is_started_again_has_its_address_and_proves_it(writer, start_scene):
     first = start_scene(writer.path)
     url = url_of(first)

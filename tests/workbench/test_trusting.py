@@ -30,6 +30,7 @@ def question(app) -> str:
     return str(app.screen.query_one(Static).render())
 
 
+@pytest.mark.screens
 async def test_a_run_like_one_that_was_sent_asks_before_it_starts(brings, runs, started):
     create_run(load_scenario(brings), runs / "crates-1.ddenv")
     async with Opened(screen=lambda: SetupScreen(like=runs / "crates-1.ddenv")) as session:

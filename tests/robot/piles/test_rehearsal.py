@@ -11,6 +11,7 @@ from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire, Script
 from ddenv.robot.simulation.template import Template
 from tests.robot.conftest import bits, cube, run
 from tests.robot.piles.test_sleep import SECTIONS
+from tests.tiers import slow
 
 ROWS = 10
 
@@ -43,7 +44,7 @@ def test_the_scripts_that_were_used_last_are_held_in_a_bounded_memory(world_of, 
         assert not any(repertoire.find(names, everything) for names in [*map(tuple, "abcd"), heap])
 
 
-@pytest.mark.parametrize("memory", [0.0, 3e5])
+@pytest.mark.parametrize("memory", slow(pytest.mark.examples, [0.0, 3e5], but=[3e5]))
 def test_a_small_memory_changes_no_bit(world_of, add, husky, scenario_of, monkeypatch, memory):
     world = add(
         world_of(), cube("a", 1.2, 0.0, 0.15), cube("b", 1, 3, 0.5), cube("c", 1.1, 3.1, 0.9), cube("d", 5, -9, 0.3)

@@ -30,7 +30,7 @@ def moments(run):
             yield moment, explain(snapshots.of(moment, what_happened(moment)))
 
 
-QUICK = [run for run in RUNS if run.stem in ("delivery", "quay-kept", "ditch-sliced")]
+QUICK = [run for run in RUNS if run.stem in ("delivery", "ditch-sliced")]
 # What is said of a test in any phase: its sign and words by outcome.
 SIGNS = {"similar": "●", "other": "◇", "pass": "○"}
 

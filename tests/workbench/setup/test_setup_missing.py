@@ -98,6 +98,7 @@ async def test_missing_files_are_rows_with_a_guess_that_is_on_the_map(depot, sta
         assert world.model("one").collisions == ()
 
 
+@pytest.mark.screens
 async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_path):
     async with Opened() as session:
         await session.open(depot)
