@@ -86,6 +86,7 @@ def test_the_scene_is_drawn_or_says_what_is_damaged(hostile, batch):
                     assert json.dumps(player.play(test), allow_nan=False) and player.drawings("way", test)
 
 
+@pytest.mark.fuzz
 @pytest.mark.parametrize("batch", BATCHES)
 async def test_the_workbench_stands(hostile, batch):
     size = (120, 36) if batch % 2 else (80, 24)

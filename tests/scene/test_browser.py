@@ -160,7 +160,6 @@ def place_of(path: str) -> str:
 
 
 @pytest.mark.browser
-@pytest.mark.witness
 async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced, start_scene):
     url = start_scene(reduced.path).stdout.readline().strip()
     with chromium((900, 600)) as port:

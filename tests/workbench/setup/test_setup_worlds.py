@@ -16,6 +16,7 @@ from ddenv.workbench.setup.preview import PLACES, places_of, remember_places
 from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
+@pytest.mark.screens
 async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
     (scenarios / "notes.txt").write_text("x")
     async with Opened() as session:
