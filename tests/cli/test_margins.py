@@ -22,7 +22,10 @@ FRICTION = (
     "crate_00.friction (0.1): f down to 0 (5 of 5 runs), which is as far as was tried; f up to 0.2 (5 of 5 runs), the robot "
     "reaches its goal from 0.4 (7 of 7 runs)"
 )
-FIX = "The nearest fix: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot reaches its goal in 20 of 20 fresh runs"
+FIX = (
+    "The nearest fix found: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot reaches its goal in 20 of 20 "
+    "fresh runs"
+)
 
 
 @pytest.fixture

@@ -82,7 +82,9 @@ def test_a_run_without_trajectories_says_so(run):
     database.close()
     one = played(run.file, at_end(run), 38)
     assert one.length == 0.0
-    assert one.lacks == ("The run file has no path of the robot in test 38, as bundles have none: nothing moves here.",)
+    assert one.lacks == (
+        "The run file has no path of the robot in test 38 (bundles leave paths out): nothing moves here.",
+    )
 
 
 def test_of_another_simulator_only_the_robot_moves_and_it_says_so(tmp_path):

@@ -18,6 +18,7 @@ from ddenv.cli.terminal import announce, announced, say_written, terminal_column
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
 from ddenv.text import count, first_of, padded, printable, shortened, width
+from ddenv.world.access import is_directives
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, Note, World
@@ -153,8 +154,6 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     below = ["", "notes", *notes] if notes else []
     wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
     gravity = " ".join(f"{part:g}" for part in world.gravity)
-    from ddenv.world.access import is_directives
-
     what = world.version if is_directives(world.path) else f"SDF {world.version}"
     title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
     return [*wrapped(title, columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
@@ -330,8 +329,6 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     from ddenv.robot import check_drake
 
     world, read_as = _read(file, reading)
-    from ddenv.world.access import is_directives
-
     if is_directives(world.path):
         raise UserError(f"{world.path}: only SDF worlds can be written settled; 'ddenv world convert' makes one")
     check_drake()

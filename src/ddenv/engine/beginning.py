@@ -96,7 +96,7 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
     Raises UserError if stacks are to be kept and it cannot be known.
     """
     moves = any(model.links and not model.static for model in world.models)
-    # A simulator in Python says itself what took part, with what rests on what.
+    # A simulator in Python names the models that affected a run, and those that they rest on.
     in_python = scenario.oracle is not None and scenario.oracle.use is not None
     if (
         (not moves or (in_python and not scenario.reduction.keep_supports))

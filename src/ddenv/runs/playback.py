@@ -78,7 +78,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
             moving[name] = table
     if not rows:
         lacks.append(
-            f"The run file has no path of the robot in test {number}, as bundles have none: nothing moves here."
+            f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
     return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
 

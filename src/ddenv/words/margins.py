@@ -110,7 +110,7 @@ def nearest_fix(margins: Margins) -> str:
     now = next(each.asked.now for each in margins.numbers if each.asked.name == one.name)
     low, high = anytime_interval(one.reached, one.runs)
     change = f"{one.name} from {now:.4g} to {one.value:.4g}, {100.0 * one.share:.2g} % of its scale"
-    only, first = ("", "The nearest fix") if one.confirmed else (" only", "No fix is certified")
+    only, first = ("", "The nearest fix found") if one.confirmed else (" only", "No fix is certified")
     fresh = f"in {one.reached} of {count(one.runs, 'fresh run')} ({percent(low)} to {percent(high)})"
     return f"{first}: {change}; the robot reaches its goal{only} {fresh}."
 
@@ -119,7 +119,7 @@ def sureness(margins: Margins) -> str:
     """What the table's claims are worth."""
     less = "" if margins.certified else " No certificate has shown yet how often f shows in what is left."
     return (
-        "Claims are about the values that were tried, not those between; the chance that any of one call is wrong is at most "
+        "Claims are about the values that were tried, not those between; the chance that any claim of a call is wrong is at most "
         f"{percent(ERROR)}.{less}"
     )
 

@@ -55,7 +55,7 @@ class Ended:
     """How a test ended: whether the robot `reached` its goal before its time was up.
 
     `poses` are the rows, unless they were yielded. `took_part` names the models that can have changed a bit of the test, including
-    what these rest on; None if that is not known. With it, what took no part is removed without a test, and the same seed must
+    those that these rest on; None if that is not known. With it, all other models are removed untested, and the same seed must
     give the same bits.
     """
 
