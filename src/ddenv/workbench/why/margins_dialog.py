@@ -29,7 +29,7 @@ class MarginsDialog(Reading):
             name, now, until, goal, runs = map(plain, one.cells)
             lines += [
                 (name, bar(one.margin, WIDTH)),
-                ("", f"now {now}; f until {until}; then {goal}; {runs} runs"),
+                ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
             ]
         groups = [("How far each number may change before f goes", lines)]
         if not lines:
