@@ -14,15 +14,15 @@ from ddenv.errors import UserError
 from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.help.shortcuts import Help
 from ddenv.workbench.history import Compare, History
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
-from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
+from ddenv.workbench.run.choose import ChooseModels, Layers
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, ssh_line
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.setup.fields import SchemaSelect
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.widgets.lines import Lines
@@ -161,8 +161,8 @@ async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(
 
 
 def test_every_binding_has_an_id_and_a_tooltip():
-    owners = (RunScreen, WorldMap, Workbench, Quit, SceneDialog, Method, SetupScreen, SchemaSelect, History)
-    owners += (Compare, Question, ChooseModels, Change, Layers, Copy)
+    owners = (RunScreen, WorldMap, Workbench, Quit, SceneDialog, Method, SetupScreen, History)
+    owners += (Compare, Question, ChooseModels, Change, Layers, Pick)
     bindings = [binding for owner in owners for binding in owner.BINDINGS]
     assert all(binding.id and binding.tooltip for binding in bindings)
     assert len({binding.id for binding in bindings}) == len(bindings)

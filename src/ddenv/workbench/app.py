@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -16,16 +16,18 @@ from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
 from textual.geometry import Size
-from textual.notifications import SeverityLevel
-from textual.screen import ModalScreen, Screen
+from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
-from ddenv.workbench.help.bindings import keys
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
+
+if TYPE_CHECKING:
+    from ddenv.workbench.map.world_map import WorldMap
 
 BELL = "\x07"
 # New objects until garbage is collected, then how often until older ones are looked through, too.
@@ -125,7 +127,6 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
-        self._held: tuple[str, dict[str, Any]] | None = None
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
@@ -163,7 +164,6 @@ class Workbench(App[int]):
         return own or any(each.action != TABS[key] for each in bound)
 
     def on_mount(self) -> None:
-        self.screen_change_signal.subscribe(self, lambda _: self._say_held())
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
         self.app_resume_signal.subscribe(self, lambda _: self._redraw())
         self._write("\x1b[22;2t")
@@ -181,33 +181,10 @@ class Workbench(App[int]):
         if not self.is_headless:
             self.call_after_refresh(_collect_from_now)
 
-    # Notices: at most one is shown. It would hide the words and the buttons of a dialog, so it waits until that is closed.
-
-    def notify(
-        self,
-        message: str,
-        *,
-        title: str = "",
-        severity: SeverityLevel = "information",
-        timeout: float | None = None,
-        markup: bool = True,
-    ) -> None:
-        """As every app, but while a dialog is open a notice waits; its time begins when it is shown."""
-        options: dict[str, Any] = {"title": title, "severity": severity, "timeout": timeout, "markup": markup}
-        if self._asks:
-            self._held = message, options
-        else:
-            self.clear_notifications()
-            super().notify(message, **options)
-
-    @property
-    def _asks(self) -> bool:
-        return any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:])
-
-    def _say_held(self) -> None:
-        if self._held is not None and not self._asks:
-            (message, options), self._held = self._held, None
-            super().notify(message, **options)
+    def notify(self, message: str, **options: Any) -> None:
+        """As every app, but at most one notice is shown."""
+        self.clear_notifications()
+        super().notify(message, **options)
 
     def action_help_quit(self) -> None:
         """What ctrl+c says: in a terminal it should end nothing by mistake."""
@@ -263,12 +240,30 @@ class Workbench(App[int]):
 
         self.push_screen(Help(groups(self.screen)))
 
+    # What all maps of the screen do together.
+
     def action_names(self) -> None:
-        """Shows or hides the names on all maps of the screen."""
+        for world in self._maps:
+            world.toggle_layer("names")
+
+    def action_zoom(self, factor: float) -> None:
+        for world in self._maps:
+            world.zoom(factor)
+
+    def action_fit(self) -> None:
+        for world in self._maps:
+            world.fit()
+
+    @property
+    def _maps(self) -> Iterable[WorldMap]:
         from ddenv.workbench.map.world_map import WorldMap
 
-        for world in self.screen.query(WorldMap):
-            world.toggle_layer("names")
+        return self.screen.query(WorldMap)
+
+    def action_signs(self) -> None:
+        from ddenv.workbench.help.signs import SignsDialog
+
+        self.push_screen(SignsDialog())
 
     def action_runs(self) -> None:
         """The list of all runs, above the screen that asks for it."""

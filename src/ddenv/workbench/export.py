@@ -18,9 +18,9 @@ from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
 from ddenv.text import count, first_of, plain, shortened
-from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 

@@ -22,14 +22,14 @@ from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen
 from ddenv.words.decisions import CAME_BY
 from ddenv.words.slices import slice_in_short
-from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_lines
 from ddenv.workbench.widgets.lines import Lines
-from ddenv.workbench.widgets.question import Question
+from ddenv.workbench.widgets.question import ask
 
 # Time between two looks at the run, s.
 PERIOD = 0.5
@@ -171,12 +171,7 @@ class History(Screen[int | None]):
         if why := refusal(command, now):
             self._refuse(why)
             return
-
-        def answered(yes: bool | None) -> None:
-            if yes:
-                self.dismiss(node.number)
-
-        self.app.push_screen(Question(question(command, now.state)), answered)
+        ask(self.app, question(command, now.state), lambda: self.dismiss(node.number))
 
     def action_mark(self) -> None:
         node = self.under_cursor

@@ -25,6 +25,7 @@ def signs() -> dict[str, Signs]:
             ("▾", "touches a model"),
             OF_WAYS[-1],
         ),
+        "On the chart": (("╌", "so many models seem to be needed at least"), ("▲", "you decided something")),
         "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
         "Verdicts of a certificate": _joined(CLAIM),

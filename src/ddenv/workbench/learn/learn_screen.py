@@ -15,10 +15,10 @@ from ddenv.learn.race import Turn
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Round
-from ddenv.workbench.help.bindings import ids
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.bindings import ids
 
 SMALLEST = (64, 20)
 # With so many models at most, maps have their names from the start.

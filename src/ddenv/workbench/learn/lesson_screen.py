@@ -24,7 +24,6 @@ from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
 from ddenv.text import plain
 from ddenv.words.news import what_happened
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
@@ -36,6 +35,7 @@ from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.snapshot import Moments
+from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.shared.observed import Observed
 
 
@@ -223,13 +223,10 @@ class LessonScreen(LearnScreen[bool]):
             self.dismiss(True)
         elif self.course.go_on():
             self._moved()
-        elif self.course.is_open:
-            # Without a cursor the frame says how to answer.
-            if (place := self.query_one(LessonPane).cursor) is not None:
-                self.action_answer(place)
         elif self._opened is None:
             self.action_move("moment", 1)
-        else:
+        elif not self.course.is_open:
+            # Of an open question the frame says how to answer.
             self.say("this is the end of the lesson: escape leaves it, backspace goes back")
 
     def action_back(self) -> None:

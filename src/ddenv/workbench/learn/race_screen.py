@@ -16,10 +16,10 @@ from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import count, plain, shortened, truncated
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.snapshot import Moments
+from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.shared.observed import Observed
 
 IN, OUT, GONE = "■", "□", "·"

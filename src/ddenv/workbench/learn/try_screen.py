@@ -17,10 +17,10 @@ from ddenv.learn.race import BOUND, Line, Play, comparison, in_one_sentence
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import count, plain, shortened, truncated
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.bindings import HELP, keys
 
 LONGEST_NAME = 16
 SAID = {

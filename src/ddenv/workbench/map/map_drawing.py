@@ -21,7 +21,7 @@ from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.text import plain, shortened
-from ddenv.workbench.map.map_colors import REMOVED, Palette
+from ddenv.workbench.map.map_colors import DULL, FAINT, ORIGINAL, PATH, REMOVED, Palette
 from ddenv.workbench.map.map_words import PARTING
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts, kept, looks
 from ddenv.workbench.map.place import MovedPrints, Point, Shown
@@ -131,9 +131,9 @@ class MapDrawing:
     def _driving(self, shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
         """The running tests, with the paths behind their robots; those of the candidate in focus stand out."""
         live, ids = shown.snapshot.live, _in_focus(shown.snapshot)
-        colors = {one.test: palette.live if one.test in ids or not ids else palette.dull for one in live}
+        colors = {one.test: palette.live if one.test in ids or not ids else palette.shade(DULL) for one in live}
         trails = self._trails if "path" in shown.layers else {}
-        paths = [(np.array(trail), colors.get(test, palette.dull), 0) for test, trail in trails.items()]
+        paths = [(np.array(trail), colors.get(test, palette.shade(DULL)), 0) for test, trail in trails.items()]
         return paths, [((one.pose[0], one.pose[1], heading(one.pose[3:])), colors[one.test], ARROWS) for one in live]
 
     def _with_live(self, shown: Shown) -> Shown:
@@ -162,7 +162,7 @@ def _foremost(snapshot: Snapshot) -> Live | None:
 
 def _riders(shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
     """The robots on one or two ways with their paths; the second one, a hollow arrow, is below the first one."""
-    looks_of = ((palette.live, 0, ARROWS), (palette.dull, DASH, HOLLOW))
+    looks_of = ((palette.live, 0, ARROWS), (palette.shade(DULL), DASH, HOLLOW))
     both = list(zip(shown.ways, looks_of, strict=False))[::-1]
     paths = [(way.points[: way.gone], color, dash) for way, (color, dash, _) in both]
     return paths, [(way.robot, color, signs) for way, (color, _, signs) in both if way.robot is not None]
@@ -178,7 +178,7 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     fill(canvas, grid, how)
     dotted, written = (np.zeros(canvas.chars.shape, dtype=bool) for _ in range(2))
     if "removed" in shown.layers:
-        dotted = ghosts(canvas, gone, grid, how, palette.faint)
+        dotted = ghosts(canvas, gone, grid, how, palette.shade(FAINT))
     for points, color, dash in _lines(shown, palette):
         canvas.dots(braille(points, view, dash), color)
     marks = {
@@ -227,11 +227,11 @@ def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
     """The paths below the letters; the first one covers the second one."""
     layers, snapshot = shown.layers, shown.snapshot
     if shown.ways:
-        both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
+        both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
         return [(way.points, color, dash) for way, color, dash in both][::-1]
-    lines = [(_path(snapshot.evidence), palette.path, 0)] if "path" in layers else []
+    lines = [(_path(snapshot.evidence), palette.shade(PATH), 0)] if "path" in layers else []
     if "original" in layers and not shown.same_paths:
-        lines.insert(0, (_path(snapshot.original), palette.original, DASH))
+        lines.insert(0, (_path(snapshot.original), palette.shade(ORIGINAL), DASH))
     return lines
 
 

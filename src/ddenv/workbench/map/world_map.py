@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, ClassVar
 from rich.segment import Segment
 from rich.text import Text
 from textual import events
-from textual.binding import Binding
 from textual.geometry import Region
 from textual.message import Message
 from textual.reactive import var
@@ -24,6 +23,7 @@ from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_words import describe, legend
 from ddenv.workbench.map.place import Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
+from ddenv.workbench.shared.bindings import keys
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
@@ -44,21 +44,20 @@ class WorldMap(Widget, can_focus=True):
     # Whether enter and clicks choose places.
     picking = var(False)
     HELP = "click: select or unselect a model   wheel: zoom   drag: move the map"
-    BINDINGS: ClassVar = [
-        Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
-        Binding("right", "move(1, 0)", "move", show=False, id="map.right", tooltip="crosshair to the right"),
-        Binding("up", "move(0, 1)", "move", show=False, id="map.up", tooltip="crosshair up"),
-        Binding("down", "move(0, -1)", "move", show=False, id="map.down", tooltip="crosshair down"),
-        Binding("shift+left", "pan(-1, 0)", "pan", show=False, id="map.pan_left", tooltip="move the map to the left"),
-        Binding("shift+right", "pan(1, 0)", "pan", show=False, id="map.pan_right", tooltip="move the map to the right"),
-        Binding("shift+up", "pan(0, 1)", "pan", show=False, id="map.pan_up", tooltip="move the map up"),
-        Binding("shift+down", "pan(0, -1)", "pan", show=False, id="map.pan_down", tooltip="move the map down"),
-        Binding("enter", "pick", "select", id="map.pick", tooltip="select or unselect the model under the crosshair"),
-        Binding("left_square_bracket", "neighbour(-1)", show=False, id="map.previous", tooltip="to the previous model"),
-        Binding(
-            "right_square_bracket", "neighbour(1)", "next model", show=False, id="map.next", tooltip="to the next model"
-        ),
-    ]
+    BINDINGS: ClassVar = keys(
+        "map",
+        ("left", "left", "move(-1, 0)", "", "crosshair to the left"),
+        ("right", "right", "move(1, 0)", "", "crosshair to the right"),
+        ("up", "up", "move(0, 1)", "", "crosshair up"),
+        ("down", "down", "move(0, -1)", "", "crosshair down"),
+        ("pan_left", "shift+left", "pan(-1, 0)", "", "move the map to the left"),
+        ("pan_right", "shift+right", "pan(1, 0)", "", "move the map to the right"),
+        ("pan_up", "shift+up", "pan(0, 1)", "", "move the map up"),
+        ("pan_down", "shift+down", "pan(0, -1)", "", "move the map down"),
+        ("pick", "enter", "pick", "select", "select or unselect the model under the crosshair"),
+        ("previous", "[", "neighbour(-1)", "", "to the previous model"),
+        ("next", "]", "neighbour(1)", "next model", "to the next model"),
+    )
 
     @dataclass
     class Pointed(Message):

@@ -12,28 +12,27 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
-from textual.screen import ModalScreen, Screen
-from textual.widgets import OptionList, Static
-from textual.widgets.option_list import Option
+from textual.screen import Screen
+from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
-from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.state import Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import purpose
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
 from ddenv.text import count, padded, plain, shortened
 from ddenv.words.signs import outcome
-from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.signs import SignsDialog
+from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.map.place import MovedPrints, Place, Point, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
+from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.world.pose import pose_at
 
 # Simulated seconds in a second.
@@ -123,10 +122,8 @@ class Playback(Screen[None]):
         ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
         ("before", "up", "test(-1)", "test before", "the finished test before this one"),
         ("next", "down", "test(1)", "next test", "the next finished test"),
-        ("closer", "plus,equals_sign", "zoom(1.25)", "closer", "map: closer", "+"),
-        ("farther", "minus", "zoom(0.8)", "farther", "map: farther away", "-"),
-        ("fit", "0", "fit", "fit", "map: show all that matters"),
-        ("signs", "k", "signs", "signs", "what the signs and letters on the map mean"),
+        *MAP_KEYS,
+        ("signs", "k", "app.signs", "signs", "what the signs and letters on the map mean"),
         HELP,
         ("close", "escape,q", "dismiss", "close", "back to where it was opened", "esc"),
     )
@@ -296,13 +293,20 @@ class Playback(Screen[None]):
             self._refuse("this is one test; o plays another one over it")
 
     def action_beside(self) -> None:
-        first = self._tests[0].test
+        first, state = self._tests[0].test, self._position.end
+        tests = others(state.tests, first)
 
-        def chosen(number: int | None) -> None:
-            if number is not None:
-                self._change([first.id, number] if number else [first.id])
+        def line(test: Test) -> Text:
+            same = "= " if test.seed == first.seed else ""
+            return _line(str(test.id), purpose(state, test), f"{same}{test.seed}", outcome(test))
 
-        self.app.push_screen(Beside(self._position.end, first), chosen)
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._change([first.id, tests[row - 1].id] if row else [first.id])
+
+        lines = [Text(f"test {first.id} alone"), *map(line, tests)]
+        head, at = _line("test", "of", "seed", "end"), min(1, len(tests))
+        self.app.push_screen(Pick(f"Play beside test {first.id}", "plays both", lines, head=head, at=at), chosen)
 
     def action_swap(self) -> None:
         if len(self._tests) == 2:
@@ -319,48 +323,8 @@ class Playback(Screen[None]):
         else:
             self._refuse("there is no finished test after this one" if by > 0 else "there is no test before this one")
 
-    def action_zoom(self, factor: float) -> None:
-        self.map.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.map.fit()
-
-    def action_signs(self) -> None:
-        self.app.push_screen(SignsDialog())
-
     def _refuse(self, why: str) -> None:
         self.notify(plain(why), severity="warning", timeout=4, markup=False)
-
-
-class Beside(ModalScreen[int | None]):
-    """Returns the number of the test to play beside `test`; 0 for none, or None if nothing is to change."""
-
-    CSS_PATH = "playback.tcss"
-    BINDINGS: ClassVar = keys("beside", ("close", "escape,o,q", "dismiss", "close", "back to the playback"))
-
-    def __init__(self, state: RunState, test: Test) -> None:
-        super().__init__()
-        self._state, self._test = state, test
-        self._tests = others(state.tests, test)
-
-    def compose(self) -> ComposeResult:
-        with Framed(f"Play beside test {self._test.id}", "enter plays both   escape closes"):
-            yield Static(_line("test", "of", "seed", "end"), id="head", markup=False)
-            alone = Option(Text(f"test {self._test.id} alone"))
-            options = (Option(self._words(test)) for test in self._tests)
-            yield OptionList(alone, *options, id="beside", compact=True, markup=False)
-
-    def on_mount(self) -> None:
-        options = self.query_one(OptionList)
-        options.focus()
-        options.highlighted = min(1, len(self._tests))
-
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        self.dismiss(self._tests[event.option_index - 1].id if event.option_index else 0)
-
-    def _words(self, test: Test) -> Text:
-        same = "= " if test.seed == self._test.seed else ""
-        return _line(str(test.id), purpose(self._state, test), f"{same}{test.seed}", outcome(test))
 
 
 def others(tests: Sequence[Test], one: Test) -> list[Test]:

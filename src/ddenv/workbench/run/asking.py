@@ -137,9 +137,9 @@ class Asking:
         elif sure or not (asked := question(command, now.state)):
             self.send(command)
         else:
-            from ddenv.workbench.widgets.question import Question
+            from ddenv.workbench.widgets.question import ask
 
-            self._screen.app.push_screen(Question(asked), lambda yes: self.send(command) if yes else None)
+            ask(self._screen.app, asked, lambda: self.send(command))
 
     def _decide_first(self, command: Command, dropped: str) -> None:
         """Asks what becomes of the reduction that waits, before the new search that `command` begins."""

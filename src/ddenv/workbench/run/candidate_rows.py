@@ -28,23 +28,6 @@ IN_SHORT = "in short"
 
 Item = Trial | Candidate | Test | FreshRuns
 Words = Mapping[str, str]
-# What the columns mean, for tooltips.
-MEANINGS = {
-    "#": "the order in which the candidates are tested",
-    "candidate": "a part of the environment, or the environment without a part; a try is your own selection",
-    "models": "how many models it has",
-    "distance": "what the prioritization ranked it by",
-    "tests": "how many of the possible tests were made",
-    "evidence": "how its tests ended; k explains the signs",
-    "to f": "how near to the end of f the nearest of its tests came",
-    "real": "how long its tests took by the clock, or how far the running one is",
-    "verdict": "what its tests add up to; k explains the signs",
-    "environment": "what was run with fresh seeds: what is left, that without one model, or the whole world",
-    "runs": "the runs that did not break",
-    "ended": "how the runs ended; k explains the signs",
-    "f": "the share of the runs that showed f",
-    "shown": "what the runs have shown so far: at least so much of the rate is kept, or without the model f is at most so frequent",
-}
 # Columns that only candidates fill.
 OF_CANDIDATES = ("distance", "evidence")
 # Maximum width of a model's name, in cells.

@@ -9,7 +9,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
@@ -22,7 +21,8 @@ from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.state import RunState
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.widgets.question import Question
+from ddenv.workbench.shared.bindings import keys
+from ddenv.workbench.widgets.question import ask
 
 # Time between two looks at the run, s.
 PERIOD = 0.5
@@ -37,15 +37,8 @@ class FailuresMet(ModalScreen[int | None]):
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
-        Binding(
-            "enter",
-            "go",
-            "reduce it",
-            id="failures.go",
-            tooltip="reduce this failure in a branch, from the smallest environment that showed it",
-            priority=True,
-        ),
-        Binding("escape,f,q", "dismiss", "close", id="failures.close", tooltip="back to the run"),
+        *keys("failures", ("go", "enter", "go", "reduce it", "reduce this failure in a branch"), priority=True),
+        *keys("failures", ("close", "escape,f,q", "dismiss", "close", "back to the run")),
     ]
 
     def __init__(self, look: Callable[[], Situation]) -> None:
@@ -109,12 +102,7 @@ class FailuresMet(ModalScreen[int | None]):
         if why := refusal(command, now):
             self.query_one("#failure", Static).update(Text(f"✗ {plain(why)}", "bold"))
             return
-
-        def answered(yes: bool | None) -> None:
-            if yes:
-                self.dismiss(one.smallest)
-
-        self.app.push_screen(Question(question(command, now.state)), answered)
+        ask(self.app, question(command, now.state), lambda: self.dismiss(one.smallest))
 
 
 def _line(failure: str, tests: str, smallest: str) -> Text:

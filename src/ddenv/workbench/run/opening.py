@@ -16,12 +16,12 @@ from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name
-from ddenv.workbench.help.signs import SignsDialog
+from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
-from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
-from ddenv.workbench.run.dialogs import Method, Quit, Rounds, SceneDialog
+from ddenv.workbench.run.choose import ChooseModels, Layers, copied
+from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, rounds
 from ddenv.workbench.run.facts import FactsDialog
 from ddenv.workbench.run.failures_dialog import FailuresMet
 from ddenv.workbench.shared.background import is_open
@@ -90,8 +90,13 @@ class Opening:
     def rounds(self) -> None:
         """Lists the rounds so far, to go to the end of one."""
         position = self._screen.browsing.position
-        dialog = Rounds(tuple(position.chapters), position.at)
-        self._screen.app.push_screen(dialog, lambda chapter: self._screen.go(chapter.last) if chapter else None)
+        chapters = tuple(position.chapters)
+
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._screen.go(chapters[row].last)
+
+        self._screen.app.push_screen(rounds(chapters, position.at), chosen)
 
     def facts(self) -> None:
         """Shows the raw facts of the test that tells most of the row under the cursor, or of the last one of all."""
@@ -136,10 +141,6 @@ class Opening:
 
         self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, look, self._asking.ask))
 
-    def signs(self) -> None:
-        """Shows what the signs mean."""
-        self._screen.app.push_screen(SignsDialog())
-
     def layers(self) -> None:
         """Asks what the map shows."""
         self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())
@@ -152,7 +153,13 @@ class Opening:
             texts.append(("names selected", "\n".join(selected)))
         texts += [("to come back", f"ddenv open {name}"), ("to go on without screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]
-        self._screen.app.push_screen(Copy(texts))
+
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._screen.app.copy_to_clipboard(texts[row][1])
+                self._asking.say(f"{texts[row][0]} copied, if the terminal allows it")
+
+        self._screen.app.push_screen(Pick("Copy", "or click copies", [copied(*each) for each in texts]), chosen)
 
     def export(self) -> None:
         """Asks what to export."""

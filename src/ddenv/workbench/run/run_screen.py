@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
-from textual import events, on, work
+from textual import events, on
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.reactive import Reactive
@@ -25,7 +24,7 @@ from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
-from ddenv.workbench.map.place import Place, place_of_run
+from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidate_rows import round_title
@@ -33,10 +32,9 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
+from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
-from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
 from ddenv.workbench.shared.messages import Attention
 from ddenv.workbench.shared.poll import Poll
@@ -44,8 +42,6 @@ from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
 
-# The time until all that has the focus, or had it, asked to be drawn, s.
-TOGETHER = 0.004
 SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
 # The panes and their words, in the order of the keys 1 to 5.
@@ -117,12 +113,9 @@ class RunScreen(Screen[None]):
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
-        for id in TOOLTIPS:
-            self.query_one(f"#{id}").tooltip = TOOLTIPS[id]
         self.query_one(Panes).mark(self._pane)
         self.following.begin()
-        # What it needs takes long to load: the first paint comes before.
-        self.call_after_refresh(self._read_world)
+        read_world(self, self.run, self._placed)
 
     def on_unmount(self) -> None:
         self.scene.stop()
@@ -136,29 +129,9 @@ class RunScreen(Screen[None]):
         self.table.set_narrow(width < WIDE and self._pane != "round")
         self.call_after_refresh(self._show_models)
 
-    # The world is read beside the screen, since it can be large.
-
-    @work(thread=True, group="world", exclusive=True)
-    def _read_world(self) -> None:
-        try:
-            place, notice = place_of_run(self.run), ""
-        except UserError as error:
-            place, notice = Place(), str(error)
-        call_if_open(self, self._placed, place, notice)
-
     def _placed(self, place: Place, notice: str) -> None:
         self.world.set_place(place, notice)
         self._show_models()
-
-    def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
-        self.run_worker(self._draw_together(), group="focus")
-        super().set_focus(widget, scroll_visible, from_app_focus)
-
-    async def _draw_together(self) -> None:
-        """What is in the panels would be drawn a frame before their borders: the focus moves in one."""
-        with self.app.batch_update():
-            await asyncio.sleep(TOGETHER)
-        self.check_idle()
 
     # From the run file to the screen.
 
@@ -315,18 +288,15 @@ class RunScreen(Screen[None]):
 
     def find(self, name: str) -> None:
         """Brings a model into sight, with the crosshair on it."""
-        self._show_pane("map")
+        self.action_pane("map")
         self.world.go_to(name)
         self.world.focus()
 
     @on(Panes.Chosen)
     def _pane_clicked(self, event: Panes.Chosen) -> None:
-        self._show_pane(event.pane)
+        self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
-        self._show_pane(pane)
-
-    def _show_pane(self, pane: str) -> None:
         """Brings a pane into sight, and the keys to it."""
         if pane != self._pane:
             self.remove_class(f"-pane-{self._pane}")
@@ -339,7 +309,7 @@ class RunScreen(Screen[None]):
         self.call_after_refresh(self._show_keys)
 
     def action_next_pane(self) -> None:
-        self._show_pane([*PANES, *PANES][list(PANES).index(self._pane) + 1])
+        self.action_pane([*PANES, *PANES][list(PANES).index(self._pane) + 1])
 
     def action_follow(self) -> None:
         if self.browsing.is_past:
@@ -348,12 +318,6 @@ class RunScreen(Screen[None]):
         self.world.select(())
         self.table.follow()
         self.table.show(self.snapshot)
-
-    def action_zoom(self, factor: float) -> None:
-        self.world.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.world.fit()
 
 
 def _panel(id: str, title: str, hints: str = "") -> Framed:

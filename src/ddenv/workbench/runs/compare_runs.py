@@ -15,9 +15,9 @@ from textual.widgets import Static
 
 from ddenv.text import count, first_of, plain, truncated
 from ddenv.words.signs import brief
-from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
+from ddenv.workbench.shared.bindings import keys
 
 # The maximum number of models to name, and width of a value.
 NAMED, LONGEST = 20, 60

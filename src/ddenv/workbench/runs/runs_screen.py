@@ -20,12 +20,12 @@ from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
 from ddenv.runs.folder import SUFFIX
 from ddenv.text import count, plain, shortened
-from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
 from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup
 from ddenv.workbench.widgets.path_entry import PathEntry
 

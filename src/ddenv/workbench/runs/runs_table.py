@@ -14,10 +14,10 @@ from textual.widgets.option_list import Option
 
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.signs import brief
-from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
 from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.bindings import keys
 
 # The maximum number of models to name.
 MOST_NAMES = 40

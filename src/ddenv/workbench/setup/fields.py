@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 from textual import events, on
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.message import Message
 from textual.widget import Widget
-from textual.widgets import Button, Input, Label, OptionList, Select, Static
+from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
-from ddenv.runs import processor
 from ddenv.schemas import OURS, Kind, names, uses
-from ddenv.text import count, plain
-from ddenv.words.methods import chosen, note, paragraph
+from ddenv.text import plain
+from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.form import Field
 from ddenv.workbench.setup.start_run import usual_jobs
@@ -48,72 +45,16 @@ def not_used(field: Field, algorithm: str) -> str:
     return ""
 
 
-def cost(field: Field, text: str, seconds: float | None = None) -> str:
-    """The cost of a field's value, or ""; a test takes so many `seconds` of real time, if that is known."""
-    number = -1.0
-    with suppress(ValueError):
-        number = float(text)
-    if 0 <= number < 1e6:
-        match field.id:
-            case "iterations":
-                return f"A candidate without f costs at most {count(1 + int(number), 'test')}."
-            case "baseline_runs":
-                return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
-            case "timeout":
-                real = f", here about {seconds:.1f} s of real time" if seconds else ""
-                return f"A test without success takes {number:g} simulated s{real}."
-    if field.id == "jobs":
-        return f"This machine has {count(processor.usable_cores(), 'processor')}; more jobs save no time."
-    if field.id == "accept":
-        return "Asking costs your time, and no tests."
-    return field.setting.cost if field.setting else ""
-
-
-class SchemaSelect(Select[str]):
-    """All names of a kind; its id is the kind."""
-
-    # These keys are bound here, not on the screen: otherwise the form around it would handle them.
-    BINDINGS: ClassVar = [
-        Binding("pagedown", "screen.scroll(1)", "more", id="schema.more", tooltip="scroll an explanation", show=False),
-        Binding("pageup", "screen.scroll(-1)", "back", id="schema.back", tooltip="scroll it back", show=False),
-    ]
-
-    @dataclass
-    class Looked(Message):
-        """In the open list another name is highlighted."""
-
-        kind: Kind
-        name: str
-
-    def __init__(self, kind: Kind, tooltip: str) -> None:
-        super().__init__([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
-        self.kind: Kind = kind
-        self.tooltip = tooltip
-
-    @property
-    def chosen(self) -> str:
-        return str(self.value)
-
-    def on_mount(self) -> None:
-        self.watch(self.query_one(OptionList), "highlighted", self._highlighted, init=False)
-
-    def _highlighted(self, index: int | None) -> None:
-        if self.expanded and index is not None:
-            self.post_message(self.Looked(self.kind, names(self.kind)[index]))
-
-
 class Explained(VerticalScroll):
     """The meaning of the focused field, in a few lines that scroll."""
 
-    def __init__(self, *, id: str) -> None:
-        super().__init__(id=id, can_focus=False)
-        self.title = ""
+    title = ""
 
     def compose(self) -> ComposeResult:
         yield Static("", markup=False)
 
     def show(self, title: str, words: str, warning: str = "") -> None:
-        """`title` is the name of what is explained, `warning` a sentence that comes first and stands out."""
+        """A `warning` comes first and stands out."""
         self.title = title
         text = Text(title, "bold").append("  ")
         if warning:
@@ -143,7 +84,6 @@ class OptionsForm(Vertical):
         self._message = ""
         # The texts of the rarely used fields, while they are not opened: with these the screen would open 0.15 s later.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
-        self.seconds: float | None = None
         self.border_title = "Settings"
 
     def compose(self) -> ComposeResult:
@@ -151,7 +91,13 @@ class OptionsForm(Vertical):
             with Grid(id="method"):
                 for kind, tooltip in METHOD.items():
                     yield Label(kind, markup=False)
-                    yield SchemaSelect(kind, tooltip)
+                    yield Select(
+                        [(name, name) for name in names(kind)],
+                        id=kind,
+                        allow_blank=False,
+                        compact=True,
+                        tooltip=tooltip,
+                    )
             yield Grid(*_widgets(form.BASIC), id="basic", classes="grid")
             yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
@@ -181,8 +127,8 @@ class OptionsForm(Vertical):
     @property
     def method(self) -> tuple[str, str]:
         """The chosen pair and algorithm."""
-        names = {select.kind: select.chosen for select in self.query(SchemaSelect)}
-        return f"{names['partitioning']}/{names['prioritization']}", names["algorithm"]
+        algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in METHOD)
+        return f"{partitioning}/{prioritization}", algorithm
 
     @property
     def texts(self) -> dict[str, str]:
@@ -208,7 +154,7 @@ class OptionsForm(Vertical):
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
         for kind, name in names.items():
-            select = self.query_one(f"#{kind}", SchemaSelect)
+            select = self.query_one(f"#{kind}", Select)
             with select.prevent(Select.Changed):
                 select.value = name
         self._dim()
@@ -239,45 +185,33 @@ class OptionsForm(Vertical):
 
     # The texts.
 
-    @on(SchemaSelect.Looked)
-    def _looked(self, event: SchemaSelect.Looked) -> None:
-        event.stop()
-        algorithm = event.name if event.kind == "algorithm" else self.method[1]
-        self._dim(algorithm)
-        self._explain_name(event.kind, event.name, algorithm)
-
     def on_descendant_focus(self, event: events.DescendantFocus) -> None:
         self._explain(event.widget)
 
     def _explain(self, widget: Widget | None) -> None:
         """The field that has the focus, or else the algorithm, which most depends on."""
-        id = next((each.id for each in (widget, widget and widget.parent) if each and each.id in FIELDS), None)
-        if id is not None:
-            self._explain_field(FIELDS[id])
-        elif isinstance(widget, SchemaSelect):
-            self._explain_name(widget.kind, widget.chosen, self.method[1])
-        else:
-            self._explain_name("algorithm", self.method[1], self.method[1])
+        id, (pair, algorithm) = "" if widget is None else widget.id or "", self.method
+        partitioning, _, prioritization = pair.partition("/")
+        panel = self.query_one(Explained)
+        if id in FIELDS:
+            field = FIELDS[id]
+            words = f"{field.meaning} {field.setting.cost if field.setting else ''}".strip()
+            panel.show(field.label, words, not_used(field, algorithm))
+        elif widget is not panel:
+            kind = next((kind for kind in KINDS if kind == id), KINDS[0])
+            name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
+            panel.show(f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm))
 
-    def _explain_name(self, kind: Kind, name: str, algorithm: str) -> None:
-        unused = note(kind, name if kind == "algorithm" else algorithm)
-        self.query_one(Explained).show(f"{kind} {plain(name)}", paragraph(kind, name), unused)
-
-    def _explain_field(self, field: form.Field) -> None:
-        words = f"{field.meaning} {cost(field, self.texts[field.id], self.seconds)}".strip()
-        self.query_one(Explained).show(field.label, words, not_used(field, self.method[1]))
-
-    def _dim(self, algorithm: str = "") -> None:
+    def _dim(self) -> None:
         """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
-        algorithm = algorithm or self.method[1]
-        used = uses(algorithm)
-        for select in self.query(SchemaSelect):
-            select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
+        algorithm = self.method[1]
+        for kind in METHOD:
+            unused = kind != "algorithm" and kind not in uses(algorithm)
+            self.query_one(f"#{kind}").set_class(unused, "-unused")
         for id, field in self._fields():
             field.set_class(bool(not_used(FIELDS[id], algorithm)), "-unused")
 
     def show_cost(self, words: str) -> None:
-        """Shows the tests and the time that the settings need."""
         self.query_one("#cost", Static).update(Text(words))
 
     def tell_command(self, words: str, typed: bool = True) -> None:
@@ -361,15 +295,13 @@ class OptionsForm(Vertical):
     def _picked(self, event: Select.Changed) -> None:
         event.stop()
         self._dim()
-        if isinstance(event.select, SchemaSelect):
+        if event.select.id in METHOD:
             self._explain(event.select)
         self._edited(event.select)
 
     def _edited(self, widget: Widget) -> None:
         if widget.id in FIELDS:
             self._check_again(widget.id)
-            if widget.has_focus:
-                self._explain_field(FIELDS[widget.id])
         self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
 
 

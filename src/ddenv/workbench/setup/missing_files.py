@@ -25,8 +25,8 @@ from textual.widgets.option_list import Option
 from ddenv.errors import UserError
 from ddenv.runs.remedies import remedy, remembered, with_remedies
 from ddenv.text import count, plain
-from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 if TYPE_CHECKING:

@@ -20,18 +20,18 @@ from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
-from ddenv.workbench.help.bindings import ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
-from ddenv.workbench.setup.fields import Explained, OptionsForm
+from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.messages import ShowRun
 from ddenv.workbench.shared.processes import Engine
 from ddenv.workbench.widgets.panes import Panes
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
 SMALLEST = (64, 18)
 # From this size on all panes are shown at once.
 ROOMY = (110, 32)
-# From this size on the rarely used settings are shown, too.
-VAST = (160, 48)
 PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
 BASELINE = "start, and pause after the baseline: it shows how often the whole world fails"
 # Where the focus goes in each pane.
@@ -67,9 +65,9 @@ class SetupScreen(Screen[None]):
         (SMALLEST[0], "-slim"),
         (80, "-narrow"),
         (ROOMY[0], "-wide"),
-        (VAST[0], "-vast"),
+        (160, "-vast"),
     ]
-    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (48, "-high")]
     BINDINGS: ClassVar = keys(
         "setup",
         ("start", "ctrl+s,f5", "start", "start", "start the reduction", "^s"),
@@ -82,15 +80,13 @@ class SetupScreen(Screen[None]):
         ("pick_heading", "h", "pick('heading')", "heading", "set the heading on the map"),
         ("pick_goal", "g", "pick('goal')", "goal", "set the goal on the map"),
         ("missing", "m", "missing", "missing", "to the missing files and their remedies"),
-        ("closer", "plus,equals_sign", "zoom(1.25)", "closer", "map: closer"),
-        ("farther", "minus", "zoom(0.8)", "farther", "map: farther away"),
-        ("fit", "0", "fit", "fit", "map: show all of it"),
+        *MAP_KEYS,
         ("choose", "f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
         ("map", "f3", "pane('map')", "map", "to the map"),
         ("settings", "f4", "pane('settings')", "settings", "to the settings"),
         ("runs", "R", "app.runs", "runs", "the list of all runs"),
         ("lessons", "L", "app.lessons", "lessons", "lessons on delta debugging"),
-        ("help", "f1,question_mark", "app.help", "help", "show every key", "?"),
+        HELP,
         ("home", "escape", "home", "back", "stop picking; back to the list of files"),
         ("quit", "q", "app.leave", "quit", "leave"),
     )
@@ -142,8 +138,6 @@ class SetupScreen(Screen[None]):
     def on_mount(self) -> None:
         self._list_files()
         self.query_one(FileList).focus()
-        if self.size.width >= VAST[0] and self.size.height >= VAST[1]:
-            self.call_after_refresh(self.form.toggle_more)
 
     def on_screen_resume(self) -> None:
         self.query_one(RunList).read()
@@ -198,7 +192,6 @@ class SetupScreen(Screen[None]):
 
     @on(FileList.Looked)
     def _choose(self, event: FileList.Looked) -> None:
-        self.preview.remember_places()
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
         self.form.show_message("")
@@ -223,15 +216,16 @@ class SetupScreen(Screen[None]):
             self.preview.ask_again()
             self._show_outcome()
             return
-        places = None if choice.scenario else self.preview.places_for(self._keep_places)
-        self.form.show_settings(choice.settings, places)
+        texts = self.form.texts
+        places = {field.id: texts[field.id] if self._keep_places else "" for field in form.PLACES}
+        self.form.show_settings(choice.settings, None if choice.scenario else places)
         if self.preview.asks and choice.path == self._opened_now:
             self.action_pick("start")
 
     @on(Preview.PastRead)
     def _past_was_read(self, event: Preview.PastRead) -> None:
         if event.choice is self.preview.choice:
-            self._past, self.form.seconds = event.past, event.past.seconds
+            self._past = event.past
             self._show_outcome()
 
     # Places on the map.
@@ -247,12 +241,6 @@ class SetupScreen(Screen[None]):
         """To the rows of missing files, if there are any."""
         self._show_pane("map")
         (self.preview.missing if self.preview.missing.display else self.preview.map).focus()
-
-    def action_zoom(self, factor: float) -> None:
-        self.preview.map.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.preview.map.fit()
 
     # Cost and command.
 
@@ -354,7 +342,6 @@ class SetupScreen(Screen[None]):
             else:
                 self._complain(UserError("not started: it needs a program that you do not trust"))
 
-        self.preview.remember_places()
         self._busy = True
         self.form.show_message("checking ...")
         # A run file is never the user's own: somebody may have sent it.
@@ -445,10 +432,6 @@ class SetupScreen(Screen[None]):
         """Moves the focus to a pane, and shows it if only one fits."""
         self._show_pane(pane)
         self.query_one(HEADS[pane]).focus()
-
-    def action_scroll(self, pages: int) -> None:
-        explained = self.query_one(Explained)
-        explained.scroll_relative(y=pages * max(1, explained.size.height - 1), animate=False)
 
     def action_more(self) -> None:
         self._show_pane("settings")

@@ -9,7 +9,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual import on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import OptionList, Static
@@ -26,12 +25,12 @@ from ddenv.runs.playback import played
 from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.signs import SignsDialog
-from ddenv.workbench.map.place import Place, Way, place_of_run
+from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
 from ddenv.workbench.why.margins_dialog import MarginsDialog
@@ -41,12 +40,8 @@ SMALLEST = (64, 18)
 PERIOD = 0.5
 
 
-def _ids(names: str) -> tuple[str, ...]:
-    return tuple(f"why.{name}" for name in names.split())
-
-
-SHOWN = _ids("play isolate margins copy closer farther fit signs help close")
-FIRST = _ids("help close play isolate margins copy signs closer farther fit")
+SHOWN = ids("why", "play isolate margins copy closer farther fit signs help close")
+FIRST = ids("why", "help close play isolate margins copy signs closer farther fit")
 
 
 # What the key of isolation does, as the footer says.
@@ -75,31 +70,23 @@ class WhyScreen(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low")]
     AUTO_FOCUS = "#why-list"
     BINDINGS: ClassVar = [
-        Binding(
-            "enter",
-            "play",
-            "play both runs",
-            id="why.play",
-            tooltip="play the run with the model and the one without it over each other",
-            priority=True,
+        *keys("why", ("play", "enter", "play", "play both runs", "play both runs over each other"), priority=True),
+        *keys(
+            "why",
+            (
+                "isolate",
+                "i",
+                "isolate",
+                BEGIN,
+                "find a nearest world in which the robot reaches its goal; again: stop that",
+            ),
+            ("margins", "m", "margins", "margins", "how far each number may change before f goes"),
+            ("copy", "c", "copy", "copy", "copy all sentences, or the command that is named (OSC 52)"),
+            *MAP_KEYS,
+            ("signs", "k", "app.signs", "signs", "what the signs and letters on the map mean"),
+            HELP,
+            ("close", "escape,W,q", "dismiss", "close", "back to the run", "esc"),
         ),
-        Binding(
-            "i",
-            "isolate",
-            BEGIN,
-            id="why.isolate",
-            tooltip="find the nearest world that passes, in which the robot reaches its goal; while that goes on: stop it",
-        ),
-        Binding("m", "margins", "margins", id="why.margins", tooltip="how far each number may change before f goes"),
-        Binding(
-            "c", "copy", "copy", id="why.copy", tooltip="copy all sentences, or the command that is named (OSC 52)"
-        ),
-        Binding("plus,equals_sign", "zoom(1.25)", "closer", id="why.closer", tooltip="map: closer", key_display="+"),
-        Binding("minus", "zoom(0.8)", "farther", id="why.farther", tooltip="map: farther away", key_display="-"),
-        Binding("0", "fit", "fit", id="why.fit", tooltip="map: show all that matters"),
-        Binding("k", "signs", "signs", id="why.signs", tooltip="what the signs and letters on the map mean"),
-        Binding("question_mark,f1", "app.help", "help", id="why.help", tooltip="show every key", key_display="?"),
-        Binding("escape,W,q", "close", "close", id="why.close", tooltip="back to the run", key_display="esc"),
     ]
 
     def __init__(
@@ -141,18 +128,10 @@ class WhyScreen(Screen[None]):
         if self._place.prints:
             self._placed(self._place, "")
         else:
-            self.call_after_refresh(self._read_world)
+            read_world(self, self._file.path, self._placed)
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._list)
-
-    @work(thread=True, group="world", exclusive=True)
-    def _read_world(self) -> None:
-        try:
-            place, notice = place_of_run(self._file.path), ""
-        except UserError as error:
-            place, notice = Place(), str(error)
-        call_if_open(self, self._placed, place, notice)
 
     def _placed(self, place: Place, notice: str) -> None:
         self._place = place
@@ -292,18 +271,6 @@ class WhyScreen(Screen[None]):
             return
         self.app.copy_to_clipboard("\n".join(map(plain, lines or [command])))
         self.notify("copied, if the terminal allows it", timeout=3)
-
-    def action_zoom(self, factor: float) -> None:
-        self.map.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.map.fit()
-
-    def action_signs(self) -> None:
-        self.app.push_screen(SignsDialog())
-
-    def action_close(self) -> None:
-        self.dismiss(None)
 
     def _refuse(self, why: str) -> None:
         self.notify(plain(why), severity="warning", timeout=4, markup=False)
