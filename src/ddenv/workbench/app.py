@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rich.console import RenderableType
 from rich.text import Text
 from textual import events, on
 from textual.app import App, ComposeResult
@@ -24,7 +23,6 @@ from ddenv.text import plain
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
-from ddenv.workbench.terminal.written import Written
 
 if TYPE_CHECKING:
     from ddenv.workbench.map.world_map import WorldMap
@@ -120,7 +118,6 @@ class Workbench(App[int]):
         first: ShowLessons | ShowLesson | ShowRace | None = None,
     ) -> None:
         super().__init__()
-        self._written = Written()
         self._reading = reading
         for theme in OURS:
             self.register_theme(theme)
@@ -157,7 +154,6 @@ class Workbench(App[int]):
             await super().on_event(event)
 
     def _is_bound(self, key: str) -> bool:
-        """Whether `tab` or `shift+tab` has another meaning, to the user or where the focus is."""
         nodes = (self.focused or self.screen).ancestors_with_self
         bound = (each for node in nodes for each in Binding.make_bindings(node.BINDINGS) if each.key == key)
         own = any(key in keys.split(",") for keys in self._own_keys.values())
@@ -165,7 +161,7 @@ class Workbench(App[int]):
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
-        self.app_resume_signal.subscribe(self, lambda _: self._redraw())
+        self.app_resume_signal.subscribe(self, lambda _: self.refresh(layout=True))
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
         if self.is_headless:
@@ -216,7 +212,6 @@ class Workbench(App[int]):
     @on(ShowRun)
     @on(ShowSetup)
     def _show(self, asked: ShowRun | ShowSetup) -> None:
-        """Another screen, in place of all that are open."""
         try:
             screen = self._screen_for(asked)
         except UserError as error:
@@ -235,7 +230,6 @@ class Workbench(App[int]):
             self.post_message(ShowRun(path))
 
     def action_help(self) -> None:
-        """The keys of the focused pane, of the screen, and of the app."""
         from ddenv.workbench.help.shortcuts import Help, groups
 
         self.push_screen(Help(groups(self.screen)))
@@ -266,13 +260,11 @@ class Workbench(App[int]):
         self.push_screen(SignsDialog())
 
     def action_runs(self) -> None:
-        """The list of all runs, above the screen that asks for it."""
         from ddenv.workbench.runs.runs_screen import RunsScreen
 
         self._push_once(RunsScreen)
 
     def action_lessons(self) -> None:
-        """The list of lessons, above the screen that asks for it."""
         from ddenv.workbench.learn.lessons_screen import LessonsScreen
 
         self._push_once(LessonsScreen)
@@ -293,16 +285,6 @@ class Workbench(App[int]):
         self.action_leave()
 
     # The terminal.
-
-    def _redraw(self) -> None:
-        self._written.forget()
-        self.refresh(layout=True)
-
-    def on_resize(self) -> None:
-        self._written.forget()
-
-    def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
-        super()._display(screen, self._written.fewer(renderable))
 
     def on_unmount(self) -> None:
         self._write("\x1b[23;2t")

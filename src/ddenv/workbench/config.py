@@ -177,12 +177,10 @@ def _written(keys: str) -> str:
 
 
 def _quoted(keys: str) -> str:
-    """As YAML reads it as text."""
     return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
 
 
 def _sections() -> dict[str, list[tuple[str, Action]]]:
-    """All actions by the section of their names."""
     groups: dict[str, list[tuple[str, Action]]] = {}
     for id, action in actions().items():
         groups.setdefault(id.split(".")[0], []).append((id, action))

@@ -39,17 +39,9 @@ ROOM = 90
 # The width of the tree in columns, without the lines of its branches.
 TREE = 15
 MARK = "marked"
+# The maximum number of models that are named.
+NAMED = 40
 GO = "go on from this environment: the run pauses there (branch)"
-
-
-class Tree(DataTable[Text]):
-    """The cursor is a whole row: home and end go to the first and the last one."""
-
-    def action_scroll_home(self) -> None:
-        self.action_scroll_top()
-
-    def action_scroll_end(self) -> None:
-        self.action_scroll_bottom()
 
 
 class History(Screen[int | None]):
@@ -80,7 +72,7 @@ class History(Screen[int | None]):
     def compose(self) -> ComposeResult:
         with Horizontal(id="both"):
             with Framed("Reductions", id="tree-panel", classes="panel"):
-                yield Tree(id="tree", cursor_type="row", cell_padding=1)
+                yield DataTable[Text](id="tree", cursor_type="row", cell_padding=1)
             with Framed("What you decided", id="past-decisions", classes="panel"):
                 yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         yield Static("", id="about", markup=False)
@@ -88,7 +80,7 @@ class History(Screen[int | None]):
         yield KeyFooter(shown, shown)
 
     def on_mount(self) -> None:
-        self.query_one(Tree).focus()
+        self.query_one(DataTable).focus()
         self.set_interval(PERIOD, self._look)
 
     # What is shown.
@@ -105,7 +97,7 @@ class History(Screen[int | None]):
             self._fill(self._here if stays is None else stays)
 
     def _fill(self, cursor: int) -> None:
-        table = self.query_one(Tree)
+        table = self.query_one(DataTable)
         table.clear(columns=True)
         branched = max((len(row.lines) for row in self._rows), default=0)
         table.add_column("environment", width=TREE + min(branched, 20))
@@ -133,7 +125,7 @@ class History(Screen[int | None]):
 
     @property
     def under_cursor(self) -> Node | None:
-        row = self.query_one(Tree).cursor_row
+        row = self.query_one(DataTable).cursor_row
         return self._rows[row].node if 0 <= row < len(self._rows) else None
 
     def on_resize(self) -> None:
@@ -215,7 +207,6 @@ class Compare(ModalScreen[None]):
 
     CSS_PATH = "history.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-small"), (110, "-large")]
-    AUTO_FOCUS = "Lines"
     BINDINGS: ClassVar = keys("compare", ("close", "escape,c,q,enter", "dismiss", "close", "back to the history"))
 
     def __init__(self, first: Node, second: Node, state: RunState, place: Place) -> None:
@@ -225,24 +216,20 @@ class Compare(ModalScreen[None]):
         self._state, self._place = state, place
 
     def compose(self) -> ComposeResult:
-        with Framed("Two environments side by side", "tab to the lists   escape closes"):
+        with Framed("Two environments side by side", "escape closes"):
             with Horizontal(classes="sides"):
                 for name, node, alone in self._sides:
                     with Vertical(classes="side"):
                         yield Static(self._facts(name, node), classes="facts", markup=False)
                         yield WorldMap(id=f"map-{name}")
-                        yield Static(_heading(f"only in {name}", alone), classes="facts", markup=False)
-                        yield Lines(_name, nothing="none", id=f"only-{name}")
-            yield Static(_heading("in both", self._common), classes="facts", markup=False)
-            yield Lines(_name, nothing="none", id="common")
+                        yield Static(_named(f"only in {name}", alone), classes="names", markup=False)
+            yield Static(_named("in both", self._common), classes="names", markup=False)
 
     def on_mount(self) -> None:
-        for name, node, alone in self._sides:
-            self.query_one(f"#only-{name}", Lines).show(alone)
+        for name, node, _ in self._sides:
             world = self.query_one(f"#map-{name}", WorldMap)
             world.set_place(self._place)
             world.show(Snapshot(self._state.changed(environment=node.environment, round=None, trials=())), None)
-        self.query_one("#common", Lines).show(self._common)
 
     def on_resize(self) -> None:
         # Of one size, so that both maps have one scale and one frame.
@@ -257,9 +244,6 @@ class Compare(ModalScreen[None]):
         return text.append(after + (f"; {words}" if words else ""), "not bold dim")
 
 
-def _heading(what: str, names: Sequence[str]) -> Text:
-    return Text(f"{what}: {count(len(names), 'model')}", "bold")
-
-
-def _name(name: str, width: int) -> Text:
-    return Text(f"  {shortened(name, max(4, width - 2))}", no_wrap=True)
+def _named(what: str, names: Sequence[str]) -> Text:
+    said = first_of([plain(shortened(name, 40)) for name in names], NAMED)
+    return Text(f"{what}: {count(len(names), 'model')}", "bold").append(f"\n{said}", "not bold")

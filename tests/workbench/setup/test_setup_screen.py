@@ -39,9 +39,6 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started)
         assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
         # What the form does not have comes from the scenario.
         assert not reduction.early_stop
-    # The number of jobs is no part of a scenario: the next form begins with it.
-    async with Opened() as session:
-        assert session.value("jobs") == "3"
 
 
 @pytest.mark.screens

@@ -53,7 +53,6 @@ class KeyFooter(Keys):
         self._order, self._first = tuple(shown), tuple(first)
         self._words: dict[str, tuple[str, str]] = {}
         self.entries: tuple[Entry, ...] = ()
-        self._hovered = ""
         self._due = False
 
     def say(self, id: str, words: str, shown: str = "") -> None:
@@ -75,7 +74,6 @@ class KeyFooter(Keys):
         self.renew()
 
     def renew(self) -> None:
-        """Shows the keys that can be pressed now, as many as fit."""
         self._due = False
         if self.is_attached and (entries := self._fitting()) != self.entries:
             self.entries = entries
@@ -106,12 +104,4 @@ class KeyFooter(Keys):
         drawn = Content.assemble((entry.shown, "bold $footer-key-foreground"), f" {entry.words}")
         if not entry.enabled:
             drawn = drawn.stylize("dim")
-        if entry.key == self._hovered:
-            drawn = drawn.stylize("on $block-hover-background")
         return drawn.stylize(pressing(entry.key, "" if entry.enabled else "app.bell"))
-
-    def _explain(self, key: str) -> None:
-        super()._explain(key)
-        if key != self._hovered:
-            self._hovered = key
-            self.refresh()

@@ -82,12 +82,10 @@ def groups(screen: Screen[Any]) -> list[Group]:
 
 
 def commands(screen: Screen[Any]) -> list[Shortcut]:
-    """The workbench's own actions that can be run now."""
     return [each for group in groups(screen) for each in group.shortcuts if each.id and each.enabled]
 
 
 def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
-    """One for each action, with all its keys."""
     keys: dict[str, list[str]] = {}
     first: dict[str, ActiveBinding] = {}
     for active in found:
@@ -110,7 +108,6 @@ def _words(active: ActiveBinding) -> str:
 
 
 def _pane(focused: DOMNode | None) -> tuple[str, tuple[str, ...]]:
-    """The focused pane's title, and the hints below its keys."""
     if focused is None:
         return "Here", ()
     nodes = focused.ancestors_with_self

@@ -15,7 +15,6 @@ Signs = tuple[tuple[str, str], ...]
 
 
 def signs() -> dict[str, Signs]:
-    """(sign, meaning) by where they stand."""
     return {
         "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate that is shown"), *MORE_SIGNS[1:], *LEGEND),
         "On the map of tests played back": (*OF_WAYS, ("a", "in one of the two only")),
@@ -47,7 +46,6 @@ def signs() -> dict[str, Signs]:
 
 
 def _split(words: dict[str, str]) -> Signs:
-    """Of words that begin with their sign."""
     return tuple((each[0], each[2:]) for each in words.values())
 
 

@@ -49,8 +49,6 @@ class LearnScreen(Screen[ScreenResultType]):
         yield from ()
 
     def read_world(self, run: Path, maps: Sequence[WorldMap]) -> None:
-        """Shows the world of a run on these maps, once it is read."""
-
         def show(place: Place, notice: str) -> None:
             for each in maps:
                 each.set_place(place, notice)

@@ -32,7 +32,6 @@ class LessonPane(VerticalScroll):
         yield Static("", id="lesson-text", markup=False)
 
     def show(self, page: Page) -> None:
-        """Another page, from its beginning; with a hint or an answer, its end: that is new."""
         self._page = page
         room = self.scrollable_content_region.width
         self.query_one("#lesson-text", Static).update(page_text(page, room))
@@ -43,7 +42,6 @@ class LessonPane(VerticalScroll):
         self.call_after_refresh(self._say_what_is_next)
 
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
-        """What the frame says, too."""
         super().watch_scroll_y(old_value, new_value)
         self._say_what_is_next()
 
@@ -67,7 +65,6 @@ class LessonPane(VerticalScroll):
 
 
 def letters(question: Question) -> str:
-    """Which letters are its answers."""
     used = LETTERS[: len(question.answers)]
     # After e there are gaps.
     return f"{used[0]} to {used[-1]}" if used[-1] <= "e" else " ".join(used)
@@ -83,7 +80,6 @@ def page_text(page: Page, room: int = 0) -> Text:
 
 
 def _blocks(blocks: Sequence[Block], room: int) -> Text:
-    """Paragraphs with a line between them; the entries of a list stand close together."""
     text = Text()
     for before, block in zip((None, *blocks), blocks, strict=False):
         if before is not None:
@@ -131,7 +127,6 @@ def _question(question: Question, page: Page, room: int) -> Text:
 
 
 def _verdict(question: Question, chosen: int, page: Page, room: int) -> Text:
-    """Right or wrong, why, and what is wrong with the other answers."""
     right = f"{LETTERS[question.right]} is right."
     first = f"Skipped. {right}" if chosen < 0 else "✓ Right." if chosen == question.right else f"✗ No: {right}"
     text = Text().append(f"\n\n{first}", "bold")
@@ -148,7 +143,6 @@ class Variables(Widget):
         self._variables: tuple[Variable, ...] = ()
 
     def show(self, variables: tuple[Variable, ...]) -> None:
-        """Other values."""
         self._variables = variables
         self.refresh()
 

@@ -159,7 +159,6 @@ class LessonScreen(LearnScreen[bool]):
 
     @property
     def _at_next(self) -> bool:
-        """Whether the lesson is at its end, and another one follows."""
         return bool(self._following) and self.course.step == self.course.last
 
     def _keep_score(self) -> None:

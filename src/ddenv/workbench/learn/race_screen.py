@@ -48,7 +48,6 @@ class RacerPane(Vertical):
         yield self._said
 
     def show(self, race: Race) -> None:
-        """The search as far as the race is."""
         play, turn, tests = self.play, race.now(self.play), min(race.at, self.play.tests)
         left, room = play.after(tests), max(8, self.size.width - 2)
         # The map says itself what a panel's lower border has, so the figures stand above.

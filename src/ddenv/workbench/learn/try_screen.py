@@ -208,7 +208,6 @@ def _last(attempt: Attempt) -> Text:
 
 
 def _side_by_side(lines: list[Line], room: int) -> Text:
-    """The names of what is left stand where there is room for them."""
     width = max(len(line.name) for line in lines)
     text = Text(f"{'':<{width}}  tests  left\n", "dim")
     for line in lines:

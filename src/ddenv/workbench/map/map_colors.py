@@ -94,7 +94,6 @@ def _seen(color: RGB, back: RGB, fore: RGB) -> RGB:
 
 
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
-    """The palette for a widget's background and text colour in the app's theme."""
     if app.native_ansi_color:
         return mixed(*OWN[app.current_theme.dark], own=True)
     names = ("accent", "primary", "success", "error")

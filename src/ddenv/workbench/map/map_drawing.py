@@ -74,7 +74,6 @@ class Picture:
     cells: dict[int, Cell]
 
     def holds(self, cell: Cell) -> bool:
-        """Whether a cell is in the picture."""
         rows, columns = self.canvas.chars.shape
         return cell[0] < int(rows) and cell[1] < int(columns)
 
@@ -149,7 +148,6 @@ class MapDrawing:
 
 
 def _in_focus(snapshot: Snapshot) -> frozenset[int]:
-    """The running tests of the candidate in focus."""
     focus = snapshot.focus
     return frozenset(test.id for test in snapshot.running if focus is not None and test.candidate == focus.index)
 
@@ -262,7 +260,6 @@ def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette
 
 
 def strip(canvas: Canvas, row: int) -> Strip:
-    """One row of `canvas`."""
     segments = [Segment(run.text, _style(run.fore, run.back, run.bold)) for run in canvas.runs(row)]
     return Strip(segments, canvas.chars.shape[1])
 

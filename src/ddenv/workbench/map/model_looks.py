@@ -89,7 +89,6 @@ def kept(shown: Shown) -> Kept:
 
 
 def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
-    """The looks of all models in a `palette`."""
     names, floor = _known(tuple(prints))
     kinds = _kinds(names, floor, who)
     parts = np.array([who.parts.get(name, -1) for name in names], dtype=int)
@@ -103,7 +102,6 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[list[str], np.ndarray]:
-    """The names of models, and which are floors: the same in all rounds."""
     areas = np.array([each.area for each in prints])
     return [each.name for each in prints], areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
 
@@ -199,8 +197,6 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     protected = canvas.chars == ord(SOLID[PROTECTED])
     for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):
         canvas.chars[where & protected] = ord(line)
-    for half, quarter, sides in (("▀", "▘", beside[0::2]), ("▄", "▖", beside[1::2])):
-        canvas.chars[(canvas.chars == ord(half)) & sides & ~full] = ord(quarter)
 
 
 def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int) -> np.ndarray:

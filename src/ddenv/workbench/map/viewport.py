@@ -61,7 +61,6 @@ class Viewport:
             self.pan(right, up)
 
     def holds(self, cell: Cell) -> bool:
-        """Whether a cell is in the view."""
         return self.view is not None and 0 <= cell[0] < self.view.rows and 0 <= cell[1] < self.view.columns
 
     def center_on(self, x: float, y: float) -> None:

@@ -117,12 +117,10 @@ class WorldMap(Widget, can_focus=True):
 
     @property
     def candidate(self) -> Candidate | Trial | None:
-        """The candidate whose models stand out."""
         return self.shown.candidate
 
     @property
     def selection(self) -> frozenset[str]:
-        """The names of the models that the user selected."""
         return self.shown.selection
 
     @property
@@ -134,7 +132,6 @@ class WorldMap(Widget, can_focus=True):
 
     @property
     def aims(self) -> bool:
-        """Whether the crosshair is shown."""
         return self.has_focus or self.picking or self._unmarked is not None
 
     def set_place(self, place: Place, notice: str = "") -> None:
@@ -175,19 +172,16 @@ class WorldMap(Widget, can_focus=True):
         self.draw() if same or not self.viewport.fitted else self._refit()
 
     def toggle_layer(self, name: str) -> None:
-        """Shows one of `LAYERS`, or hides it."""
         self.shown = replace(self.shown, layers=self.shown_layers ^ {name})
         self.draw()
 
     def legend(self, width: int) -> Text:
-        """One line with the meanings of the signs on the map, as many as fit."""
         return legend(self.shown, width)
 
     # Models.
 
     @property
     def model_at_cursor(self) -> str | None:
-        """The name of the model under the crosshair."""
         cursor = self.viewport.cursor
         if self._aim is not None and self._aim[1:] == (cursor, self.viewport.view):
             return self._aim[0]
@@ -235,7 +229,6 @@ class WorldMap(Widget, can_focus=True):
             self.draw()
 
     def select(self, names: Iterable[str]) -> None:
-        """Selects these models instead."""
         selection = frozenset(names)
         if selection != self.selection:
             self.shown = replace(self.shown, selection=selection)
@@ -274,7 +267,6 @@ class WorldMap(Widget, can_focus=True):
         self._draw_soon()
 
     def fit(self) -> None:
-        """Shows everything important again."""
         self.viewport.fitted = True
         self._refit()
 

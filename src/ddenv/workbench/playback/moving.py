@@ -24,7 +24,6 @@ class RobotWay:
 
     @property
     def whole(self) -> Way:
-        """The way without a robot on it."""
         return Way(self._name, self.points)
 
     def at(self, time: float) -> Way:
@@ -36,7 +35,6 @@ class RobotWay:
         return Way(self._name, self.points, (*pose.position[:2], pose.yaw()), gone)
 
     def place(self, time: float) -> tuple[float, float] | None:
-        """Where the robot was at simulated `time`, s: x, y m."""
         pose = self._one.pose(time)
         return None if pose is None else pose.position[:2]
 

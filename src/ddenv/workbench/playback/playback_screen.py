@@ -59,7 +59,6 @@ class Playing:
         return self.time >= self.length
 
     def go(self, time: float) -> None:
-        """To an instant, and stops there."""
         self.on = False
         self.time = min(max(0.0, time), self.length)
 
@@ -70,7 +69,6 @@ class Playing:
         self.go((whole + number) * FRAME)
 
     def toggle(self) -> None:
-        """Plays, or pauses; at the end it begins again."""
         if not self.on and self.at_end:
             self.time = 0.0
         self.on = not self.on and self.length > 0
@@ -91,7 +89,6 @@ class Playing:
 
 
 def now() -> float:
-    """A clock that only goes on, s."""
     return time.monotonic()
 
 

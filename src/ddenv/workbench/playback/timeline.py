@@ -54,7 +54,6 @@ class Timeline(Widget):
         self._dragging = False
 
     def show(self, shown: Instant) -> None:
-        """Draws again if anything in it changed."""
         if shown != self.shown:
             taller = len(shown.tests) != len(self.shown.tests)
             self.shown = shown

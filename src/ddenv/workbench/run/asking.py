@@ -57,7 +57,6 @@ class Asking:
 
     @property
     def situation(self) -> Situation:
-        """What the rules look at."""
         snapshot, last = self._poll.snapshot, self._last[1]
         pending = last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
         return Situation(snapshot.state, snapshot.engine, self.barred, pending)
@@ -97,20 +96,17 @@ class Asking:
     # What is said.
 
     def refuse(self, why: str) -> None:
-        """Shows why something is not possible."""
         self._screen.notify(plain(why), severity="warning", timeout=4, markup=False)
 
     def say(self, what: str) -> None:
         self._screen.notify(plain(what), timeout=4, markup=False)
 
     def show_refusal(self, before: Snapshot) -> None:
-        """Shows why the engine refused a command of this screen."""
         id, why = self._poll.snapshot.state.refusal
         if (id, why) != before.state.refusal and id in self._mine:
             self.refuse(f"{self._mine[id]}: not done, {why}")
 
     def show_verdicts(self, before: Snapshot) -> None:
-        """Shows the verdicts of tries since `before`."""
         now = self._poll.snapshot.state.trials
         if before.state.trials == now:
             return

@@ -16,7 +16,7 @@ from textual.strip import Strip
 from ddenv.evidence.claims import FreshRuns
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Test, Trial
-from ddenv.workbench.run.candidate_rows import IN_SHORT, Column, Item, Listed, Words, fitting, listed, words
+from ddenv.workbench.run.candidate_rows import Column, Item, Listed, Words, fitting, listed, words
 from ddenv.workbench.shared.bindings import keys
 
 STRONG, WEAK = Style(bold=True), Style(dim=True)
@@ -67,7 +67,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self.columns: tuple[Column, ...] = fitting(Listed(), 0)
         self._snapshot = Snapshot()
         self._listed = Listed()
-        self._narrow = False
 
     # What is listed.
 
@@ -83,20 +82,12 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     @property
     def chosen(self) -> Candidate | Trial | None:
-        """The candidate or trial that was chosen by hand."""
         return None if self.following else self.under_cursor
 
     def words(self, row: int) -> Words:
-        """The words of a row by column."""
         return words(self._snapshot, self._listed, row)
 
-    def set_narrow(self, narrow: bool) -> None:
-        """With little room, drops every column that can be spared."""
-        self._narrow = narrow
-        self._arrange()
-
     def show(self, snapshot: Snapshot) -> None:
-        """Shows the run as it is now."""
         before, self._listed, self._snapshot = self._listed, listed(snapshot), snapshot
         if self._listed.of != before.of:
             self.following, self.cursor_row = True, 0
@@ -113,7 +104,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self.refresh()
 
     def follow(self) -> None:
-        """Gives the cursor back to the run."""
         self.following = True
         self.post_message(self.Chosen())
 
@@ -150,7 +140,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     @property
     def _in_sight(self) -> bool:
-        """Whether the cursor is."""
         return self.scroll_offset.y <= self.cursor_row < self.scroll_offset.y + self._page
 
     def _put(self, row: int | None, reveal: bool = False) -> None:
@@ -172,8 +161,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._reveal()
 
     def _arrange(self) -> None:
-        """Fits the columns and the scroll area."""
-        self.columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
+        self.columns = fitting(self._listed, max(0, self.container_size.width - 1))
         self.virtual_size = Size(0, len(self._listed) + 1)
         self.refresh()
 
@@ -192,10 +180,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
-        said = cells.get(last.name, "")
-        if cell_len(said) > last.width - 2:
-            said = cells.get(IN_SHORT, said)
-        verdict = _aligned(last, f"  {said}")
+        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
         segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 

@@ -134,7 +134,6 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
 
     @on(Input.Submitted)
     def _take(self) -> None:
-        """Takes the chosen names, or the one under the cursor."""
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._chosen:
@@ -209,7 +208,6 @@ class Layers(ModalScreen[None]):
 
 
 def copied(what: str, text: str) -> Text:
-    """A line of the list of texts to copy."""
     lines = text.splitlines()
     more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
     shown = truncated(plain(lines[0]), 40) if lines else ""

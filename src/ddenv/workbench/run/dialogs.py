@@ -106,7 +106,6 @@ class SceneDialog(ModalScreen[None]):
         self.refresh_address()
 
     def refresh_address(self) -> None:
-        """Shows what is known of the scene now."""
         self.query_one("#address", Static).update(self._words())
 
     def _words(self) -> Text:

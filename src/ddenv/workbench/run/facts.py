@@ -81,7 +81,6 @@ def _names(models: tuple[str, ...] | list[str]) -> str:
 
 
 def _counts(position: Position, state: RunState, test: Test) -> str:
-    """The verdict that the test counts in."""
     if test.trial is not None and 0 < test.trial <= len(state.trials):
         trial = state.trials[test.trial - 1]
         return f"{trial.label}: {trial.verdict or 'not judged yet'}, {count(len(trial.tests), 'test')}"
@@ -146,5 +145,4 @@ class FactsDialog(ModalScreen[None]):
         self.query_one(Framed).say("command copied, if the terminal allows it")
 
     def _command(self, test: int) -> str:
-        """What makes a test again."""
         return f"ddenv test {self._run} --test {test}"

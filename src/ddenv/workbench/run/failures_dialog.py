@@ -42,7 +42,6 @@ class FailuresMet(ModalScreen[int | None]):
     ]
 
     def __init__(self, look: Callable[[], Situation]) -> None:
-        """`look` returns the run as it is now."""
         super().__init__()
         self._look_at = look
         self._found: tuple[OtherFailure, ...] = ()

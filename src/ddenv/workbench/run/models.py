@@ -47,7 +47,6 @@ class ModelsLeft(Vertical):
         yield Lines(line, nothing="none", id="models")
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
-        """Shows the run as it is now; `prints` are the footprints of its models."""
         split = None if state.round is None or state.round.done else state.round.split
         made_of = (state.environment, split, state.pinned, state.evidence_test, state.baseline, prints)
         lines = self.query_one("#models", Lines)
@@ -101,7 +100,6 @@ def line(row: Row, width: int) -> Text:
 
 
 def heading(width: int) -> str:
-    """The names of the columns."""
     return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
 
 

@@ -57,17 +57,14 @@ class Opening:
         self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
 
     def find(self) -> None:
-        """Asks for a model, and shows it on the map."""
         names = [each.name for each in self._screen.world.place.prints]
         self.choose("Find a model on the map", names, False, lambda chosen: self._screen.find(chosen[0]))
 
     def change(self) -> None:
-        """Asks for other settings."""
         dialog = Change(self._poll.snapshot.state)
         self._screen.app.push_screen(dialog, lambda command: self._asking.ask(command) if command else None)
 
     def history(self) -> None:
-        """Shows the tree of reductions, to go back to one of them."""
         from ddenv.workbench.history import History
 
         def chosen(node: int | None) -> None:
@@ -78,8 +75,6 @@ class Opening:
         self._screen.app.push_screen(History(lambda: self._asking.situation, self._screen.world.place), chosen)
 
     def failures(self) -> None:
-        """Lists the other failures that the tests met, to reduce one of them in a branch."""
-
         def chosen(test: int | None) -> None:
             if test is not None:
                 # The list asked the question already.
@@ -88,7 +83,6 @@ class Opening:
         self._screen.app.push_screen(FailuresMet(lambda: self._asking.situation), chosen)
 
     def rounds(self) -> None:
-        """Lists the rounds so far, to go to the end of one."""
         position = self._screen.browsing.position
         chapters = tuple(position.chapters)
 
@@ -99,7 +93,6 @@ class Opening:
         self._screen.app.push_screen(rounds(chapters, position.at), chosen)
 
     def facts(self) -> None:
-        """Shows the raw facts of the test that tells most of the row under the cursor, or of the last one of all."""
         position = self._screen.browsing.position
         test, _ = of_row(position.now, self._screen.table.item)
         if test is None:
@@ -108,7 +101,6 @@ class Opening:
             self._screen.app.push_screen(FactsDialog(position, test, attach_name(self._poll.path), self.play_test))
 
     def play(self) -> None:
-        """Plays back the finished test that tells most of the row under the cursor."""
         self.play_row(self._screen.table.item)
 
     def play_row(self, item: Item | None) -> None:
@@ -131,7 +123,6 @@ class Opening:
         return ""
 
     def why(self) -> None:
-        """Shows what happens without each model that is left."""
         from ddenv.workbench.why.why_screen import Look, WhyScreen
 
         position, place = self._screen.browsing.position, self._screen.world.place
@@ -142,11 +133,9 @@ class Opening:
         self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, look, self._asking.ask))
 
     def layers(self) -> None:
-        """Asks what the map shows."""
         self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())
 
     def copy(self) -> None:
-        """Lists what can be copied: names, and the commands that come back to this run."""
         path, name = self._poll.path, attach_name(self._poll.path)
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
         if selected := self._screen.keys.pointed.models:
@@ -162,19 +151,16 @@ class Opening:
         self._screen.app.push_screen(Pick("Copy", "or click copies", [copied(*each) for each in texts]), chosen)
 
     def export(self) -> None:
-        """Asks what to export."""
         from ddenv.workbench.export import ExportScreen
 
         world = Path(str(self._poll.snapshot.state.scenario.get("world", "")))
         self._screen.app.push_screen(ExportScreen(self._poll.path, world))
 
     def method(self) -> None:
-        """Explains how the run is reduced."""
         options = settings(self._poll.snapshot.state)
         self._screen.app.push_screen(Method(options.algorithm, options.pair))
 
     def scene(self) -> None:
-        """Shows the address of the 3-D scene; starts it if it is not on."""
         dialog = SceneDialog(self._scene)
         if not self._scene.on:
             self._scene.start()
@@ -194,13 +180,11 @@ class Opening:
     # Out of the workbench.
 
     def detach(self) -> None:
-        """Leaves the workbench and says how to come back."""
         works = "The engine goes on" if self._poll.snapshot.engine != "absent" else "No engine is running"
         again = f"{attach_name(self._poll.path)}{' --watch' if self._poll.watch else ''}"
         self._exit(f"{works}. Attach again with: ddenv open {again}")
 
     def quit(self) -> None:
-        """Leaves at once if no engine is running; else asks whether to stop it."""
         snapshot = self._poll.snapshot
         if snapshot.engine == "absent" or snapshot.gone:
             self._screen.app.exit(0)

@@ -138,7 +138,6 @@ class KeyOffers:
         self._screen = screen
 
     def offer(self, name: str) -> Offer:
-        """What a key does now."""
         if self._screen.browsing.is_past:
             return Offer(why_not=NOT_NOW)
         return offer(name, self._screen.asking.situation, self.pointed)
@@ -152,7 +151,6 @@ class KeyOffers:
         return Pointed(row, table.following, (*known, *sorted(names.difference(known))))
 
     def _selection(self) -> frozenset[str]:
-        """The models that were selected by hand, or the one that the crosshair is on."""
         world = self._screen.world
         if world.selection:
             return frozenset(world.selection)
@@ -160,7 +158,6 @@ class KeyOffers:
         return frozenset() if name is None else frozenset((name,))
 
     def show(self, footer: KeyFooter) -> None:
-        """Shows in the footer what is possible."""
         now, pointed = self._screen.asking.situation, self.pointed
         for name, binding in GUIDING.items():
             offered = offer(name, now, pointed)

@@ -35,7 +35,7 @@ from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
-from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
+from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_lines
 from ddenv.workbench.shared.messages import Attention
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine, Scene
@@ -81,7 +81,6 @@ class RunScreen(Screen[None]):
 
     @property
     def snapshot(self) -> Snapshot:
-        """The run as it was seen last, or at the earlier moment that is shown."""
         return self.browsing.snapshot
 
     def compose(self) -> ComposeResult:
@@ -105,7 +104,7 @@ class RunScreen(Screen[None]):
             with Vertical(id="run-more"):
                 yield ModelsLeft(id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
-                    yield Lines(decision_line, nothing=NOTHING_DECIDED, tail=True, id="decisions")
+                    yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         if self.poll.watch:
             yield Static(WATCHING, id="watching", markup=False)
         yield Status(id="status")
@@ -126,7 +125,6 @@ class RunScreen(Screen[None]):
         width, height = self.size
         words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
         self.query_one("#small", Static).update(words)
-        self.table.set_narrow(width < WIDE and self._pane != "round")
         self.call_after_refresh(self._show_models)
 
     def _placed(self, place: Place, notice: str) -> None:
@@ -196,7 +194,6 @@ class RunScreen(Screen[None]):
             self.scene.show(Wanted(at))
 
     def show_legend(self) -> None:
-        """Shows what the signs on the map mean."""
         selection, candidate, state = self.world.selection, self.world.candidate, self.world.snapshot.state
         fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
         self._legend.show(len(selection), candidate, fallen, self.world.legend)
@@ -215,7 +212,6 @@ class RunScreen(Screen[None]):
         self.keys.use(name)
 
     def on_key(self, event: events.Key) -> None:
-        """A key that is not possible now says why."""
         self.keys.pressed(event.key)
 
     @on(WorldMap.Pointed)
@@ -224,7 +220,6 @@ class RunScreen(Screen[None]):
             self.keys.show(self._footer)
 
     def _keys_here(self) -> tuple[str, ...]:
-        """The keys of what has the focus, if the footer shows them in place of the screen's."""
         if self.browsing.is_past:
             return BROWSING
         if self.snapshot.state.status == "finished" and not self.poll.watch:
@@ -241,7 +236,6 @@ class RunScreen(Screen[None]):
         self._browse(lambda: self.browsing.step(what, by))
 
     def go(self, id: int | None) -> None:
-        """Shows the moment of an event, or the end of the run for None."""
         self._browse(lambda: self.browsing.position.go(id))
 
     def _browse(self, move: Callable[[], str | None]) -> None:
@@ -287,7 +281,6 @@ class RunScreen(Screen[None]):
         self.find(event.item.name)
 
     def find(self, name: str) -> None:
-        """Brings a model into sight, with the crosshair on it."""
         self.action_pane("map")
         self.world.go_to(name)
         self.world.focus()
@@ -303,7 +296,6 @@ class RunScreen(Screen[None]):
             self.add_class(f"-pane-{pane}")
         self._pane = pane
         self.query_one(Panes).mark(pane)
-        self.table.set_narrow(self.size.width < WIDE and pane != "round")
         focus = {"map": "#map", "log": "#log"}.get(pane, "#candidates")
         self.query_one(focus).focus()
         self.call_after_refresh(self._show_keys)

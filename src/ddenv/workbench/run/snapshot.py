@@ -49,7 +49,6 @@ class Browsing:
 
     @property
     def is_past(self) -> bool:
-        """Whether an earlier moment is shown."""
         return self.position.at is not None
 
     def step(self, what: Step, by: int) -> str:
@@ -77,7 +76,6 @@ class Moments:
         self._motion = lru_cache(PATHS)(file.motion)
 
     def of(self, moment: Moment, words: str) -> Snapshot:
-        """The snapshot of a moment in which happened what the `words` say."""
         state = moment.after
         return Snapshot(
             state,
@@ -114,12 +112,10 @@ class Following:
         self._stays: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
 
     def begin(self) -> None:
-        """Looks now, and then every `PERIOD`."""
         self.look()
         self._screen.set_interval(PERIOD, self.look)
 
     def look(self) -> None:
-        """Reads what is new in the run file."""
         before, live = self._poll.snapshot, not self._poll.catching_up
         if self._poll.look() is not None:
             self._stale = True

@@ -23,7 +23,7 @@ from ddenv.text import count, plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
-from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
+from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup
@@ -36,8 +36,6 @@ BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 KEPT = 7 * 86_400.0
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3
-# From this width on what is said of a run stands beside the table, else below it.
-WIDE = 110
 # The footer's keys in the order of the screen, then by priority.
 SHOWN = ids("runs", "open watch like filter sort mark compare delete undo path help back")
 FIRST = ids("runs", "help back open sort filter delete undo mark compare path watch like")
@@ -97,7 +95,7 @@ class RunsScreen(Screen[None]):
     """Reads the folder repeatedly in a thread; writes only on the user's command."""
 
     CSS_PATH = "runs.tcss"
-    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (WIDE, "-wide"), (160, "-huge")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (20, "-low"), (30, "-tall")]
     BINDINGS: ClassVar = keys(
         "runs",
@@ -191,12 +189,7 @@ class RunsScreen(Screen[None]):
     @on(DataTable.RowHighlighted)
     def _show_title(self) -> None:
         run = self._chosen
-        width = self.query_one("#about").size.width or 30
-        words = Text("") if run is None else about(run, width) if self.size.width >= WIDE else in_few_lines(run)
-        self.query_one("#about", Static).update(words)
-
-    def on_resize(self) -> None:
-        self.call_after_refresh(self._show_title)
+        self.query_one("#about", Static).update("" if run is None else about(run))
 
     @property
     def _chosen(self) -> Recent | None:
@@ -217,7 +210,6 @@ class RunsScreen(Screen[None]):
             self.post_message(ShowSetup(like=run.path))
 
     def _readable(self) -> Recent | None:
-        """The run under the cursor if it can be read; otherwise shows why not."""
         run = self._chosen
         if run is None:
             self._complain("there is no run here")
@@ -327,7 +319,6 @@ class RunsScreen(Screen[None]):
         self.query_one(RunTable).focus()
 
     def action_back(self) -> None:
-        """Closes first what was opened at the foot, then the screen."""
         if self.has_class("-opening"):
             self.remove_class("-opening")
         elif self.has_class("-filtering"):

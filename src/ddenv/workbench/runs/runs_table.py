@@ -32,12 +32,10 @@ class RunList(OptionList):
         self._folder: RunsFolder | None = None
 
     def run_of(self, option_id: str | None) -> Recent:
-        """The run of an option."""
         return self._runs[option_id or ""]
 
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
-        """Reads the folder again."""
         from ddenv.runs.folder import runs_folder
 
         self._folder = self._folder or RunsFolder(runs_folder())
@@ -67,42 +65,15 @@ class RunList(OptionList):
             self.add_option(Option(Text("none yet", "dim"), disabled=True))
 
 
-def about(run: Recent, width: int) -> Text:
-    """All details of a run, for a column of that `width`."""
-    text = Text(shortened(plain(run.path.stem), width), "bold").append("\n")
-    if run.trouble:
-        return text.append(f"\n{plain(run.trouble)}", "not bold")
-    text.append(f"{run.sign} {run.state_words}\n", "not bold")
-    if run.reason:
-        text.append(f"{plain(run.reason)}\n", "not bold dim")
-    facts = [
-        ("scenario", shortened(run.scenario, max(8, width - 10))),
-        ("algorithm", run.algorithm),
-        ("pair", run.pair if len(run.pair) + 10 <= width else run.pair.replace("/", f"/\n{'':10}")),
-        ("tests", str(run.tests)),
-        ("computing", f"{brief(run.computed)} of simulations"),
-        ("decisions", f"{run.decisions} by hand" if run.decisions else "none by hand"),
-    ]
-    for name, words in facts:
-        text.append(f"\n{name:<10}", "not bold dim").append(words, "not bold")
-    text.append(f"\n\n{len(run.kept)} of {count(run.total, 'model')} left\n", "bold")
-    for name in run.kept[:MOST_NAMES]:
-        text.append(f"  {shortened(plain(name), max(8, width - 2))}\n", "not bold")
-    more = len(run.kept) - MOST_NAMES
-    return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")
-
-
-def in_few_lines(run: Recent) -> Text:
-    """What the table has no room for at 80 columns."""
-    text = Text(plain(run.path.stem), "bold")
-    said = run.trouble or "; ".join(part for part in (f"{run.sign} {run.state_words}", run.reason) if part)
-    text.append(f"\n{plain(said)}", "not bold")
+def about(run: Recent) -> Text:
+    text = Text(plain(run.path.stem), "bold").append(f"\n{plain(run.trouble)}" if run.trouble else "", "not bold")
     if run.trouble:
         return text
+    text.append(f"\n{run.sign} {run.state_words}{f'; {plain(run.reason)}' if run.reason else ''}", "not bold")
     text.append(f"\n{plain(run.scenario)} by {plain(run.algorithm)}, {plain(run.pair)}", "not bold")
-    return text.append(
-        f"\nleft: {first_of([plain(name) for name in run.kept], MOST_NAMES)}" if run.kept else "", "not bold dim"
-    )
+    text.append(f"\n{brief(run.computed)} of simulations, {count(run.decisions, 'decision')} by hand", "not bold")
+    left = first_of([plain(name) for name in run.kept], MOST_NAMES)
+    return text.append(f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim")
 
 
 def left_of(total: int, left: int) -> str:
@@ -123,8 +94,6 @@ FIRST: tuple[_Column, ...] = (
 MORE: tuple[_Column, ...] = (
     ("changed", 11, True, lambda run: moment(run.changed)),
     ("scenario", 16, False, lambda run: plain(run.scenario)),
-    ("started", 11, True, lambda run: moment(run.started)),
-    ("size", 8, True, lambda run: size(run.size)),
 )
 # By what the runs are sorted, in the order in which a key goes through it. Numbers and times begin with the most.
 ORDERS: dict[str, Callable[[Recent], Any]] = {
@@ -135,17 +104,10 @@ ORDERS: dict[str, Callable[[Recent], Any]] = {
     "left": lambda run: len(run.kept) if run.total else math.inf,
     "tests": lambda run: -run.tests,
     "cost": lambda run: -run.computed,
-    "started": lambda run: -run.started,
-    "size": lambda run: -run.size,
 }
 NARROWEST_NAME = 12
 # Each column has a space at both sides of its text.
 AROUND = 2
-
-
-def size(number: int) -> str:
-    """Bytes as 12 kB or 4.7 MB."""
-    return f"{number / 1000:.0f} kB" if number < 1e6 else f"{number / 1e6:.1f} MB"
 
 
 def moment(time: float) -> str:
@@ -178,7 +140,6 @@ class RunTable(DataTable[Text]):
 
     @property
     def chosen(self) -> Recent | None:
-        """The run under the cursor."""
         return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
 
     def show(self, runs: list[Recent], order: str) -> None:

@@ -67,12 +67,10 @@ class Choice:
 
     @property
     def models(self) -> int:
-        """How many models a reduction could remove."""
         return len(self.world.elements(frozenset(self.settings.protected)))
 
     @property
     def about(self) -> str:
-        """The words below the map."""
         from ddenv.world.load import SCENARIOS
 
         words = f"{self.models} models."

@@ -70,7 +70,6 @@ def _alike(data: Any, scenario: Scenario) -> bool:
 
 
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
-    """The line with the tests and the time of a whole reduction."""
     reduction = scenario.reduction
     # Another simulator does not say what took part.
     rough = rough_run(models, reduction, past.rate, slices=scenario.oracle is None)

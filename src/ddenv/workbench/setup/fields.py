@@ -16,12 +16,12 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
+from ddenv.runs import processor
 from ddenv.schemas import OURS, Kind, names, uses
 from ddenv.text import plain
 from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.form import Field
-from ddenv.workbench.setup.start_run import usual_jobs
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:
@@ -111,11 +111,10 @@ class OptionsForm(Vertical):
 
     def on_mount(self) -> None:
         self.watch(self.screen, "focused", self._mark)
-        self.query_one("#jobs", Input).value = str(usual_jobs())
+        self.query_one("#jobs", Input).value = str(processor.usable_cores())
         self.show_message("")
 
     def _mark(self, focused: Widget | None) -> None:
-        """Marks the form while the focus is in it."""
         within = focused is not None and self in focused.ancestors
         if within != self.has_class("-within"):
             # Its fields look the same with it.
@@ -126,13 +125,11 @@ class OptionsForm(Vertical):
 
     @property
     def method(self) -> tuple[str, str]:
-        """The chosen pair and algorithm."""
         algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in METHOD)
         return f"{partitioning}/{prioritization}", algorithm
 
     @property
     def texts(self) -> dict[str, str]:
-        """The texts of the fields, by id."""
         return self._unopened | {id: str(field.value) for id, field in self._fields()}
 
     def _fields(self) -> Iterator[tuple[str, Input | Select[str]]]:
@@ -150,7 +147,7 @@ class OptionsForm(Vertical):
         """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
         texts = form.texts_of(scenario) | dict(places or {})
         if form.problem(form.JOBS_FIELD, self.texts["jobs"]):
-            texts["jobs"] = str(usual_jobs())
+            texts["jobs"] = str(processor.usable_cores())
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
         for kind, name in names.items():
@@ -162,7 +159,6 @@ class OptionsForm(Vertical):
         self.post_message(self.Edited(place=True))
 
     def set_texts(self, texts: dict[str, str]) -> None:
-        """Fills in some of the fields."""
         self._unopened |= {id: text for id, text in texts.items() if id in self._unopened}
         for id, field in self._fields():
             if id in texts:
@@ -172,11 +168,9 @@ class OptionsForm(Vertical):
         self._show_problems()
 
     def show_fields(self, show: bool) -> None:
-        """The whole form; without the settings only the cost, the command, the name and Start."""
         self.query_one("#fields").display = self.query_one("#explained").display = show
 
     def suggest_name(self, name: str) -> None:
-        """Fills in a run name, unless the user gave one."""
         self._suggested = name
         if not self._name_given:
             field = self.query_one("#name", Input)
@@ -237,7 +231,6 @@ class OptionsForm(Vertical):
         self.query_one(f"#{id}").focus()
 
     def show_message(self, words: str) -> None:
-        """Shows `words` in place of all errors so far."""
         self._message = words
         self._problems.clear()
         self._show_problems()
@@ -273,7 +266,6 @@ class OptionsForm(Vertical):
 
     @on(Button.Pressed, "#more")
     def toggle_more(self) -> None:
-        """Shows or hides the rarely used settings."""
         self._show_more(not any(grid.display for grid in self.query("#advanced")))
 
     def _show_more(self, show: bool) -> None:

@@ -97,14 +97,12 @@ def value(field: Field, text: str) -> Value:
 
 
 def _wanted(field: Field) -> str:
-    """What an empty field asks for."""
     if field in PLACES:
         return f"press {'s for the start' if field in SPAWN else 'g for the goal'}, on the map"
     return f"type {field.setting.range}" if field.setting is not None and field.setting.range else "type one"
 
 
 def _out_of_range(field: Field, found: Value) -> str:
-    """What is allowed, if `found` is not."""
     if field.setting is not None:
         return "" if field.setting.allows(found) or isinstance(found, str) else field.setting.range
     if isinstance(found, float) and not abs(found) <= field.most:
@@ -122,19 +120,16 @@ def problem(field: Field, text: str) -> str:
 
 
 def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Value]:
-    """The values of all `fields` by id. Raises FieldError for the first wrong one."""
     return {field.id: value(field, texts.get(field.id, "")) for field in fields}
 
 
 def jobs(text: str) -> int:
-    """The number of tests at the same time. Raises FieldError."""
     number = value(JOBS_FIELD, text)
     assert isinstance(number, int)
     return number
 
 
 def text_of(value: Value) -> str:
-    """A value as the text of a field."""
     if isinstance(value, bool):
         return ON if value else OFF
     if isinstance(value, float):
@@ -152,7 +147,6 @@ def read_key(data: Mapping[str, Any], key: str) -> Any:
 
 
 def texts_of(scenario: Scenario) -> dict[str, str]:
-    """A scenario's settings as texts for the fields."""
     data = scenario.model_dump(mode="json")
     values = {field.id: read(data, field.setting) for field in ALL if field.key and field.setting}
     places = {field.id: read_key(data, field.key) for field in PLACES}

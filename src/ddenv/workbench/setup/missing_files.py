@@ -178,7 +178,6 @@ class MissingList(OptionList):
 
     @property
     def _here(self) -> list[str]:
-        """The URI of the missing file under the cursor."""
         place = self.highlighted
         return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
 

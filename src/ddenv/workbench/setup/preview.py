@@ -106,7 +106,6 @@ class Preview(Vertical):
         self._read(path, opened)
 
     def show_nothing(self, why: str) -> None:
-        """Shows `why` the world cannot be shown."""
         self.choice = None
         self.pick("")
         self.workers.cancel_group(self, "notes")
@@ -173,11 +172,9 @@ class Preview(Vertical):
 
     @property
     def asks(self) -> bool:
-        """Whether the chosen world has no start yet."""
         return self.choice is not None and self.choice.scenario is None and self.spawn is None
 
     def show_places(self) -> None:
-        """Shows the form's start and goal, on the map and in words, and what is wrong with the start."""
         if self.choice is not None:
             self._fill_z(self.choice)
             spawn, goal = self.spawn, self.goal
@@ -218,7 +215,6 @@ class Preview(Vertical):
 
     @on(WorldMap.PlacePicked)
     def _place_picked(self, event: WorldMap.PlacePicked) -> None:
-        """Fills in the form, and continues with the next missing place."""
         if self.choice is None or not self.picked_next:
             return
         if self.picked_next == "start":

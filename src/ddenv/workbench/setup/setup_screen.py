@@ -27,7 +27,7 @@ from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import OptionsForm
-from ddenv.workbench.setup.files import FileList, recent_files, remember
+from ddenv.workbench.setup.files import FileList, recent_files
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
@@ -112,8 +112,6 @@ class SetupScreen(Screen[None]):
         # Whether the choice is still being read, as is the first file when the screen opens.
         self._awaited = True
         self._past = Past()
-        # The file that the scenario was saved in, with the scenario in it.
-        self._saved: tuple[Path, Scenario] | None = None
         self._opened_now: Path | None = None
         self._keep_places = False
         self._busy = False
@@ -238,7 +236,6 @@ class SetupScreen(Screen[None]):
         self.preview.pick(what)
 
     def action_missing(self) -> None:
-        """To the rows of missing files, if there are any."""
         self._show_pane("map")
         (self.preview.missing if self.preview.missing.display else self.preview.map).focus()
 
@@ -251,7 +248,6 @@ class SetupScreen(Screen[None]):
         self._show_outcome()
 
     def _show_outcome(self) -> None:
-        """Shows the cost and the command for the form, or its error."""
         self.workers.cancel_group(self, "cost")
         cost, words, typed = "", "", True
         if self.preview.choice is not None or not self._awaited:
@@ -290,14 +286,14 @@ class SetupScreen(Screen[None]):
     def _command(self) -> list[str]:
         """The words of the command that does the same, empty if there is none. Raises UserError."""
         choice, jobs = self._chosen(), form.jobs(self.form.texts["jobs"])
-        source = self._saved if choice.run else (choice.path, choice.settings)
-        if source is None:
+        if choice.run:
             return []
-        bare, name = choice.scenario is None, self.form.own_name
-        return command_words(*source, self._scenario(), bare=bare, jobs=jobs, reading=choice.options, name=name)
+        own, bare, name = choice.settings, choice.scenario is None, self.form.own_name
+        return command_words(
+            choice.path, own, self._scenario(), bare=bare, jobs=jobs, reading=choice.options, name=name
+        )
 
     def action_copy(self) -> None:
-        """The whole command to the clipboard (OSC 52)."""
         try:
             words = self._command()
         except UserError as error:
@@ -379,23 +375,7 @@ class SetupScreen(Screen[None]):
     def _written(self, path: Path | None) -> None:
         if path is not None:
             self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
-            self._load_saved(path)
-
-    @work(thread=True, group="recent", exclusive=True)
-    def _load_saved(self, path: Path) -> None:
-        from ddenv.world.load import load_scenario
-
-        remember(path)
-        try:
-            saved = path, load_scenario(path)
-        except UserError as error:
-            call_if_open(self, self._complain, error)
-            return
-        call_if_open(self, self._keep_saved, saved)
-
-    def _keep_saved(self, saved: tuple[Path, Scenario]) -> None:
-        self._saved = saved
-        self._show_outcome()
+            self._opened(path)
 
     # Panes.
 
@@ -429,7 +409,6 @@ class SetupScreen(Screen[None]):
         self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
-        """Moves the focus to a pane, and shows it if only one fits."""
         self._show_pane(pane)
         self.query_one(HEADS[pane]).focus()
 

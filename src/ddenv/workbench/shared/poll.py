@@ -64,12 +64,10 @@ class Poll:
 
     @property
     def snapshot(self) -> Snapshot:
-        """What the last look saw."""
         return self._snapshot or Snapshot()
 
     @property
     def catching_up(self) -> bool:
-        """Whether there are more events than the last look read."""
         return self._catching_up
 
     def close(self) -> None:
@@ -122,7 +120,6 @@ class Poll:
         return replace(snapshot, behind=more, version=__version__)
 
     def _left(self, why: str) -> Snapshot:
-        """What was read last of a file that is gone."""
         error = f"{why}; what you see is what was read last"
         return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 

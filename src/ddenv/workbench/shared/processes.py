@@ -84,7 +84,6 @@ class Scene:
             self.trouble = f"the scene cannot be started: {error.strerror}"
 
     def show(self, wanted: Wanted) -> None:
-        """What it shows from now on, once it is on."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._ask()
@@ -133,7 +132,6 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def last_line(log: Path) -> str:
-    """The last line of a log that is not empty."""
     try:
         lines = log.read_text(errors="replace").splitlines()
     except OSError:

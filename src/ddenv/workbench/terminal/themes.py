@@ -53,7 +53,6 @@ ALIASES = {"textual-ansi": ANSI, "ansi_dark": ANSI, "ansi": ANSI, "dark": DARK.n
 
 
 def theme_names() -> tuple[str, ...]:
-    """The names of all themes, ddenv's first."""
     return (*(theme.name for theme in OURS), *sorted(BUILTIN_THEMES))
 
 

@@ -49,7 +49,6 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """All sentences, to be copied."""
         return " ".join(part for part in (self.sentence, *self.more) if part)
 
 
@@ -111,7 +110,6 @@ def _place(point: tuple[float, float]) -> str:
 
 
 def head(width: int) -> Text:
-    """What the columns of `row` are."""
     return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
 
 

@@ -58,7 +58,6 @@ class Look:
 
     @property
     def isolates(self) -> bool:
-        """Whether an engine is finding the nearest world that passes."""
         return self.works and self.state.isolating is not None
 
 
@@ -209,7 +208,6 @@ class WhyScreen(Screen[None]):
 
     @property
     def entry(self) -> Entry | None:
-        """What is under the cursor."""
         at = self.query_one("#why-list", OptionList).highlighted
         return self._entries[at] if at is not None and at < len(self._entries) else None
 
