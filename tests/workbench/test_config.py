@@ -44,7 +44,7 @@ def test_without_a_file_or_with_one_that_says_nothing_all_is_as_it_comes(tmp_pat
 
 
 def test_a_file_sets_theme_and_keys(config):
-    config("theme: textual-ansi\nnotify: no\nkeys: {run.pause: f8, map.left: 'h, ctrl+k', run.step: 7}")
+    config("theme: ansi-dark\nnotify: no\nkeys: {run.pause: f8, map.left: 'h, ctrl+k', run.step: 7}")
     assert read_config() == Config(ANSI, {"run.pause": "f8", "map.left": "h,ctrl+k", "run.step": "7"}, False)
 
 

@@ -16,7 +16,8 @@ from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.help.shortcuts import Help
-from ddenv.workbench.history import Compare, History
+from ddenv.workbench.help.side_by_side import SideBySide
+from ddenv.workbench.history import History
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
@@ -162,7 +163,7 @@ async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(
 
 def test_every_binding_has_an_id_and_a_tooltip():
     owners = (RunScreen, WorldMap, Workbench, Quit, SceneDialog, Method, SetupScreen, History)
-    owners += (Compare, Question, ChooseModels, Change, Layers, Pick)
+    owners += (SideBySide, Question, ChooseModels, Change, Layers, Pick)
     bindings = [binding for owner in owners for binding in owner.BINDINGS]
     assert all(binding.id and binding.tooltip for binding in bindings)
     assert len({binding.id for binding in bindings}) == len(bindings)

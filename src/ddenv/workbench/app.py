@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from ddenv.workbench.map.world_map import WorldMap
 
 BELL = "\x07"
-# New objects until garbage is collected, then how often until older ones are looked through, too.
-THRESHOLDS = (20_000, 20, 20)
 # The keys that move the focus, with Textual's actions for them.
 TABS = {"tab": "app.focus_next", "shift+tab": "app.focus_previous"}
 
@@ -67,17 +65,6 @@ def _commands() -> type[Provider]:
     from ddenv.workbench.help.command_palette import Commands
 
     return Commands
-
-
-def _collect_from_now() -> None:
-    """Collects garbage again, but not in what there is already: looking through it takes longer than to answer a key.
-
-    Python looks through all the rest far too often where most is left out, so it begins with more new objects. Without this the
-    slowest keys (p95) take twice as long.
-    """
-    gc.freeze()
-    gc.set_threshold(*THRESHOLDS)
-    gc.enable()
 
 
 class Workbench(App[int]):
@@ -175,18 +162,13 @@ class Workbench(App[int]):
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
         if not self.is_headless:
-            self.call_after_refresh(_collect_from_now)
+            # Looking for garbage in what there is already takes longer than to answer a key.
+            self.call_after_refresh(gc.freeze)
 
     def notify(self, message: str, **options: Any) -> None:
         """As every app, but at most one notice is shown."""
         self.clear_notifications()
         super().notify(message, **options)
-
-    def action_help_quit(self) -> None:
-        """What ctrl+c says: in a terminal it should end nothing by mistake."""
-        self.notify("ctrl+q quits; an engine keeps running", timeout=3)
-
-    # The screens.
 
     def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson | ShowRace) -> Screen[Any]:
         if isinstance(asked, ShowRun):
@@ -283,8 +265,6 @@ class Workbench(App[int]):
 
     async def action_quit(self) -> None:
         self.action_leave()
-
-    # The terminal.
 
     def on_unmount(self) -> None:
         self._write("\x1b[23;2t")

@@ -30,21 +30,18 @@ def run_workbench(
 
     It opens on the screen `first`, on `run`, on the setup screen with a scenario's or a world's `file`, or on the setup screen.
     """
-    # What is made until the first paint stays: looking through it for garbage would only delay that. The app goes on with it.
-    gc.disable()
-    try:
-        from ddenv.workbench.app import Workbench
-        from ddenv.workbench.config import read_config
-        from ddenv.workbench.terminal.themes import fitting
+    # With the usual ones the slowest keys take twice as long.
+    gc.set_threshold(20_000, 20, 20)
+    from ddenv.workbench.app import Workbench
+    from ddenv.workbench.config import read_config
+    from ddenv.workbench.terminal.themes import fitting
 
-        config = read_config()
-        app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
-        check_terminal()
-        if not config.theme:
-            app.theme = fitting(app.console.color_system)
-        result = app.run()
-    finally:
-        gc.enable()
+    config = read_config()
+    app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
+    check_terminal()
+    if not config.theme:
+        app.theme = fitting(app.console.color_system)
+    result = app.run()
     return result if isinstance(result, int) else app.return_code or 0
 
 

@@ -183,8 +183,6 @@ class LineMode:
         for words in lines:
             print(printable(words), file=self._out, flush=True)
 
-    # What is typed.
-
     @property
     def _situation(self) -> Situation:
         snapshot = self._poll.snapshot

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from rich.table import Table
 from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import ActiveBinding, Binding
+from textual.binding import ActiveBinding
 from textual.containers import VerticalScroll
 from textual.dom import DOMNode
 from textual.screen import ModalScreen, Screen
@@ -18,6 +18,7 @@ from textual.widgets import Static
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.key_names import shown
+from ddenv.workbench.shared.bindings import keys
 
 _FOCUS = "to the next or previous pane, field or button"
 _LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"
@@ -140,9 +141,9 @@ class Reading(ModalScreen[None]):
 class Help(Reading):
     """Every key with what it does: those of the focused pane first."""
 
-    BINDINGS: ClassVar = [
-        Binding("escape,question_mark,q,enter,f1", "dismiss", "close", id="help.close", tooltip="close this dialog"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "help", ("close", "escape,question_mark,q,enter,f1", "dismiss", "close", "close this dialog")
+    )
 
     def __init__(self, groups: Iterable[Group]) -> None:
         self.groups = tuple(groups)

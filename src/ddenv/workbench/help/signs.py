@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from textual.binding import Binding
-
 from ddenv.runfile import branches
 from ddenv.words.signs import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, OF_WAYS
+from ddenv.workbench.shared.bindings import keys
 
 Signs = tuple[tuple[str, str], ...]
 
@@ -59,9 +58,7 @@ def _joined(meanings: dict[str, str]) -> Signs:
 class SignsDialog(Reading):
     """All signs with their meanings."""
 
-    BINDINGS: ClassVar = [
-        Binding("escape,k,q,enter", "dismiss", "close", id="signs.close", tooltip="close this dialog"),
-    ]
+    BINDINGS: ClassVar = keys("signs", ("close", "escape,k,q,enter", "dismiss", "close", "close this dialog"))
 
     def __init__(self) -> None:
         super().__init__("Signs", signs().items())

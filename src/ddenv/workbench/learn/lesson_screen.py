@@ -118,8 +118,6 @@ class LessonScreen(LearnScreen[bool]):
     def on_unmount(self) -> None:
         self._file.close()
 
-    # What is shown.
-
     def _show(self) -> None:
         self._show_run()
         course, page = self.course, self.course.page
@@ -210,8 +208,6 @@ class LessonScreen(LearnScreen[bool]):
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._show)
-
-    # What is done.
 
     def action_on(self) -> None:
         if self.query_one(LessonPane).read_on():

@@ -137,8 +137,6 @@ class RaceScreen(LearnScreen[None]):
         for pane in self._panes:
             pane.map.display = maps
 
-    # What is shown.
-
     def _show(self) -> None:
         race = self.race
         for pane in self._panes:
@@ -154,8 +152,6 @@ class RaceScreen(LearnScreen[None]):
         if race.over:
             said.append("\n").append("\n".join(map(plain, result(race.plays))), "bold not dim")
         self.query_one("#race-said", Static).update(said)
-
-    # What is done.
 
     def _tick(self) -> None:
         if not self.race.go(self.race.at + 1) or self.race.over:

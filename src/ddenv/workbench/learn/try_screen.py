@@ -73,8 +73,6 @@ class TryScreen(LearnScreen[None]):
         self._show()
         self.read_world(self._run, [self._map])
 
-    # What is shown.
-
     def _show(self) -> None:
         attempt = self.attempt
         self._map.show(snapshot_of(self._base, attempt.held), None)
@@ -133,8 +131,6 @@ class TryScreen(LearnScreen[None]):
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._show)
-
-    # What is done.
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action == "on":

@@ -167,8 +167,6 @@ class Playback(Screen[None]):
     def on_resize(self) -> None:
         self.call_after_refresh(self._show_legend)
 
-    # The tests.
-
     def _take(self, numbers: Sequence[int]) -> None:
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
@@ -211,8 +209,6 @@ class Playback(Screen[None]):
         )
         self.query_one("#playback-header", Static).update(header)
         self._show()
-
-    # The instant.
 
     def _tick(self) -> None:
         at = now()
@@ -258,8 +254,6 @@ class Playback(Screen[None]):
     def _go(self, time: float) -> None:
         self.playing.go(time)
         self._show()
-
-    # The keys.
 
     def action_play(self) -> None:
         self._ticked = now()

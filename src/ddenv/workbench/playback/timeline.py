@@ -89,8 +89,6 @@ class Timeline(Widget):
         text.stylize("bold", SIGN, SIGN + now + 1)
         return text.append(f" {outcome(test)[: self._words]}", "not bold")
 
-    # The mouse.
-
     def _time(self, x: int) -> float:
         return max(0.0, min(1.0, (x - SIGN) / (self._room - 1))) * self.shown.length
 

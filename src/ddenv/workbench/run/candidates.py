@@ -68,8 +68,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._snapshot = Snapshot()
         self._listed = Listed()
 
-    # What is listed.
-
     @property
     def item(self) -> Item | None:
         """What the row under the cursor is about, also in the tables of the baseline and of a certificate."""
@@ -106,8 +104,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def follow(self) -> None:
         self.following = True
         self.post_message(self.Chosen())
-
-    # Keys and mouse.
 
     def action_move(self, rows: int) -> None:
         self._by_hand(self.cursor_row + rows)

@@ -15,6 +15,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from ddenv.runfile.failures import OtherFailure
 from ddenv.runfile.position import Chapter
 from ddenv.schemas import Kind
 from ddenv.text import count, plain
@@ -134,6 +135,17 @@ def ssh_line(url: str) -> str:
     """The command that makes the scene of this machine reachable from another one."""
     port = urlsplit(url).port
     return f"ssh -L {port}:127.0.0.1:{port} {getpass.getuser()}@{socket.gethostname()}"
+
+
+def failures(found: Sequence[OtherFailure]) -> Pick:
+    """The list of other failures that the tests met, each with the smallest environment that showed it."""
+
+    def line(failure: str, tests: str, smallest: str) -> Text:
+        return Text(f"{failure:<36}{tests:>7}   {smallest}", no_wrap=True)
+
+    lines = [line(one.name, str(len(one.tests)), f"{count(one.size, 'model')} (test {one.smallest})") for one in found]
+    head = line("failure", "tests", "smallest environment")
+    return Pick("Other failures met", "reduces it in a branch", lines, head=head)
 
 
 def rounds(chapters: Sequence[Chapter], at: int | None) -> Pick:

@@ -13,6 +13,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import FreshRuns
 from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
+from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name
@@ -21,13 +22,15 @@ from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Layers, copied
-from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, rounds
+from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, failures, rounds
 from ddenv.workbench.run.facts import FactsDialog
-from ddenv.workbench.run.failures_dialog import FailuresMet
 from ddenv.workbench.shared.background import is_open
 
 if TYPE_CHECKING:
     from ddenv.workbench.run.run_screen import RunScreen
+
+# The maximum number of other failures in a list.
+LISTED = 200
 
 
 class Opening:
@@ -72,15 +75,19 @@ class Opening:
                 # The history asked the question already.
                 self._asking.ask(GoBack(node), sure=True)
 
-        self._screen.app.push_screen(History(lambda: self._asking.situation, self._screen.world.place), chosen)
+        self._screen.app.push_screen(History(lambda: self._asking.situation), chosen)
 
     def failures(self) -> None:
-        def chosen(test: int | None) -> None:
-            if test is not None:
-                # The list asked the question already.
-                self._asking.ask(AcceptOther(test, instead=True), sure=True)
+        found = atlas(self._poll.snapshot.state)[:LISTED]
+        if not found:
+            self._asking.refuse("no test shows a failure other than f")
+            return
 
-        self._screen.app.push_screen(FailuresMet(lambda: self._asking.situation), chosen)
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._asking.ask(AcceptOther(found[row].smallest, instead=True))
+
+        self._screen.app.push_screen(failures(found), chosen)
 
     def rounds(self) -> None:
         position = self._screen.browsing.position
@@ -176,8 +183,6 @@ class Opening:
             dialog.refresh_address()
         elif self._scene.trouble:
             self._screen.notify(self._scene.trouble, severity="error", markup=False)
-
-    # Out of the workbench.
 
     def detach(self) -> None:
         works = "The engine goes on" if self._poll.snapshot.engine != "absent" else "No engine is running"

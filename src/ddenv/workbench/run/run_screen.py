@@ -137,10 +137,8 @@ class RunScreen(Screen[None]):
         if self.poll.snapshot.engine == "alive":
             self.engine.seen_at_work()
         self.asking.show_refusal(before)
-        if live:
-            self.asking.show_verdicts(before)
-            if why := worth_a_look(before, self.poll.snapshot):
-                self.post_message(Attention(plain(self.run.stem), why))
+        if live and (why := worth_a_look(before, self.poll.snapshot)):
+            self.post_message(Attention(plain(self.run.stem), why))
 
     def _show(self, changed: bool) -> None:
         if changed:

@@ -22,12 +22,6 @@ from ddenv.workbench.shared.poll import Poll
 
 # Why no key guides the run at an earlier moment.
 NOT_NOW = "this is an earlier moment of the run: escape comes back to now"
-NO_MORE = {
-    "moment": "the run begins here",
-    "round": "there is no round before this one",
-    "reduction": "there is no reduction before this moment",
-    "decision": "there is no verdict before this moment",
-}
 # Paths of tests that are kept.
 PATHS = 16
 # How often the run file is read, s.
@@ -55,7 +49,7 @@ class Browsing:
         """Goes on or back. Returns why that is not possible, or "". Raises UserError for a damaged file."""
         if self.position.step(what, by):
             return ""
-        return NO_MORE[what] if by < 0 else "this is now already"
+        return f"there is no {what} before this moment" if by < 0 else "this is now already"
 
     @property
     def snapshot(self) -> Snapshot:

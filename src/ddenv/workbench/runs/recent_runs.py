@@ -62,13 +62,8 @@ class Recent:
         return STATUS.get(self.status, ("", self.status or "..."))[1]
 
     @property
-    def words(self) -> str:
-        word = "cannot be read" if self.trouble else STATUS.get(self.status, ("", self.status))[1]
-        return f"{self.brief} {word}".strip()
-
-    @property
     def brief(self) -> str:
-        """How many models are left, for a list in which its state has no room beside its sign."""
+        """How many models are left, for a list in which its sign is its state."""
         return f"{len(self.kept)}/{self.total}" if self.total else ""
 
     @property

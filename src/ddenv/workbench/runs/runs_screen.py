@@ -22,6 +22,7 @@ from ddenv.runs.folder import SUFFIX
 from ddenv.text import count, plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
 from ddenv.workbench.shared.background import call_if_open, is_open
@@ -284,9 +285,9 @@ class RunsScreen(Screen[None]):
             if run.path == marked.path:
                 self._complain("this is the marked run: go to another one")
             else:
-                from ddenv.workbench.runs.compare_runs import CompareRuns
+                from ddenv.workbench.runs.compare_runs import lines
 
-                self.app.push_screen(CompareRuns(marked, run))
+                self.app.push_screen(SideBySide("Two runs side by side", lines(marked, run)))
 
     # A run elsewhere, the filter, and the way back.
 

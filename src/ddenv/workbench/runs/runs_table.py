@@ -47,20 +47,12 @@ class RunList(OptionList):
         if self.highlighted is None and self._runs:
             self.highlighted = 0
 
-    def on_resize(self) -> None:
-        at = self.highlighted
-        if self._runs:
-            self._show(list(self._runs.values()))
-            self.highlighted = at
-
     def _show(self, runs: list[Recent]) -> None:
         self._runs = {str(run.path): run for run in runs}
         self.clear_options()
-        width = self.scrollable_content_region.width or self.app.size.width
         for run in runs:
             text = Text(f"{run.sign} {plain(run.path.stem)}", no_wrap=True, overflow="ellipsis")
-            words = run.words if text.cell_len + len(run.words) + 2 <= width else run.brief
-            self.add_option(Option(text.append(f"  {words}" if words else "", "dim"), id=str(run.path)))
+            self.add_option(Option(text.append(f"  {run.brief}", "dim"), id=str(run.path)))
         if not runs:
             self.add_option(Option(Text("none yet", "dim"), disabled=True))
 
@@ -76,17 +68,11 @@ def about(run: Recent) -> Text:
     return text.append(f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim")
 
 
-def left_of(total: int, left: int) -> str:
-    """How many models are left, in a column of 10 cells where they are thousands, too."""
-    words = f"{left} of {total}" if total else ""
-    return words if len(words) <= 10 else f"{left}/{total}"
-
-
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
-    ("left", 10, True, lambda run: left_of(run.total, len(run.kept))),
+    ("left", 10, True, lambda run: run.brief),
     ("tests", 6, True, lambda run: str(run.tests) if run.total else ""),
     ("cost", 7, True, lambda run: brief(run.computed) if run.total else ""),
 )

@@ -85,7 +85,7 @@ def value(field: Field, text: str) -> Value:
     if field.empty and text in ("", field.empty):
         return None
     if not text:
-        raise FieldError(field.id, f"{field.label}: is missing; {_wanted(field)}")
+        raise FieldError(field.id, f"{field.label}: is missing")
     try:
         found = str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
@@ -94,12 +94,6 @@ def value(field: Field, text: str) -> Value:
     if allowed := _out_of_range(field, found):
         raise FieldError(field.id, f"{field.label}: expected {allowed}, found {text[:40]}")
     return found
-
-
-def _wanted(field: Field) -> str:
-    if field in PLACES:
-        return f"press {'s for the start' if field in SPAWN else 'g for the goal'}, on the map"
-    return f"type {field.setting.range}" if field.setting is not None and field.setting.range else "type one"
 
 
 def _out_of_range(field: Field, found: Value) -> str:

@@ -23,8 +23,10 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
 from ddenv.text import plain
+from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.moving import RobotWay, without
@@ -33,7 +35,6 @@ from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
-from ddenv.workbench.why.margins_dialog import MarginsDialog
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
@@ -137,8 +138,6 @@ class WhyScreen(Screen[None]):
         self.map.set_place(place, notice)
         self._show_entry()
 
-    # What is known.
-
     def _look(self) -> None:
         """Reads all again once there is another certificate, or another nearest world that passes."""
         now = self._look_at()
@@ -204,8 +203,6 @@ class WhyScreen(Screen[None]):
         options.highlighted = min(at, len(self._entries) - 1)
         self._show_entry()
 
-    # What is shown.
-
     @property
     def entry(self) -> Entry | None:
         at = self.query_one("#why-list", OptionList).highlighted
@@ -240,8 +237,6 @@ class WhyScreen(Screen[None]):
         ways = tuple(RobotWay(each, name).whole for each, name in zip(found, one.ways, strict=True) if each.rows)
         return (ways if len(ways) == 2 else ()), tuple(lacks)
 
-    # The keys.
-
     def action_play(self) -> None:
         one = self.entry
         if one is None or one.parting is None:
@@ -272,3 +267,30 @@ class WhyScreen(Screen[None]):
 
     def _refuse(self, why: str) -> None:
         self.notify(plain(why), severity="warning", timeout=4, markup=False)
+
+
+class MarginsDialog(Reading):
+    """The margins that `state` has. `run` is what a shell calls the run."""
+
+    BINDINGS: ClassVar = keys("margins", ("close", "escape,m,q,enter", "dismiss", "close", "close this dialog"))
+
+    def __init__(self, state: RunState, run: str) -> None:
+        known = state.margins
+        found = () if known is None else rows(known)
+        lines = []
+        for one in found:
+            name, now, until, goal, runs = map(plain, one.cells)
+            lines += [
+                (name, bar(one.margin, 41)),
+                ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
+            ]
+        groups = [("How far each number may change before f goes", lines)]
+        if not lines:
+            groups = [
+                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number may change")])
+            ]
+        if known is not None and found:
+            groups += [
+                ("What this says", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
+            ]
+        super().__init__("Margins", groups)
