@@ -72,7 +72,7 @@ def test_what_is_wrong_is_told_with_its_place(config, text, told):
     path = config(text)
     with pytest.raises(UserError) as error:
         read_config()
-    assert str(error.value).startswith(f"{path}: ")
+    assert str(error.value).startswith(f"{path}:")
     assert told in str(error.value)
 
 

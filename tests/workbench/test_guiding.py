@@ -193,7 +193,7 @@ async def test_a_notice_hides_no_dialog_and_goes_at_the_next_key(run):
         assert isinstance(session.app.screen, Quit)
         for number in range(5):
             session.screen.asking.say(f"notice {number}")
-        await session.pilot.pause()
+            await session.pilot.pause()
         assert not any(toast.display for toast in session.app.screen.query("Toast"))
         # The latest one is enough: the log has all.
         assert [notice.message for notice in session.app._notifications] == ["notice 4"]

@@ -143,33 +143,25 @@ def read_config() -> Config:
 def lines() -> list[str]:
     """The file, the theme, whether the terminal rings, and every action with its keys. Raises UserError for an invalid file."""
     config, path = read_config(), config_path()
-    chosen = config.theme or f"{DARK.name}, or ansi-dark where the terminal has 16 colours"
     found = [
         f"file    {path}{'' if path.exists() else ' (does not exist; ddenv config --example prints one)'}",
-        f"theme   {chosen}",
+        f"theme   {config.theme or f'{DARK.name}, or ansi-dark where the terminal has 16 colours'}",
         f"themes  {', '.join(theme_names())}",
         f"notify  {'yes' if config.notify else 'no'}",
+        "",
     ]
-    width = max(len(id) for id in actions())
     keys = {id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()}
-    room = max(len(key) for key in keys.values())
-    for group in _sections().values():
-        found.append("")
-        for id, action in group:
-            changed = "*" if id in config.keys else " "
-            found.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
+    width, room = (max(map(len, words)) for words in (keys, keys.values()))
+    for id, action in actions().items():
+        found.append(f"{'*' if id in config.keys else ' '} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
     return [*found, "", "* is your own key"] if config.keys else found
 
 
 def example_lines() -> list[str]:
     """An example file that changes nothing: every action is a comment."""
     begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
-    found = begin.splitlines()
-    for section, group in _sections().items():
-        found.append(f"  # {section}")
-        for id, action in group:
-            found.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
-    return found
+    keys = {id: _quoted(_written(",".join(action.keys))) for id, action in actions().items()}
+    return [*begin.splitlines(), *(f"  # {id}: {keys[id]}  # {action.words}" for id, action in actions().items())]
 
 
 def _written(keys: str) -> str:
@@ -178,10 +170,3 @@ def _written(keys: str) -> str:
 
 def _quoted(keys: str) -> str:
     return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
-
-
-def _sections() -> dict[str, list[tuple[str, Action]]]:
-    groups: dict[str, list[tuple[str, Action]]] = {}
-    for id, action in actions().items():
-        groups.setdefault(id.split(".")[0], []).append((id, action))
-    return groups

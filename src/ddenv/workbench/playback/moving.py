@@ -39,9 +39,9 @@ class RobotWay:
         return None if pose is None else pose.position[:2]
 
 
-def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...], letters: tuple[int, ...] = ()) -> Snapshot:
+def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
     """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
-    round = Round(0, len(groups), Split(there, groups, letters=letters), PersistentTuple()) if groups else None
+    round = Round(0, len(groups), Split(there, groups), PersistentTuple()) if groups else None
     bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
     return Snapshot(bare, past=True)
 

@@ -11,44 +11,32 @@ from urllib.parse import urlsplit
 from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from ddenv.runfile.failures import OtherFailure
 from ddenv.runfile.position import Chapter
-from ddenv.schemas import Kind
 from ddenv.text import count, plain
 from ddenv.words.methods import chosen, note, paragraph
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.pick import Pick
+from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.processes import Scene
 from ddenv.workbench.widgets.question import Choice
 
 
-class Method(ModalScreen[None]):
+class Method(Reading):
     """Algorithm, partitioning and prioritization of a run, each with its explanation."""
 
-    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = keys("method", ("close", "escape,e,q,enter", "dismiss", "close", "close this dialog"))
 
     def __init__(self, algorithm: str, pair: str) -> None:
-        super().__init__()
-        self._algorithm, self._pair = algorithm, pair
-
-    def compose(self) -> ComposeResult:
-        with Framed("How this run is reduced", "escape closes", classes="dialog reading"), VerticalScroll():
-            yield Static(self._words(), markup=False)
-
-    def _words(self) -> Text:
-        return Text("\n\n").join(self._paragraph(*each) for each in chosen(self._algorithm, self._pair).items())
-
-    def _paragraph(self, kind: Kind, name: str) -> Text:
-        text = Text(f"{kind} ").append(plain(name), "bold").append("\n")
-        if unused := note(kind, self._algorithm):
-            text.append(unused, "bold").append(" ")
-        return text.append(paragraph(kind, name))
+        groups = []
+        for kind, name in chosen(algorithm, pair).items():
+            said = (note(kind, algorithm), paragraph(kind, name))
+            groups.append((f"{kind} {plain(name)}", [("", words) for words in said if words]))
+        super().__init__("How this run is reduced", groups)
 
 
 class Quit(Choice):

@@ -217,10 +217,10 @@ class OptionsForm(Vertical):
 
     def complain(self, error: UserError) -> None:
         """Shows an error below the fields, until it is corrected; the wrong field is marked and gets the cursor."""
-        id = form.field_of(error)
-        if id is None:
+        if not isinstance(error, form.FieldError):
             self.show_message(f"{MARK}{error}")
             return
+        id = error.field
         if FIELDS[id] in form.ADVANCED:
             self._show_more(True)
         self._message, self._problems = "", {id: str(error)} | self._problems | {id: str(error)}
@@ -252,14 +252,12 @@ class OptionsForm(Vertical):
 
     def _check_again(self, id: str) -> None:
         """An error goes away as soon as its field is right."""
-        spoiled = [each for each in form.together(id) if each in self._problems]
-        for each in spoiled:
-            if wrong := form.problem(FIELDS[each], self.texts[each]):
-                self._problems[each] = wrong
-            else:
-                del self._problems[each]
-        if spoiled or self._message:
+        if id in self._problems or self._message:
             self._message = ""
+            if wrong := form.problem(FIELDS[id], self.texts[id]):
+                self._problems[id] = wrong
+            else:
+                self._problems.pop(id, None)
             self._show_problems()
 
     # Actions.

@@ -170,21 +170,3 @@ def numbers(fields: tuple[Field, ...], texts: Mapping[str, str]) -> tuple[float,
         return tuple(float(number) for number in values(fields, texts).values() if number is not None)
     except FieldError:
         return None
-
-
-def field_of(error: UserError) -> str | None:
-    """The field for an error about a scenario's key, if there is one."""
-    if isinstance(error, FieldError):
-        return error.field
-    message = str(error)
-    for field in ALL:
-        if field.key and f" {field.key}:" in f" {message}":
-            return field.id
-    if message.startswith("spawn ("):
-        return "spawn_x"
-    return NAME.id if "exists already" in message else None
-
-
-def together(id: str) -> tuple[str, ...]:
-    """The fields whose errors a change of one field may correct: the robot stands where all numbers of the spawn say."""
-    return tuple(field.id for field in SPAWN) if id.startswith("spawn") else (id,)

@@ -248,27 +248,16 @@ class SetupScreen(Screen[None]):
         self._show_outcome()
 
     def _show_outcome(self) -> None:
-        self.workers.cancel_group(self, "cost")
         cost, words, typed = "", "", True
         if self.preview.choice is not None or not self._awaited:
             try:
                 scenario, command = self._scenario(), self._command()
                 words, typed = shlex.join(command) or NO_COMMAND, bool(command)
-                self._reckon(scenario, self._chosen().models, form.jobs(self.form.texts["jobs"]), self._past)
+                cost = whole_cost(scenario, self._chosen().models, form.jobs(self.form.texts["jobs"]), self._past)
             except UserError as error:
                 cost = f"not ready: {error}"
-        if cost or not words:
-            self.form.show_cost(cost)
+        self.form.show_cost(cost)
         self.form.tell_command(words, typed)
-
-    @work(thread=True, group="cost", exclusive=True)
-    def _reckon(self, scenario: Scenario, models: int, jobs: int, past: Past) -> None:
-        from textual.worker import get_current_worker
-
-        worker = get_current_worker()
-        cost = whole_cost(scenario, models, jobs, past)
-        if not worker.is_cancelled:
-            call_if_open(self, self.form.show_cost, cost)
 
     def _scenario(self) -> Scenario:
         choice, (pair, algorithm) = self._chosen(), self.form.method
@@ -356,7 +345,7 @@ class SetupScreen(Screen[None]):
 
     def _complain(self, error: UserError) -> None:
         self._busy = False
-        if form.field_of(error) not in (None, form.NAME.id):
+        if isinstance(error, form.FieldError) and error.field != form.NAME.id:
             self._show_pane("settings")
         self.form.complain(error)
 

@@ -56,20 +56,9 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
     found = reasons(file, state) if current(state) is not None else ()
     listed = found[:LISTED]
-    letters, listed = _lettered(state, listed)
-    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed), letters)
-    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in zip(letters, listed, strict=True))
+    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
+    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
     return (*models, *_nearest(file, state)), len(found) - len(listed)
-
-
-def _lettered(state: RunState, listed: Sequence[Reason]) -> tuple[tuple[int, ...], tuple[Reason, ...]]:
-    """The models in the order of their letters: those of the map of the run, if each is a part of its last round."""
-    of_run = {} if state.round is None else state.round.split.letter_of
-    letters = tuple(of_run.get(each.without, -1) for each in listed)
-    if len({*letters, -1}) <= len(letters):
-        return tuple(range(len(listed))), tuple(listed)
-    order = sorted(range(len(listed)), key=letters.__getitem__)
-    return tuple(letters[place] for place in order), tuple(listed[place] for place in order)
 
 
 def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
