@@ -91,7 +91,7 @@ async def test_keys_that_only_look(run):
         assert world.selection == {"crate_03"}
         assert "1 selected" in session.text("#map-lines")
         await session.press("l", "down", "space", "escape")
-        assert "removed" not in world.shown_layers
+        assert "removed" not in world.shown.layers
         await session.press("y", "enter")
         assert session.app.clipboard.split() == run.elements[:5]
         await session.press("y", "down", "down", "enter")

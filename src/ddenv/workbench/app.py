@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rich.text import Text
 from textual import events, on
 from textual.app import App, ComposeResult
-from textual.binding import Binding
 from textual.command import Provider
 from textual.geometry import Size
 from textual.screen import Screen
@@ -28,8 +27,8 @@ if TYPE_CHECKING:
     from ddenv.workbench.map.world_map import WorldMap
 
 BELL = "\x07"
-# The keys that move the focus, with Textual's actions for them.
-TABS = {"tab": "app.focus_next", "shift+tab": "app.focus_previous"}
+# Textual's actions that move the focus.
+TABS = {"app.focus_next": Screen.focus_next, "app.focus_previous": Screen.focus_previous}
 
 
 def classes_at(screen: type[Screen[Any]], size: Size) -> str:
@@ -135,16 +134,12 @@ class Workbench(App[int]):
         """
         if isinstance(event, events.Key) and not event.is_forwarded:
             self.clear_notifications()
-        if isinstance(event, events.Key) and event.key in TABS and self.app_focus and not self._is_bound(event.key):
-            (self.screen.focus_next if event.key == "tab" else self.screen.focus_previous)()
+        tab = isinstance(event, events.Key) and event.key in ("tab", "shift+tab") and self.app_focus
+        bound = self.screen.active_bindings.get(event.key) if tab else None
+        if bound is not None and bound.binding.action in TABS:
+            TABS[bound.binding.action](self.screen)
         else:
             await super().on_event(event)
-
-    def _is_bound(self, key: str) -> bool:
-        nodes = (self.focused or self.screen).ancestors_with_self
-        bound = (each for node in nodes for each in Binding.make_bindings(node.BINDINGS) if each.key == key)
-        own = any(key in keys.split(",") for keys in self._own_keys.values())
-        return own or any(each.action != TABS[key] for each in bound)
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
@@ -270,7 +265,6 @@ class Workbench(App[int]):
         self._write("\x1b[23;2t")
 
     def watch_title(self, title: str) -> None:
-        """The terminal's title; saved before and restored after."""
         self._write(f"\x1b]2;{plain(title)}\x07")
 
     @on(Attention)

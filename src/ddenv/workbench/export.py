@@ -106,7 +106,6 @@ class ExportScreen(ModalScreen[None]):
 
     @on(Input.Changed)
     def _forget(self) -> None:
-        """Asks again before other files are replaced."""
         self._agreed = frozenset()
         self.query_one("#export-write", Button).label = "Write"
 
@@ -185,7 +184,6 @@ class ExportScreen(ModalScreen[None]):
 
 
 def suggested(run: Path, world: Path = Path()) -> tuple[str, ...]:
-    """Names for what can be written of a run of `world`, in the order of `KINDS`."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
     return (
         f"{stem}.minimal{ending_of(world)}",

@@ -68,8 +68,7 @@ class History(Screen[int | None]):
             with Framed("What you decided", id="past-decisions", classes="panel"):
                 yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         yield Static("", id="about", markup=False)
-        shown = ids("history", "go mark compare help close")
-        yield KeyFooter(shown, shown)
+        yield KeyFooter(ids("history", "help close go mark compare"))
 
     def on_mount(self) -> None:
         table = self.query_one(DataTable)
@@ -170,7 +169,6 @@ def compare(first: Node, second: Node) -> tuple[tuple[str, ...], tuple[str, ...]
 
 
 def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]]:
-    """What two environments are, and the models that are in both, or in only one of them."""
     yield "environment", place(first), place(second)
     yield "method", plain(first.method), plain(second.method)
     yield "own tests", str(first.own_tests), str(second.own_tests)

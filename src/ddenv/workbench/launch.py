@@ -26,10 +26,7 @@ def run_workbench(
     file: Path | None = None,
     first: ShowLessons | ShowLesson | ShowRace | None = None,
 ) -> int:
-    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal.
-
-    It opens on the screen `first`, on `run`, on the setup screen with a scenario's or a world's `file`, or on the setup screen.
-    """
+    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
     # With the usual ones the slowest keys take twice as long.
     gc.set_threshold(20_000, 20, 20)
     from ddenv.workbench.app import Workbench

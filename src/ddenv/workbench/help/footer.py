@@ -12,6 +12,8 @@ from textual.screen import Screen
 
 from ddenv.workbench.help.hints import Keys, pressing
 
+LAST = (".help", ".quit", ".close", ".back")
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -28,29 +30,17 @@ class Entry:
 
 
 class KeyFooter(Keys):
-    """Shows bindings by id. `shown` is their order on the screen, `first` their priority if not all fit.
+    """Shows bindings by their ids, those `first` that matter most if not all fit.
 
-    Where `instead` returns ids, these are shown in their place, in this order: a pane with the focus has keys of its own.
-    It is one widget, since the focus moves often and the keys change with it.
+    Where `instead` returns ids, these are shown in their place: a pane with the focus has keys of its own.
     """
 
     ALLOW_SELECT = False
     auto_links = False
-    DEFAULT_CSS = """
-    KeyFooter {
-        dock: bottom;
-        height: 1;
-        color: $footer-description-foreground;
-        background: $footer-background;
-    }
-    """
 
-    def __init__(
-        self, shown: Sequence[str], first: Sequence[str], instead: Callable[[], Sequence[str]] = tuple
-    ) -> None:
+    def __init__(self, first: Sequence[str], instead: Callable[[], Sequence[str]] = tuple) -> None:
         super().__init__()
-        self._instead = instead
-        self._order, self._first = tuple(shown), tuple(first)
+        self._first, self._instead = first, instead
         self._words: dict[str, tuple[str, str]] = {}
         self.entries: tuple[Entry, ...] = ()
         self._due = False
@@ -83,8 +73,7 @@ class KeyFooter(Keys):
         active = {each.binding.id: each for each in self.screen.active_bindings.values()}
         room = self.screen.size.width
         found: dict[str, Entry] = {}
-        instead = self._instead()
-        for id in instead or self._first:
+        for id in self._instead() or self._first:
             if id not in active:
                 continue
             binding = active[id].binding
@@ -94,8 +83,7 @@ class KeyFooter(Keys):
                 found[id] = entry
                 room -= entry.width
         # Help and the way out stand last.
-        order = sorted(instead, key=lambda id: id.endswith((".help", ".quit"))) or self._order
-        return tuple(found[id] for id in order if id in found)
+        return tuple(found[id] for id in sorted(found, key=lambda id: id.endswith(LAST)))
 
     def render(self) -> Content:
         return Content.assemble(*(part for entry in self.entries for part in (self._drawn(entry), " ")))

@@ -17,10 +17,6 @@ from ddenv.workbench.shared.bindings import keys
 class Pick(ModalScreen[int | None]):
     """Returns the number of the line that was chosen, or None. The line `head` stands above, the cursor begins `at` a line."""
 
-    DEFAULT_CSS = """
-    Pick .dialog { width: 78; }
-    Pick #head { width: 100%; color: $text-muted; }
-    """
     BINDINGS: ClassVar = keys("pick", ("close", "escape,q", "dismiss", "close", "choose nothing"))
 
     def __init__(self, title: str, does: str, lines: Sequence[Text], *, head: Text | None = None, at: int = 0) -> None:

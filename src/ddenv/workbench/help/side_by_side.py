@@ -19,10 +19,6 @@ from ddenv.workbench.shared.bindings import keys
 class SideBySide(ModalScreen[None]):
     """`lines` have the name of a fact, and what it is in the first and in the second one."""
 
-    DEFAULT_CSS = """
-    SideBySide .dialog { width: 96%; height: 92%; }
-    SideBySide .dialog Static, SideBySide .dialog VerticalScroll { width: 100%; }
-    """
     BINDINGS: ClassVar = keys("compare", ("close", "escape,c,q,enter", "dismiss", "close", "close this dialog"))
 
     def __init__(self, title: str, lines: Iterable[tuple[str, str, str]]) -> None:

@@ -71,7 +71,6 @@ def letters(question: Question) -> str:
 
 
 def page_text(page: Page, room: int = 0) -> Text:
-    """A page as text, `room` columns wide; nothing on it depends on colour alone."""
     parts = [_blocks(page.text, room)]
     if page.question is not None:
         parts.append(_question(page.question, page, room))

@@ -47,7 +47,6 @@ class LessonScreen(LearnScreen[bool]):
 
     AUTO_FOCUS = "LessonPane"
     NAME = "lesson"
-    SHOWN = "on skip hint again back activity run_back run_on next_decision next_reduction predict variables help close"
     FIRST = "help close on skip again activity run_back run_on predict hint variables next_reduction next_decision back"
     BINDINGS: ClassVar = keys(
         "lesson",

@@ -26,7 +26,7 @@ class LessonsScreen(LearnScreen[None]):
     """Enter opens a lesson where it was left."""
 
     NAME = "lessons"
-    SHOWN = FIRST = "open help back"
+    FIRST = "help back open"
     # It has room for what matters in any terminal.
     HORIZONTAL_BREAKPOINTS = VERTICAL_BREAKPOINTS = []
     BINDINGS: ClassVar = [

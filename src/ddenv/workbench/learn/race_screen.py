@@ -79,7 +79,6 @@ def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], r
 
 
 def _signs(turns: tuple[Turn, ...], room: int) -> str:
-    """How the tests ended, the last ones if there are many."""
     signs = "".join(SIGNS.get(turn.outcome, "?") for turn in turns)
     return signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
 
@@ -89,7 +88,6 @@ class RaceScreen(LearnScreen[None]):
 
     AUTO_FOCUS = ""
     NAME = "race"
-    SHOWN = "run back on begin end help close"
     FIRST = "help close run on back end begin"
     BINDINGS: ClassVar = keys(
         "race",

@@ -35,7 +35,6 @@ class TryScreen(LearnScreen[None]):
 
     AUTO_FOCUS = "WorldMap"
     NAME = "try"
-    SHOWN = "map.pick map.next without only back done again on help close"
     FIRST = "help close on without done map.pick only map.next back again"
     BINDINGS: ClassVar = keys(
         "try",
@@ -98,7 +97,6 @@ class TryScreen(LearnScreen[None]):
         self.refresh_bindings()
 
     def _say_where(self) -> None:
-        """What happened last, and the models that are held, with the marked ones."""
         said, attempt = self.query_one("#try-said", Static), self.attempt
         if attempt.ended:
             sign = "✓" if attempt.found else "✗"

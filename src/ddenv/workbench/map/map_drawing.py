@@ -128,7 +128,6 @@ class MapDrawing:
         return canvas, still
 
     def _driving(self, shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
-        """The running tests, with the paths behind their robots; those of the candidate in focus stand out."""
         live, ids = shown.snapshot.live, _in_focus(shown.snapshot)
         colors = {one.test: palette.live if one.test in ids or not ids else palette.shade(DULL) for one in live}
         trails = self._trails if "path" in shown.layers else {}
@@ -167,7 +166,6 @@ def _riders(shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
 
 
 def _still(shown: Shown, view: View, palette: Palette) -> Picture:
-    """All that does not change while robots drive. Letters cover paths, and marks cover letters."""
     how = looks(shown.place.prints, kept(shown), palette)
     filled, centers = _lying(shown.place.prints, view)
     canvas = Canvas(view.rows, view.columns, palette.back)
@@ -222,7 +220,6 @@ def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> N
 
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
-    """The paths below the letters; the first one covers the second one."""
     layers, snapshot = shown.layers, shown.snapshot
     if shown.ways:
         both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
@@ -248,7 +245,6 @@ def _marks(shown: Shown, palette: Palette) -> Iterator[tuple[Point, str, int]]:
 
 
 def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
-    """Marks a cell by four arms; a letter in it stays readable."""
     rows, columns = canvas.chars.shape
     row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
     for (down, right), sign in ARMS:

@@ -82,7 +82,6 @@ def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
 
 
 def sensed_order(state: RunState) -> dict[str, int]:
-    """The models that the last similar run sensed, numbered from 1 by the first time."""
     return {name: number for number, (name, _) in enumerate(_sensed(state), start=1)}
 
 

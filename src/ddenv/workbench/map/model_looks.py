@@ -124,7 +124,6 @@ def _signs(names: Sequence[str], kinds: np.ndarray, parts: np.ndarray, who: Kept
 
 
 def _label(kind: int, part: int) -> str:
-    """The sign of a model of part 1, 2, ... or of none: 0."""
     if kind in (PROTECTED, PINNED, REMOVED):
         return {PROTECTED: "#", PINNED: "+", REMOVED: ""}[kind]
     letter = partition_letter(part - 1) if part else ""
@@ -134,7 +133,6 @@ def _label(kind: int, part: int) -> str:
 
 
 def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
-    """The kind of each model; the last rule that applies counts."""
     kinds = np.where(floor, FLOOR, KEPT)
     if who.shown is not None:
         out = ~_among(names, who.shown)
@@ -175,7 +173,6 @@ def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
 
 
 def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> None:
-    """Lines between neighbours that look alike but are different models."""
     pixels = tone[grid]
     beside, above = np.zeros(grid.shape, dtype=bool), np.zeros(grid.shape, dtype=bool)
     beside[:, :-1] = (pixels[:, :-1] == pixels[:, 1:]) & (grid[:, :-1] != grid[:, 1:])

@@ -123,10 +123,6 @@ class WorldMap(Widget, can_focus=True):
     def selection(self) -> frozenset[str]:
         return self.shown.selection
 
-    @property
-    def shown_layers(self) -> frozenset[str]:
-        return self.shown.layers
-
     def watch_picking(self) -> None:
         self.draw()
 
@@ -144,12 +140,10 @@ class WorldMap(Widget, can_focus=True):
         self.refresh()
 
     def set_marks(self, spawn: tuple[float, float, float] | None, goal: Point | None) -> None:
-        """Changes start (x, y, yaw) and goal in the same world."""
         self.shown = replace(self.shown, place=replace(self.place, spawn=spawn, goal=goal))
         self._refit()
 
     def show(self, snapshot: Snapshot, candidate: Candidate | Trial | None) -> None:
-        """Shows the current state of the run; the models of `candidate` stand out."""
         before = self.snapshot
         if self.selection and snapshot.state.environment is not before.state.environment:
             self.select(self.selection.intersection(snapshot.state.environment))
@@ -172,7 +166,7 @@ class WorldMap(Widget, can_focus=True):
         self.draw() if same or not self.viewport.fitted else self._refit()
 
     def toggle_layer(self, name: str) -> None:
-        self.shown = replace(self.shown, layers=self.shown_layers ^ {name})
+        self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
 
     def legend(self, width: int) -> Text:
@@ -191,12 +185,10 @@ class WorldMap(Widget, can_focus=True):
         return None if owner is None else self.place.prints[owner].name
 
     def describe(self, name: str, columns: int = 0) -> Text:
-        """A description of a model in one line of at most `columns`; empty for an unknown name."""
         number = self._numbers.get(name)
         return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
 
     def go_to(self, name: str) -> bool:
-        """Moves the crosshair to a model, and the map if needed; False if there is no such model."""
         number, port = self._numbers.get(name), self.viewport
         if number is None or port.view is None:
             return False
@@ -209,7 +201,6 @@ class WorldMap(Widget, can_focus=True):
         return True
 
     def aim_at(self, x: float, y: float) -> None:
-        """Moves the crosshair to a place, m, and the map if needed."""
         port = self.viewport
         cell = None if port.view is None else port.view.cell(x, y)
         if cell is None:
@@ -236,7 +227,6 @@ class WorldMap(Widget, can_focus=True):
             self.draw()
 
     def action_neighbour(self, step: int) -> None:
-        """The model before or after the one under the crosshair, in the order of the world."""
         state = self.snapshot.state
         left = frozenset(state.environment)
         names = [name for name in state.elements if name in left] or list(self._numbers)
@@ -262,7 +252,6 @@ class WorldMap(Widget, can_focus=True):
     # The view.
 
     def zoom(self, factor: float) -> None:
-        """Zooms in by `factor`, about the crosshair if shown, else about the middle."""
         self.viewport.zoom(factor, self.viewport.cursor if self.aims else None)
         self._draw_soon()
 
@@ -271,7 +260,6 @@ class WorldMap(Widget, can_focus=True):
         self._refit()
 
     def _refit(self) -> None:
-        """Changes the size or the important places."""
         columns, rows = self.size
         if columns and rows and self._has_world:
             self.viewport.resize(columns, rows, lambda *size: self._drawing.fitting(self.shown, *size))
@@ -359,7 +347,6 @@ class WorldMap(Widget, can_focus=True):
         self.draw()
 
     def draw(self) -> None:
-        """Draws a new frame, and refreshes only the lines that changed."""
         view = self.viewport.view
         if view is None or not self.is_attached:
             return

@@ -74,7 +74,6 @@ class Playing:
         self.on = not self.on and self.length > 0
 
     def faster(self, steps: int) -> bool:
-        """Another of the `SPEEDS`; False if there is none."""
         place = bisect_left(SPEEDS, self.speed) + steps
         if not 0 <= place < len(SPEEDS):
             return False
@@ -82,7 +81,6 @@ class Playing:
         return True
 
     def advance(self, seconds: float) -> None:
-        """So many seconds of real time pass."""
         if self.on:
             self.time = min(self.length, self.time + seconds * self.speed)
             self.on = not self.at_end
@@ -92,7 +90,6 @@ def now() -> float:
     return time.monotonic()
 
 
-SHOWN = ids("playback", "play back on frame_back frame_on slower faster parting beside swap before next help close")
 FIRST = ids("playback", "help close play beside frame_back frame_on parting slower faster swap before next back on")
 
 
@@ -147,7 +144,7 @@ class Playback(Screen[None]):
                 yield Met(id="met")
         with Framed("", id="playback-time", classes="panel"):
             yield Timeline(id="timeline")
-        yield KeyFooter(SHOWN, FIRST)
+        yield KeyFooter(FIRST)
         yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -218,7 +215,6 @@ class Playback(Screen[None]):
             self._show()
 
     def _show(self) -> None:
-        """The robots, the models and the slider at the instant."""
         playing, at = self.playing, self.playing.time
         moving = self._tests[0].moving
         prints = self._prints.at({name: pose_at(samples, at) for name, samples in moving.items()})

@@ -68,11 +68,9 @@ class Asking:
 
     @property
     def trouble(self) -> str:
-        """The error that ended the engine that this screen started, or ""."""
         return self._engine.trouble if self._poll.snapshot.engine == "absent" else ""
 
     def waiting_for(self) -> str:
-        """The command that waits for its answer, in words."""
         (id, command), snapshot = self._last, self._poll.snapshot
         if command is None:
             return ""

@@ -114,7 +114,6 @@ def round_title(state: RunState) -> tuple[str, str]:
 
 
 def fitting(listing: Listed, width: int) -> tuple[Column, ...]:
-    """The columns that fit into `width` cells, each with its width."""
     first = listing.rest[0] if listing.rest else None
     if isinstance(first, FreshRuns):
         names = (name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
@@ -188,7 +187,6 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
 
 
 def _running(snapshot: Snapshot, tests: Sequence[Test]) -> str:
-    """Which of some tests run, and how far the first of these is."""
     running = [test for test in tests if test.outcome == "running"]
     if not running or snapshot.engine != "alive":
         return ""

@@ -31,21 +31,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     HELP = "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long   ↓ drops a model"
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar = {"candidates--header", "candidates--cursor"}
-    DEFAULT_CSS = """
-    Candidates {
-        background: $background;
-        color: $foreground;
-        scrollbar-size: 1 1;
-        overflow-x: hidden;
-        & > .candidates--header { color: $text-muted; }
-        & > .candidates--cursor { background: $primary 25%; color: $foreground; }
-        &:focus > .candidates--cursor { background: $primary 45%; color: $foreground; }
-        &:nocolor > .candidates--cursor { text-style: underline; }
-        &:nocolor:focus > .candidates--cursor { text-style: reverse; }
-        &:ansi > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: underline; }
-        &:ansi:focus > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: reverse; }
-    }
-    """
     BINDINGS: ClassVar = keys(
         "candidates",
         ("up", "up", "move(-1)", "", "the candidate above: the map shows its models"),

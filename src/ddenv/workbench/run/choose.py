@@ -189,7 +189,7 @@ class Layers(ModalScreen[None]):
             yield OptionList(*(Option(self._prompt(name)) for name in self._names), compact=True, markup=False)
 
     def _prompt(self, name: str) -> Text:
-        mark = "[x]" if name in self._world.shown_layers else "[ ]"
+        mark = "[x]" if name in self._world.shown.layers else "[ ]"
         return Text(f"{mark} {name:<11} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
 
     def action_switch(self) -> None:

@@ -126,8 +126,6 @@ def ssh_line(url: str) -> str:
 
 
 def failures(found: Sequence[OtherFailure]) -> Pick:
-    """The list of other failures that the tests met, each with the smallest environment that showed it."""
-
     def line(failure: str, tests: str, smallest: str) -> Text:
         return Text(f"{failure:<36}{tests:>7}   {smallest}", no_wrap=True)
 

@@ -53,7 +53,6 @@ class Happening(Widget):
 
 
 def _urgent(snapshot: Snapshot) -> tuple[object, ...]:
-    """What is shown at once when it changes."""
     state = snapshot.state
     number = None if state.round is None else (state.round.number, state.round.done)
     return (

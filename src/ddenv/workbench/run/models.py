@@ -70,7 +70,6 @@ class Row:
 
 
 def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
-    """The models of the environment, those nearest to f first."""
     parts = state.round.split.letter_of if state.round is not None and not state.round.done else {}
     sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
     places = {each.name: each for each in prints}
@@ -91,7 +90,6 @@ def _nearly(row: Row) -> float:
 
 
 def line(row: Row, width: int) -> Text:
-    """A row as text, with the name cut to the room there is."""
     room = max(4, width - REST)
     away = "" if row.stands is None or row.f is None else f"{row.stands.distance(row.f):.1f} m"
     sensed = "never" if row.sensed is None else f"{row.sensed:.1f} s"
@@ -166,7 +164,6 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
 
 
 def _marks(most: int, rows: int) -> dict[int, str]:
-    """What is written beside the rows: the number of models at their tops."""
     marks = {0: str(most), rows - 1: "0"}
     parts = 4 if rows >= 12 else 2 if rows >= 5 else 1
     for part in range(1, parts):
@@ -193,7 +190,6 @@ def _row_of(models: int, most: int, rows: int) -> int:
 def _line(
     at: Sequence[tuple[int, int]], levels: Sequence[int], most: int, rows: int, row: int
 ) -> Iterator[tuple[str, int]]:
-    """The characters of a row, each with the number of its style."""
     for (models, _), level in zip(at, levels, strict=True):
         eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
         # Where steps and line meet in one row, the steps are drawn.

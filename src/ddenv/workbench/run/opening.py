@@ -34,10 +34,7 @@ LISTED = 200
 
 
 class Opening:
-    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names.
-
-    Other screens are loaded when they open: the first paint of a run waits for none of them.
-    """
+    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names."""
 
     def __init__(self, screen: RunScreen) -> None:
         self._screen = screen
@@ -51,7 +48,6 @@ class Opening:
         then: Callable[[tuple[str, ...]], None],
         chosen: Sequence[str] = (),
     ) -> None:
-        """Asks for models by their names; those that are `chosen` already come first."""
         if not names:
             self._asking.refuse("there are no models to choose from")
             return
@@ -119,7 +115,6 @@ class Opening:
             self._asking.refuse(why)
 
     def play_test(self, test: int, beside: int | None = None) -> str:
-        """Plays a test back. Returns why it cannot be, or ""."""
         from ddenv.workbench.playback.playback_screen import Playback
 
         position, place = self._screen.browsing.position, self._screen.world.place

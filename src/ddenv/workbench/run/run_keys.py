@@ -20,16 +20,11 @@ if TYPE_CHECKING:
     from ddenv.workbench.run.run_screen import RunScreen
 
 
-# The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
-MORE = ids("run", "signs facts play rounds find layers copy scene runs")
-SHOWN = (
-    *ids("run", "pause step accept reject veto pin without only leave_out undo history change export why isolate"),
-    *MORE,
-    *ids("run", "help quit"),
-)
-FIRST = (
-    *ids("run", "help quit pause accept reject leave_out step veto pin without undo history export why change only"),
-    *MORE,
+# The footer's keys by priority; the last ones fit on wide screens only.
+FIRST = ids(
+    "run",
+    "help quit pause accept reject leave_out step veto pin without undo history export why change only isolate"
+    " signs facts play rounds find layers copy scene runs",
 )
 # What comes next when the run has ended.
 ENDED = ids("run", "why isolate export play quit help leave_out history change pin without only undo find scene runs")
@@ -164,7 +159,6 @@ class KeyOffers:
             footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
     def pressed(self, key: str) -> None:
-        """Shows why a key does nothing, if it guides the run and is not possible now."""
         # To list what all keys do now takes longer than most keys take.
         if any(each in GUIDING.values() for each in self._screen._bindings.key_to_bindings.get(key, ())):
             active = self._screen.active_bindings.get(key)

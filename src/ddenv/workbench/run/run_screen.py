@@ -32,7 +32,7 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, KeyOffers
+from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_lines
@@ -72,8 +72,7 @@ class RunScreen(Screen[None]):
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
         self.table, self.world, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
-        shown, first = (LOOKING, LOOKING) if watch else (SHOWN, FIRST)
-        self._footer = KeyFooter(shown, first, self._keys_here)
+        self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
         self.opening, self.keys = Opening(self), KeyOffers(self)
@@ -182,7 +181,6 @@ class RunScreen(Screen[None]):
         self._show_scene(self.table.chosen or (focus if snapshot.past else None))
 
     def _show_scene(self, row: Candidate | Trial | None) -> None:
-        """The scene shows the same moment and the row that the user chose."""
         at, round = self.browsing.position.at, self.snapshot.state.round
         if isinstance(row, Trial):
             self.scene.show(Wanted(at, trial=row.number))
@@ -237,7 +235,6 @@ class RunScreen(Screen[None]):
         self._browse(lambda: self.browsing.position.go(id))
 
     def _browse(self, move: Callable[[], str | None]) -> None:
-        """Shows another moment, or why there is none."""
         try:
             if why := move():
                 self.asking.refuse(why)
@@ -288,7 +285,6 @@ class RunScreen(Screen[None]):
         self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
-        """Brings a pane into sight, and the keys to it."""
         if pane != self._pane:
             self.remove_class(f"-pane-{self._pane}")
             self.add_class(f"-pane-{pane}")

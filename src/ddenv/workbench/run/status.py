@@ -102,7 +102,6 @@ class Status(Widget):
 
 
 def heading(state: RunState) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Scenario and method for the left, and how far the reduction is for the right, each in its longest form first."""
     options = settings(state)
     lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
     total, kept = len(state.elements), len(state.environment)

@@ -37,8 +37,7 @@ BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 KEPT = 7 * 86_400.0
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3
-# The footer's keys in the order of the screen, then by priority.
-SHOWN = ids("runs", "open watch like filter sort mark compare delete undo path help back")
+# The footer's keys by priority.
 FIRST = ids("runs", "help back open sort filter delete undo mark compare path watch like")
 
 
@@ -131,15 +130,13 @@ class RunsScreen(Screen[None]):
             with VerticalScroll(id="preview", classes="panel", can_focus=False) as panel:
                 panel.border_title = "This run"
                 yield Static("", id="about", markup=False)
-        yield KeyFooter(SHOWN, FIRST)
+        yield KeyFooter(FIRST)
         yield Static("Please make the terminal larger: at least 64 x 12.", id="small", markup=False)
 
     def on_mount(self) -> None:
         self.query_one(RunTable).focus()
         self._look()
         self.set_interval(PERIOD, self._look)
-
-    # From the folder to the screen.
 
     def _look(self) -> None:
         if not self._reading:
@@ -195,8 +192,6 @@ class RunsScreen(Screen[None]):
     @property
     def _chosen(self) -> Recent | None:
         return self.query_one(RunTable).chosen
-
-    # Actions on a run.
 
     @on(DataTable.RowSelected)
     def _selected(self) -> None:
@@ -258,8 +253,6 @@ class RunsScreen(Screen[None]):
     def _complain(self, why: str) -> None:
         self.notify(why, severity="warning", timeout=4, markup=False)
 
-    # The order, and two runs side by side.
-
     def action_sort(self) -> None:
         names = list(ORDERS)
         self._sort(names[(names.index(self._order) + 1) % len(names)])
@@ -288,8 +281,6 @@ class RunsScreen(Screen[None]):
                 from ddenv.workbench.runs.compare_runs import lines
 
                 self.app.push_screen(SideBySide("Two runs side by side", lines(marked, run)))
-
-    # A run elsewhere, the filter, and the way back.
 
     def action_path(self) -> None:
         self.add_class("-opening")

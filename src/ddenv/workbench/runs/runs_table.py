@@ -149,7 +149,6 @@ class RunTable(DataTable[Text]):
         self.show(self._runs, self._order)
 
     def _arrange(self) -> None:
-        """The columns that fit; the name takes the rest."""
         self.clear(columns=True)
         room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
         self._shown = list(FIRST)

@@ -117,9 +117,6 @@ def _read_run(path: Path) -> Choice:
     return Choice(path, world, scenario.reading, scenario, scenario, clearance, run=True)
 
 
-# The height of the spawn.
-
-
 def spawn_height(world: World, clearance: float, x: float, y: float) -> float | None:
     """The z of a spawn at (x, y) for a robot with that `clearance`, m, to the mm; None where there is no ground."""
     top = _ground(world, x, y)

@@ -38,7 +38,6 @@ FIELDS = {field.id: field for field in form.ALL}
 
 
 def not_used(field: Field, algorithm: str) -> str:
-    """Why a field has no effect, or ""."""
     only = field.setting.used_by if field.setting else ()
     if only and algorithm in OURS["algorithm"] and algorithm not in only:
         return f"Not used by {plain(algorithm)}."
@@ -121,8 +120,6 @@ class OptionsForm(Vertical):
             self.set_class(within, "-within", update=False)
             self.app.stylesheet.update_nodes([self])
 
-    # The content.
-
     @property
     def method(self) -> tuple[str, str]:
         algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in METHOD)
@@ -139,7 +136,6 @@ class OptionsForm(Vertical):
 
     @property
     def own_name(self) -> str:
-        """The run's name if the user gave one, else ""."""
         name = self.texts["name"].strip()
         return name if self._name_given and name != self._suggested else ""
 
@@ -177,8 +173,6 @@ class OptionsForm(Vertical):
             with field.prevent(Input.Changed):
                 field.value = name
 
-    # The texts.
-
     def on_descendant_focus(self, event: events.DescendantFocus) -> None:
         self._explain(event.widget)
 
@@ -209,7 +203,6 @@ class OptionsForm(Vertical):
         self.query_one("#cost", Static).update(Text(words))
 
     def tell_command(self, words: str, typed: bool = True) -> None:
-        """Shows the command that does the same; if it is not `typed`, why there is none."""
         line = Text("$ " if typed and words else "", "bold")
         command = self.query_one("#command", Static)
         command.update(line.append(plain(words), "not bold"))
@@ -259,8 +252,6 @@ class OptionsForm(Vertical):
             else:
                 self._problems.pop(id, None)
             self._show_problems()
-
-    # Actions.
 
     @on(Button.Pressed, "#more")
     def toggle_more(self) -> None:

@@ -29,7 +29,6 @@ SUFFIXES = (*SCENARIO, *SDF_ENDINGS)
 
 
 def recent_files() -> list[Path]:
-    """The recent files that still exist; none if the list is missing or damaged."""
     from ddenv.world.access import is_file
 
     return [path for path in _listed() if is_file(path)]

@@ -105,7 +105,6 @@ def _out_of_range(field: Field, found: Value) -> str:
 
 
 def problem(field: Field, text: str) -> str:
-    """What is wrong with a field's text, in its own name, or ""."""
     try:
         value(field, text)
     except FieldError as error:

@@ -104,10 +104,7 @@ def _on_the_map(uri: str, world: World) -> str:
 
 
 class MissingList(OptionList):
-    """A row for each missing file, then for each kind of part that was replaced or ignored; hidden while there is none.
-
-    Once each file has its remedy, the title stands for all rows until the list has the focus.
-    """
+    """A row for each missing file, then for each kind of part that was replaced or ignored; hidden while there is none."""
 
     BINDINGS: ClassVar = keys(
         "missing",

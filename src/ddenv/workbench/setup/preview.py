@@ -97,8 +97,6 @@ class Preview(Vertical):
         self._show_picking()
         self.call_after_refresh(self._show_about)
 
-    # Reading.
-
     def read(self, path: Path, *, opened: bool) -> None:
         """Reads a scenario, a world or a run in a thread. A file that the user `opened` is remembered."""
         self.show_nothing("reading the world ...")
@@ -158,8 +156,6 @@ class Preview(Vertical):
             remember_remedies(event.remedies)
             self._read(self.choice.path, False, again=True)
 
-    # Start and goal.
-
     @property
     def spawn(self) -> tuple[float, ...] | None:
         """The form's start: x, y, z, m, and yaw, rad."""
@@ -191,8 +187,6 @@ class Preview(Vertical):
         z = spawn_height(choice.world, choice.clearance, *at)
         self._ground_z = "" if z is None else _metres(z)
         self._form.set_texts({"spawn_z": self._ground_z, "spawn_yaw": texts["spawn_yaw"] or "0"})
-
-    # Picking.
 
     def pick(self, what: str) -> None:
         """Starts picking "start", "heading" or "goal" on the map; "" ends it."""
@@ -242,10 +236,7 @@ class Preview(Vertical):
             return {}
         return {"spawn_yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
 
-    # The lines below the map.
-
     def _show_picking(self) -> None:
-        """Which place is picked next, or where start and goal are in the longest words that fit, with the keys to pick others."""
         line, what = self.query_one("#picking", Static), self.picked_next
         line.set_class(bool(what), "-on")
         text = Text(no_wrap=True, overflow="ellipsis")
@@ -282,7 +273,6 @@ class Preview(Vertical):
             line.tooltip = Text("\n".join(f"{plain(words)}." for _, words in found))
 
     def _show_about(self) -> None:
-        """As much of the description as fits; the tooltip has all of it."""
         line, words = self.query_one("#about", Static), "" if self.choice is None else self.choice.about
         most = line.styles.max_height
         lines = wrap(words, max(3, line.content_size.width), max_lines=most and most.cells, placeholder=" …")

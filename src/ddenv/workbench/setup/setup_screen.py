@@ -50,7 +50,7 @@ HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
 # In the footer.
-SHOWN = ids("setup", "start baseline save copy open help quit")
+FIRST = ids("setup", "help quit start baseline save copy open")
 
 
 class SetupScreen(Screen[None]):
@@ -130,7 +130,7 @@ class SetupScreen(Screen[None]):
                     yield RunList(id="run-list")
             yield self.preview
         yield self.form
-        yield KeyFooter(SHOWN, SHOWN, self._keys_here)
+        yield KeyFooter(FIRST, self._keys_here)
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -165,7 +165,6 @@ class SetupScreen(Screen[None]):
 
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
-        """A world without a start is asked for it first."""
         if self.preview.choice is not None and self.preview.asks:
             self.action_pick("start")
         else:
@@ -391,7 +390,7 @@ class SetupScreen(Screen[None]):
     def _keys_here(self) -> tuple[str, ...]:
         """The ids of the keys in the footer: those of what has the focus come first."""
         bindings = () if self.focused is None else Binding.make_bindings(self.focused.BINDINGS)
-        return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *SHOWN)
+        return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *FIRST)
 
     @on(Panes.Chosen)
     def _pane_chosen(self, event: Panes.Chosen) -> None:

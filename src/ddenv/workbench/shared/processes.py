@@ -47,7 +47,6 @@ class Engine:
 
     @property
     def trouble(self) -> str:
-        """The error that ended it, or ""."""
         code = None if self._process is None else self._process.poll()
         if code in (None, *GOOD_ENDS):
             return ""
@@ -109,7 +108,6 @@ class Scene:
             self.trouble = f"the scene did not start: {last_line(log) or f'see {log}'}"
 
     def stop(self) -> None:
-        """Ends the program; nothing else depends on it."""
         process, self._process, self.url = self._process, None, ""
         if process is None:
             return

@@ -62,7 +62,6 @@ def theme_called(name: str, where: str) -> str:
 
 
 def fitting(color_system: str | None) -> str:
-    """The theme for a terminal with that colour system, as Rich names it."""
     # Colours of ddenv's themes would become the nearest of sixteen, and some the same.
     return ANSI if color_system == "standard" else DARK.name
 

@@ -130,10 +130,7 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
 
 
 def head_of(state: RunState, works: bool) -> str:
-    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left.
-
-    The first comes first: a narrow screen has no room for both.
-    """
+    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left."""
     certificate = current(state)
     title = "Why it fails" if state.isolating is None else isolating(state) + ("" if works else " (stopped)")
     return title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"

@@ -41,7 +41,6 @@ SMALLEST = (64, 18)
 PERIOD = 0.5
 
 
-SHOWN = ids("why", "play isolate margins copy closer farther fit signs help close")
 FIRST = ids("why", "help close play isolate margins copy signs closer farther fit")
 
 
@@ -119,7 +118,7 @@ class WhyScreen(Screen[None]):
                 yield Static("", id="why-legend", markup=False)
         with VerticalScroll(id="why-nothing"):
             yield Static("", id="why-empty", markup=False)
-        yield KeyFooter(SHOWN, FIRST)
+        yield KeyFooter(FIRST)
         yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:

@@ -26,7 +26,6 @@ class Choice(ModalScreen[str]):
     `text` may contain names from files, so it is never markup.
     """
 
-    DEFAULT_CSS = "Choice .dialog { width: 72; } Choice .dialog Static { width: 100%; }"
     BINDINGS: ClassVar = keys(
         "choice",
         ("previous", "left", "app.focus_previous", "", "previous button"),
