@@ -134,8 +134,8 @@ class Workbench(App[int]):
         """
         if isinstance(event, events.Key) and not event.is_forwarded:
             self.clear_notifications()
-        tab = isinstance(event, events.Key) and event.key in ("tab", "shift+tab") and self.app_focus
-        bound = self.screen.active_bindings.get(event.key) if tab else None
+        key = event.key if isinstance(event, events.Key) and self.app_focus else ""
+        bound = self.screen.active_bindings.get(key) if key in ("tab", "shift+tab") else None
         if bound is not None and bound.binding.action in TABS:
             TABS[bound.binding.action](self.screen)
         else:
