@@ -28,7 +28,7 @@ async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run,
         await session.press("less_than_sign", "less_than_sign")
         assert "round 2" in session.text("#header")
         assert table.words(0)["verdict"] == "● similar"
-        assert world.candidate.label == "part A"
+        assert world.shown.candidate.label == "part A"
         assert world.snapshot.state.environment == tuple(run.elements[:2])
         assert "reduced to 2 models after 6 tests" in session.text("#happening")
         assert "◂ moment 22 of 182" in session.text("#status")

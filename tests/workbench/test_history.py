@@ -11,7 +11,7 @@ from ddenv.runfile import branches
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import Node
 from ddenv.workbench.help.side_by_side import SideBySide
-from ddenv.workbench.history import History, compare, lines
+from ddenv.workbench.history import History, lines
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 
@@ -43,13 +43,6 @@ def test_what_a_node_is_has_a_sign_words_and_tests_of_its_own(run):
     state = fold(fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
     assert branches.words(state.nodes[-1], 0) == "minimal"
     assert branches.words(replace(state.nodes[-1], rejected=True), 0) == "was minimal"
-
-
-def test_two_environments_are_compared_by_name(run):
-    state = fold(fake_moments.guided(run).file.events())
-    common, *alone = compare(state.nodes[2], state.nodes[3])
-    assert common == ("crate_00", "crate_01", "crate_04")
-    assert alone == [("crate_05",), ("crate_02", "crate_03")]
 
 
 def cells(session):

@@ -37,9 +37,9 @@ async def test_the_cursor_follows_the_run_until_it_is_moved(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         table, world = session.screen.query_one(Candidates), session.screen.query_one(WorldMap)
-        assert table.under_cursor.label == world.candidate.label == "without A"
+        assert table.under_cursor.label == world.shown.candidate.label == "without A"
         await session.press("down", "down", "down")
-        assert world.candidate.label == "part C"
+        assert world.shown.candidate.label == "part C"
         run.finish(11, "pass")
         run.finish(12, "similar", 0.1)
         run.start(3)

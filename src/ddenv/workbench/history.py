@@ -158,23 +158,15 @@ class History(Screen[int | None]):
         self.notify(why, severity="warning", timeout=4, markup=False)
 
 
-def compare(first: Node, second: Node) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """The models of both environments, those of the first alone, and those of the second, in the order of the world file."""
-    left, right = frozenset(first.environment), frozenset(second.environment)
-    return (
-        tuple(name for name in first.environment if name in right),
-        tuple(name for name in first.environment if name not in right),
-        tuple(name for name in second.environment if name not in left),
-    )
-
-
 def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]]:
     yield "environment", place(first), place(second)
     yield "method", plain(first.method), plain(second.method)
     yield "own tests", str(first.own_tests), str(second.own_tests)
     yield "in the run", branches.words(first, here), branches.words(second, here)
-    common, *alone = map(_named, compare(first, second))
+    left, right = frozenset(first.environment), frozenset(second.environment)
+    common = _named([name for name in first.environment if name in right])
     yield "in both", common, common
+    alone = [_named([name for name in node.environment if name not in left & right]) for node in (first, second)]
     yield "only in this one", alone[0], alone[1]
 
 

@@ -116,10 +116,6 @@ class WorldMap(Widget, can_focus=True):
         return self.shown.snapshot
 
     @property
-    def candidate(self) -> Candidate | Trial | None:
-        return self.shown.candidate
-
-    @property
     def selection(self) -> frozenset[str]:
         return self.shown.selection
 

@@ -82,16 +82,13 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     def _filter(self) -> None:
         """Lists the names with the typed part. Each key calls it first: fast typing is ahead of the message `Changed`."""
         part = self.query_one(Input).value.strip().lstrip("/").casefold()
-        if part != self._part:
-            self._part = part
-            self._list(part)
-
-    def _list(self, part: str) -> None:
+        if part == self._part:
+            return
+        self._part = part
         found = [name for name in self._names if part in name.casefold()]
         self._listed, self._found = found[:LISTED], len(found)
         options = self.query_one(OptionList)
-        options.clear_options()
-        options.add_options([Option(self._prompt(name)) for name in self._listed])
+        options.set_options(Option(self._prompt(name)) for name in self._listed)
         if self._listed:
             options.highlighted = 0
         self._show_found()
@@ -111,10 +108,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     def action_move(self, by: int) -> None:
         self._filter()
         options = self.query_one(OptionList)
-        if by > 0:
-            options.action_cursor_down()
-        else:
-            options.action_cursor_up()
+        (options.action_cursor_down if by > 0 else options.action_cursor_up)()
 
     def action_mark(self) -> None:
         self._filter()

@@ -165,12 +165,9 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
 
 def _marks(most: int, rows: int) -> dict[int, str]:
     marks = {0: str(most), rows - 1: "0"}
-    parts = 4 if rows >= 12 else 2 if rows >= 5 else 1
-    for part in range(1, parts):
-        row = rows * part // parts
-        words = str(round(most * (1 - row / rows)))
-        if words not in marks.values():
-            marks[row] = words
+    middle = rows // 2
+    if rows >= 5 and (words := str(round(most * (1 - middle / rows)))) not in marks.values():
+        marks[middle] = words
     return marks
 
 

@@ -190,7 +190,7 @@ class RunScreen(Screen[None]):
             self.scene.show(Wanted(at))
 
     def show_legend(self) -> None:
-        selection, candidate, state = self.world.selection, self.world.candidate, self.world.snapshot.state
+        selection, candidate, state = self.world.selection, self.world.shown.candidate, self.world.snapshot.state
         fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
         self._legend.show(len(selection), candidate, fallen, self.world.legend)
 

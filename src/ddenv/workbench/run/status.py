@@ -150,7 +150,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
         "tests": tests_said(state),
         "drift": drift_said(state),
         "cut": (f"{cut} ended early", "") if (cut := state.cut_tests) else (),
-        "time": _time(snapshot),
+        "time": (duration(snapshot.spent), "") if snapshot.spent else (),
         "left": left_said(state, snapshot.engine == "alive"),
         "mode": ("accept: ask", "") if state.accept_mode == "ask" and not state.ended else (),
         "engine": engine_said(snapshot),
@@ -163,13 +163,9 @@ def facts_of_past(snapshot: Snapshot, scene: str, moment: int, moments: int) -> 
         "state": (f"◂ moment {moment} of {moments}",),
         "mode": ("escape: now",),
         "tests": tests_said(snapshot.state),
-        "time": _time(snapshot),
+        "time": (duration(snapshot.spent), "") if snapshot.spent else (),
         "left": ("scene shows it", "") if scene else (),
     }
-
-
-def _time(snapshot: Snapshot) -> tuple[str, ...]:
-    return (duration(snapshot.spent), "") if snapshot.spent else ()
 
 
 def fitted(said: Facts, width: int) -> list[tuple[str, str]]:

@@ -17,7 +17,7 @@ from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
-from ddenv.schemas import OURS, Kind, names, uses
+from ddenv.schemas import OURS, names, uses
 from ddenv.text import plain
 from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
@@ -28,11 +28,6 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 MARK = "✗ "
-METHOD: dict[Kind, str] = {
-    "algorithm": "how the environment is searched",
-    "partitioning": "how the environment is split",
-    "prioritization": "in which order the parts are tried",
-}
 MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
 FIELDS = {field.id: field for field in form.ALL}
 
@@ -88,15 +83,9 @@ class OptionsForm(Vertical):
     def compose(self) -> ComposeResult:
         with VerticalScroll(id="fields", can_focus=False):
             with Grid(id="method"):
-                for kind, tooltip in METHOD.items():
+                for kind in KINDS:
                     yield Label(kind, markup=False)
-                    yield Select(
-                        [(name, name) for name in names(kind)],
-                        id=kind,
-                        allow_blank=False,
-                        compact=True,
-                        tooltip=tooltip,
-                    )
+                    yield Select([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
             yield Grid(*_widgets(form.BASIC), id="basic", classes="grid")
             yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
@@ -122,7 +111,7 @@ class OptionsForm(Vertical):
 
     @property
     def method(self) -> tuple[str, str]:
-        algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in METHOD)
+        algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in KINDS)
         return f"{partitioning}/{prioritization}", algorithm
 
     @property
@@ -193,7 +182,7 @@ class OptionsForm(Vertical):
     def _dim(self) -> None:
         """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
         algorithm = self.method[1]
-        for kind in METHOD:
+        for kind in KINDS:
             unused = kind != "algorithm" and kind not in uses(algorithm)
             self.query_one(f"#{kind}").set_class(unused, "-unused")
         for id, field in self._fields():
@@ -276,7 +265,7 @@ class OptionsForm(Vertical):
     def _picked(self, event: Select.Changed) -> None:
         event.stop()
         self._dim()
-        if event.select.id in METHOD:
+        if event.select.id in KINDS:
             self._explain(event.select)
         self._edited(event.select)
 

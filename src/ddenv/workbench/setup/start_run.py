@@ -40,7 +40,7 @@ def command_words(
 
     before, after = own.model_dump(mode="json"), asked.model_dump(mode="json")
     bundled = source.parent == SCENARIOS and source.suffix == ".yaml"
-    words = ["ddenv", "run", source.stem if bundled else _path(source)]
+    words = ["ddenv", "run", source.stem if bundled else str(source.absolute())]
     for place, fields in (("spawn", form.SPAWN), ("goal", form.GOAL)):
         numbers = [read_key(after, field.key) for field in fields]
         if bare or numbers != [read_key(before, field.key) for field in fields]:
@@ -53,16 +53,12 @@ def command_words(
             words += one.words(read(after, one))
     for option, values in reading.items():
         for value in values:
-            words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
+            words += [f"--{option.replace('_', '-')}", str(value.absolute()) if isinstance(value, Path) else str(value)]
     if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]
     if not name:
         return words
-    return [*words, "--output", _path(Path(name))] if len(Path(name).parts) > 1 else [*words, "--name", name]
-
-
-def _path(path: Path) -> str:
-    return str(path.absolute())
+    return [*words, "--output", str(Path(name).absolute())] if len(Path(name).parts) > 1 else [*words, "--name", name]
 
 
 def create(

@@ -58,12 +58,9 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     listed = found[:LISTED]
     snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
     models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
-    return (*models, *_nearest(file, state)), len(found) - len(listed)
-
-
-def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
     passing = nearest(file, state)
-    return () if passing is None else (_of_nearest(state, passing),)
+    last = () if passing is None else (_of_nearest(state, passing),)
+    return (*models, *last), len(found) - len(listed)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
