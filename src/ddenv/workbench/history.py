@@ -23,6 +23,7 @@ from ddenv.words.slices import slice_in_short
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.side_by_side import SideBySide
+from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_lines
 from ddenv.workbench.widgets.lines import Lines
@@ -131,7 +132,7 @@ class History(Screen[int | None]):
             return
         now, command = self._look_at(), GoBack(node.number)
         if why := refusal(command, now):
-            self._refuse(why)
+            refuse(self, why)
             return
         ask(self.app, question(command, now.state), lambda: self.dismiss(node.number))
 
@@ -147,15 +148,12 @@ class History(Screen[int | None]):
     def action_compare(self) -> None:
         node = self.under_cursor
         if node is None or self._marked is None:
-            self._refuse("mark one environment first (m), then move to another and press c")
+            refuse(self, "mark one environment first (m), then move to another and press c")
         elif node.number == self._marked:
-            self._refuse("this one is marked: move to another one")
+            refuse(self, "this one is marked: move to another one")
         else:
             first = self._tree[self._marked]
             self.app.push_screen(SideBySide("Two environments side by side", lines(first, node, self._here)))
-
-    def _refuse(self, why: str) -> None:
-        self.notify(why, severity="warning", timeout=4, markup=False)
 
 
 def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]]:

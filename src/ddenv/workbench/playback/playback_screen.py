@@ -32,6 +32,7 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
+from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.world.pose import pose_at
 
@@ -54,10 +55,6 @@ class Playing:
     def __init__(self, length: float, speed: float = USUAL) -> None:
         self.length, self.time, self.speed, self.on = length, 0.0, speed, False
 
-    @property
-    def at_end(self) -> bool:
-        return self.time >= self.length
-
     def go(self, time: float) -> None:
         self.on = False
         self.time = min(max(0.0, time), self.length)
@@ -69,7 +66,7 @@ class Playing:
         self.go((whole + number) * FRAME)
 
     def toggle(self) -> None:
-        if not self.on and self.at_end:
+        if not self.on and self.time >= self.length:
             self.time = 0.0
         self.on = not self.on and self.length > 0
 
@@ -83,7 +80,7 @@ class Playing:
     def advance(self, seconds: float) -> None:
         if self.on:
             self.time = min(self.length, self.time + seconds * self.speed)
-            self.on = not self.at_end
+            self.on = self.time < self.length
 
 
 def now() -> float:
@@ -180,7 +177,7 @@ class Playback(Screen[None]):
         try:
             self._take(numbers)
         except UserError as error:
-            self._refuse(str(error))
+            refuse(self, str(error))
             return
         self.playing.go(at)
         self._put()
@@ -268,16 +265,16 @@ class Playback(Screen[None]):
 
     def action_speed(self, steps: int) -> None:
         if not self.playing.faster(steps):
-            self._refuse(f"{SPEEDS[0]:g} to {SPEEDS[-1]:g} × real time")
+            refuse(self, f"{SPEEDS[0]:g} to {SPEEDS[-1]:g} × real time")
         self._show()
 
     def action_parting(self) -> None:
         if self._parting is not None:
             self._go(self._parting[0])
         elif len(self._tests) == 2:
-            self._refuse(f"the robots are never {APART:g} m apart")
+            refuse(self, f"the robots are never {APART:g} m apart")
         else:
-            self._refuse("this is one test; o plays another one over it")
+            refuse(self, "this is one test; o plays another one over it")
 
     def action_beside(self) -> None:
         first, state = self._tests[0].test, self._position.end
@@ -299,7 +296,7 @@ class Playback(Screen[None]):
         if len(self._tests) == 2:
             self._change([one.test.id for one in reversed(self._tests)])
         else:
-            self._refuse("this is one test; o plays another one over it")
+            refuse(self, "this is one test; o plays another one over it")
 
     def action_test(self, by: int) -> None:
         tests, number = self._position.end.tests, self._tests[0].test.id + by
@@ -308,10 +305,7 @@ class Playback(Screen[None]):
         if 0 < number <= len(tests):
             self._change([number])
         else:
-            self._refuse("there is no finished test after this one" if by > 0 else "there is no test before this one")
-
-    def _refuse(self, why: str) -> None:
-        self.notify(plain(why), severity="warning", timeout=4, markup=False)
+            refuse(self, "there is no finished test after this one" if by > 0 else "there is no test before this one")
 
 
 def others(tests: Sequence[Test], one: Test) -> list[Test]:

@@ -21,6 +21,7 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.runs import processor
 from ddenv.runs.folder import attach_name
 from ddenv.text import duration, plain
+from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine
 
@@ -83,7 +84,7 @@ class Asking:
         return words if late < PATIENCE else f"{words}: no answer for {duration(late)}"
 
     def refuse(self, why: str) -> None:
-        self._screen.notify(plain(why), severity="warning", timeout=4, markup=False)
+        refuse(self._screen, why)
 
     def say(self, what: str) -> None:
         self._screen.notify(plain(what), timeout=4, markup=False)

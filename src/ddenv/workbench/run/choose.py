@@ -186,19 +186,12 @@ class Layers(ModalScreen[None]):
         mark = "[x]" if name in self._world.shown.layers else "[ ]"
         return Text(f"{mark} {name:<11} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
 
-    def action_switch(self) -> None:
-        place = self.query_one(OptionList).highlighted
-        if place is not None:
-            self._toggle(place)
-
     @on(OptionList.OptionSelected)
-    def _selected(self, event: OptionList.OptionSelected) -> None:
-        self._toggle(event.option_index)
-
-    def _toggle(self, place: int) -> None:
-        name = self._names[place]
-        self._world.toggle_layer(name)
-        self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
+    def action_switch(self) -> None:
+        options = self.query_one(OptionList)
+        if (place := options.highlighted) is not None:
+            self._world.toggle_layer(self._names[place])
+            options.replace_option_prompt_at_index(place, self._prompt(self._names[place]))
 
 
 def copied(what: str, text: str) -> Text:

@@ -25,7 +25,7 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
-from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.shared.background import call_if_open, is_open, refuse
 from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup
 from ddenv.workbench.widgets.path_entry import PathEntry
@@ -208,9 +208,9 @@ class RunsScreen(Screen[None]):
     def _readable(self) -> Recent | None:
         run = self._chosen
         if run is None:
-            self._complain("there is no run here")
+            refuse(self, "there is no run here")
         elif run.trouble:
-            self._complain(run.trouble)
+            refuse(self, run.trouble)
         else:
             return run
         return None
@@ -218,9 +218,9 @@ class RunsScreen(Screen[None]):
     def action_delete(self) -> None:
         run = self._chosen
         if run is None:
-            self._complain("there is no run here")
+            refuse(self, "there is no run here")
         elif run.is_worked_on:
-            self._complain("its engine is at work: open the run and stop it first")
+            refuse(self, "its engine is at work: open the run and stop it first")
         else:
             self.app.run_worker(self._delete(run.path))
 
@@ -228,7 +228,7 @@ class RunsScreen(Screen[None]):
         try:
             await to_thread(delete_run, path)
         except UserError as error:
-            self._complain(str(error))
+            refuse(self, str(error))
             return
         self.notify(f"{plain(path.stem)} is deleted; u brings it back, for a week", timeout=4, markup=False)
         self._runs = [run for run in self._runs if run.path != path]
@@ -244,14 +244,11 @@ class RunsScreen(Screen[None]):
         try:
             path = await to_thread(bring_back, runs_folder())
         except UserError as error:
-            self._complain(str(error))
+            refuse(self, str(error))
             return
         self.notify(f"{plain(path.stem)} is back", timeout=3, markup=False)
         if is_open(self):
             self._look()
-
-    def _complain(self, why: str) -> None:
-        self.notify(why, severity="warning", timeout=4, markup=False)
 
     def action_sort(self) -> None:
         names = list(ORDERS)
@@ -273,10 +270,10 @@ class RunsScreen(Screen[None]):
     def action_compare(self) -> None:
         marked = next((run for run in self._runs if run.path == self._marked), None)
         if marked is None:
-            self._complain("mark a run first (m), then go to another one and press c")
+            refuse(self, "mark a run first (m), then go to another one and press c")
         elif (run := self._readable()) is not None:
             if run.path == marked.path:
-                self._complain("this is the marked run: go to another one")
+                refuse(self, "this is the marked run: go to another one")
             else:
                 from ddenv.workbench.runs.compare_runs import lines
 
@@ -295,7 +292,7 @@ class RunsScreen(Screen[None]):
         if words and path.is_file():
             self.post_message(ShowRun(path))
         elif words:
-            self._complain(f"{plain(path)}: no such run file")
+            refuse(self, f"{plain(path)}: no such run file")
 
     def action_filter(self) -> None:
         self.add_class("-filtering")

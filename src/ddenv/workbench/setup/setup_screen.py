@@ -146,8 +146,6 @@ class SetupScreen(Screen[None]):
         words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
         self.query_one("#small", Static).update(words)
 
-    # The list of choices.
-
     @work(thread=True, group="recent", exclusive=True)
     def _list_files(self) -> None:
         from ddenv.world.load import SCENARIOS, bundled_names
@@ -184,8 +182,6 @@ class SetupScreen(Screen[None]):
             self._opened_now = path
             self._show_pane("choose")
             self.query_one(FileList).add(path)
-
-    # The choice.
 
     @on(FileList.Looked)
     def _choose(self, event: FileList.Looked) -> None:
@@ -225,8 +221,6 @@ class SetupScreen(Screen[None]):
             self._past = event.past
             self._show_outcome()
 
-    # Places on the map.
-
     def action_pick(self, what: str) -> None:
         if self.preview.choice is None:
             self.notify("there is no world to pick a place in yet", severity="warning", timeout=3)
@@ -237,8 +231,6 @@ class SetupScreen(Screen[None]):
     def action_missing(self) -> None:
         self._show_pane("map")
         (self.preview.missing if self.preview.missing.display else self.preview.map).focus()
-
-    # Cost and command.
 
     @on(OptionsForm.Edited)
     def _edited(self, event: OptionsForm.Edited) -> None:
@@ -293,8 +285,6 @@ class SetupScreen(Screen[None]):
         self.app.copy_to_clipboard(shlex.join(words))
         self.notify("command copied, if the terminal allows it", timeout=3)
 
-    # Start.
-
     @on(Button.Pressed, "#start")
     @on(Input.Submitted)
     def action_start(self) -> None:
@@ -348,8 +338,6 @@ class SetupScreen(Screen[None]):
             self._show_pane("settings")
         self.form.complain(error)
 
-    # Save as a scenario.
-
     def action_save(self) -> None:
         from ddenv.workbench.setup.save_scenario import SaveScenario
 
@@ -364,8 +352,6 @@ class SetupScreen(Screen[None]):
         if path is not None:
             self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
             self._opened(path)
-
-    # Panes.
 
     def _show_pane(self, pane: str) -> None:
         self._pane = pane

@@ -31,7 +31,7 @@ from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
-from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.background import call_if_open, refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
@@ -239,15 +239,16 @@ class WhyScreen(Screen[None]):
     def action_play(self) -> None:
         one = self.entry
         if one is None or one.parting is None:
-            self._refuse(
-                "there are no two runs to play: none with the model and one without it have the same seed and other ends"
+            refuse(
+                self,
+                "there are no two runs to play: none with the model and one without it have the same seed and other ends",
             )
             return
         try:
             both = one.parting.with_test, one.parting.without_test
             self.app.push_screen(Playback(self._file, self._position, self._place, *both))
         except UserError as error:
-            self._refuse(str(error))
+            refuse(self, str(error))
 
     def action_isolate(self) -> None:
         self._ask(Stop() if self._look_at().isolates else Isolate())
@@ -259,13 +260,10 @@ class WhyScreen(Screen[None]):
         command = remedy(self._state, self._look_at().works, attach_name(self._file.path))
         lines = [one.text for one in self._entries]
         if not lines and not command:
-            self._refuse("there is nothing to copy yet")
+            refuse(self, "there is nothing to copy yet")
             return
         self.app.copy_to_clipboard("\n".join(map(plain, lines or [command])))
         self.notify("copied, if the terminal allows it", timeout=3)
-
-    def _refuse(self, why: str) -> None:
-        self.notify(plain(why), severity="warning", timeout=4, markup=False)
 
 
 class MarginsDialog(Reading):
