@@ -63,7 +63,7 @@ def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     scenario = load_scenario(path) if kind == "scenario" else None
     file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
     read_as = reading_of(own, **reading)
-    return read_world(file, read_as, announce), read_as
+    return read_world(file, read_as), read_as
 
 
 # How a world was read: a table for people, plain data for programs.
