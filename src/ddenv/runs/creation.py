@@ -48,16 +48,13 @@ def create_named(
         trust_cluster(scenario)
     check_named(scenario, subject, asks)
     path = run_path(scenario.name, name, output)
-    return path, create_run(scenario, path, announce)
+    return path, create_run(scenario, path)
 
 
-def create_run(scenario: Scenario, path: Path, announce: Announce | None = None) -> World:
-    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written.
-
-    Calls `announce` with a line of text before slow steps.
-    """
+def create_run(scenario: Scenario, path: Path) -> World:
+    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written."""
     check_cluster(scenario.reduction.cluster)
-    world, _ = load_parts(scenario, announce)
+    world, _ = load_parts(scenario)
     documents = {"world": world.text, "robot": read_bytes(scenario.robot.model)}
     documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
     _write(scenario, world, path, documents)

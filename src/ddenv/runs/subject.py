@@ -54,12 +54,12 @@ class Subject:
 def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
     """What `name` stands for: a run if there is one of that name, else a scenario or a world with the options `given`.
 
-    Calls `announce` with a line before slow steps. Raises UserError.
+    `announce` gets a line on what is remembered. Raises UserError.
     """
     kind, path = named(name) or ("scenario", Path(name))
     if kind != "run":
         scenario = scenario_named(name, given, announce)
-        return Subject(scenario, *load_parts(scenario, announce))
+        return Subject(scenario, *load_parts(scenario))
     if any(value is not None and value != () for option, value in given.items() if option != "remembered"):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
@@ -108,7 +108,7 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = load_scenario(find_scenario(name))
     elif spawn is None or goal is None:
         # A file that is no world needs no places either.
-        read_world(Path(name), reading_of(**reading), announce)
+        read_world(Path(name), reading_of(**reading))
         example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
         raise UserError(f"{name}: a world needs a start and a goal, such as {example}")
     elif given["world"] is not None:
@@ -198,16 +198,16 @@ def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, 
     return data
 
 
-def load_parts(scenario: Scenario, announce: Announce | None = None) -> tuple[World, Model]:
+def load_parts(scenario: Scenario) -> tuple[World, Model]:
     """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
 
-    Calls `announce` with a line before slow steps. Raises UserError.
+    Raises UserError.
     """
     if scenario.oracle is not None:
         command_words(scenario)
     reading, robot_file = scenario.reading, scenario.robot.model
-    world = read_world(scenario.world, reading, announce)
-    around_robot = disk_of(robot_file, reading, announce)
+    world = read_world(scenario.world, reading)
+    around_robot = disk_of(robot_file, reading)
     robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
     world = replace(world, resources={**world.resources, **around_robot.taken})
     check_parts(scenario, world, robot)
