@@ -11,9 +11,8 @@ from functools import partial
 
 import pytest
 
-from ddenv.engine import disturbances
-from ddenv.engine.control import Control
-from ddenv.engine.disturbances import NEEDED, ClockJumps, DiskSpace
+from ddenv.engine import control
+from ddenv.engine.control import NEEDED, ClockJumps, Control, DiskSpace
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile.events import EngineStarted, Paused, TestFinished
@@ -49,8 +48,8 @@ def undisturbed(tmp_path):
 
 
 def disk(monkeypatch, free):
-    monkeypatch.setattr(disturbances, "PERIOD", 0.0)
-    monkeypatch.setattr(disturbances.shutil, "disk_usage", lambda _: Usage(free()))
+    monkeypatch.setattr(control, "PERIOD", 0.0)
+    monkeypatch.setattr(control.shutil, "disk_usage", lambda _: Usage(free()))
 
 
 def lines_and_kinds(path):

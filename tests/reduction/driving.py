@@ -13,10 +13,10 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction import procedure as steps
+from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.procedure import Certificate, Leg, Past
 from ddenv.reduction.stacks import Stacks
-from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.worlds import evidence
 

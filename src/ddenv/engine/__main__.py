@@ -18,8 +18,7 @@ from typing import Literal
 from ddenv import __version__
 from ddenv.engine.beginning import check_crash_loop, check_repeats, note_start
 from ddenv.engine.bench import Bench
-from ddenv.engine.control import Control, Stopped
-from ddenv.engine.disturbances import DiskSpace
+from ddenv.engine.control import Control, DiskSpace, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal

@@ -19,7 +19,7 @@ from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
 from ddenv.engine.slicing import audit_is_due, compare
-from ddenv.engine.worker import Broken, Start
+from ddenv.engine.worker import Broken, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Test
@@ -181,7 +181,7 @@ class Bench:
         if known is not None and (taken := result_of(known)) is not None:
             self._taken.append((number, taken))
         else:
-            self._pool.submit(number, keep, seed, full, wall_limit(state))
+            self._pool.submit(number, Run(keep, seed, full, wall_limit(state)))
         return False
 
     def settle(self, elements: frozenset[str], late: Callable[[], None]) -> Start | Broken:
@@ -220,10 +220,10 @@ class Bench:
             return
         for trial in self._open_trials():
             environment = self._journal.state.environments[trial.environment]
-            now = standing([environment], self._journal.shown, self.rule)
-            if now.verdicts[0]:
-                self._judge(trial, environment, now.verdicts[0])
-            for _, run in now.wanted:
+            (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
+            if verdict:
+                self._judge(trial, environment, verdict)
+            for _, run in wanted:
                 test = Test(environment, run, "hand")
                 if self._key(test) in self._started:
                     continue
@@ -231,7 +231,7 @@ class Bench:
                     return
 
     def _judge(self, trial: Trial, environment: Environment, verdict: str) -> None:
-        runs, _ = decided_by(lambda run: self._journal.shown(environment, run), self.rule)
+        runs, _ = decided_by(self._journal.shown, environment, self.rule)
         tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
         known = sum(self._journal.state.tests[test - 1].trial != trial.number for test in tests)
         self._journal.record(TrialJudged(trial.number, verdict, tests, known))
@@ -331,7 +331,7 @@ class Bench:
 def made_again(journal: Journal, pool: Workers, control: Control, test: KnownTest) -> RunResult | Broken | None:
     """Makes a run of the whole world again; returns how it ended unless it repeats to the last bit. Raises Stopped."""
     journal.record(Comparing(test.id))
-    pool.submit(0, frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state))
+    pool.submit(0, Run(frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state)))
     while not (ended := pool.finished(WAIT)):
         control.poll()
     result = ended[0][1]

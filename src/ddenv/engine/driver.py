@@ -21,12 +21,12 @@ from ddenv.evidence.certificate import RUNS_BESIDE, Terms, error_of
 from ddenv.evidence.claims import current, is_minimal
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
+from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, playing
 from ddenv.reduction.guide import Guide, Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
-from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest

@@ -16,7 +16,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
-from ddenv.engine.worker import Broken
+from ddenv.engine.worker import Broken, Run
 from ddenv.errors import UserError
 from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
@@ -186,7 +186,7 @@ class _Search:
         # Fresh runs are full ones, as those of a certificate.
         seed, full = seed_of(self._parts[0].reduction, run), run >= known.FIRST_FIX_RUN
         limit = wall_limit(self._journal.state)
-        self._pool.submit(self._submitted, self._kept, seed, full, limit, ((name, value),))
+        self._pool.submit(self._submitted, Run(self._kept, seed, full, limit, ((name, value),)))
         self._control.started()
 
     def _record(self, one: Wanted, result: RunResult | Broken) -> None:

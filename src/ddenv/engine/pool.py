@@ -10,14 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
 from ddenv.engine.worker import (
     Broken,
-    Changes,
     Make,
     Moment,
     Ready,
@@ -94,15 +93,7 @@ class Workers(Protocol):
     def idle(self) -> int: ...
     @property
     def busy(self) -> int: ...
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None: ...
+    def submit(self, test: int, run: Run) -> None: ...
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]: ...
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]: ...
     def live(self) -> list[tuple[Live, float]]: ...
@@ -180,22 +171,10 @@ class Pool:
         """How many tests are running."""
         return sum(slot.job is not None and slot.job.test is not None for slot in self._slots)
 
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None:
-        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other
-        values of numbers by name.
-
-        It may take `limit` s of real time, without its preparation; None for what the scenario says.
-        """
-        limit = limit or self._limit
-        self._start(Job(test, Run(keep, seed, full, limit, changes), limit + self._margin))
+    def submit(self, test: int, run: Run) -> None:
+        """Starts a test on an idle worker."""
+        limit = run.limit or self._limit
+        self._start(Job(test, replace(run, limit=limit), limit + self._margin))
 
     def _start(self, job: Job) -> _Slot:
         """Starts a job on an idle worker, one that has prepared if possible."""

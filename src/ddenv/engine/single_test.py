@@ -11,6 +11,7 @@ from typing import Any
 
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
+from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
@@ -105,7 +106,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     try:
         while shown < len(trials):
             while pool.idle and started < len(trials):
-                pool.submit(started, trials[started].keep, trials[started].seed, full=True)
+                pool.submit(started, Run(trials[started].keep, trials[started].seed))
                 started += 1
             for index, result in pool.finished(1.0):
                 trial = trials[index]

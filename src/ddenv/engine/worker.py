@@ -67,12 +67,15 @@ class Start:
 
 @dataclass(frozen=True)
 class Run:
-    """Asks for a test of at most `limit` s of real time, where `changes` have other values of numbers by name."""
+    """Asks for a test. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other values by name.
+
+    It may take `limit` s of real time, without its preparation; None for what the scenario says.
+    """
 
     keep: frozenset[str]
     seed: int
-    full: bool
-    limit: float
+    full: bool = True
+    limit: float | None = None
     changes: Changes = ()
 
 
@@ -187,7 +190,7 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
             return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
         if isinstance(simulator, ExternalSimulator):
             # It ends a test itself, and says why.
-            simulator.limit = task.limit
+            simulator.limit = task.limit or simulator.limit
         return simulator.run(task.keep, task.seed, _progress(tell), task.full)
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:

@@ -34,7 +34,6 @@ from ddenv.evidence.certificate import (
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.guide import Search
 from ddenv.reduction.round import Candidate, Partition, Round
-from ddenv.reduction.stepping_back import groups_again, last_good
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
@@ -375,8 +374,8 @@ def judge(
             # The user may want a candidate that was passed over after all.
             judged, refusals = 0, driver.refusals
         candidates = islice(environments, judged, None)
-        now = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
-        for verdict in now.verdicts:
+        verdicts, wanted = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
+        for verdict in verdicts:
             if not verdict:
                 break
             environment = environments[judged]
@@ -385,16 +384,16 @@ def judge(
             if verdict == "similar":
                 return judged
             judged += 1
-        if not now.wanted:
+        if not wanted:
             return None
-        yield Wants(tuple(Test(environments[index], run, why, index) for index, run in now.wanted))
+        yield Wants(tuple(Test(environments[index], run, why, index) for index, run in wanted))
 
 
 def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
     if driver.refused(environment):
         return Judged(index, environment, "missed", 0)
     # By these runs alone: more of them may have ended.
-    runs, hits = decided_by(lambda run: driver.shown(environment, run), rule)
+    runs, hits = decided_by(driver.shown, environment, rule)
     missed = verdict == "dissimilar" and not usual.verdict(hits, runs - hits)
     return Judged(index, environment, "missed" if missed else verdict, runs)
 
@@ -518,3 +517,28 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
     tests = tuple((environment, first + run) for claim in claims.values() for environment, run in claim.rests_on)
     leg: Leg = yield SteppedBack(place, again, tests)
     return leg
+
+
+def groups_again(good: Environment, bad: Environment, end: Environment) -> list[Partition]:
+    """What to leave out of `good` at once: all that went after `bad`, then halves of what went from `good` to `bad`."""
+    later, step = tuple(bad - end), tuple(good - bad)
+    halves = [step[: len(step) // 2], step[len(step) // 2 :]] if len(step) > 1 else []
+    return [group for group in (later, *halves) if group]
+
+
+def last_good(
+    chain: Sequence[Environment], judged: Callable[[Environment], Claim]
+) -> int | tuple[tuple[Environment, int], ...]:
+    """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
+
+    `chain` begins with the whole world and ends with what has lost the rate. `judged` carries `good_enough` as far as the
+    finished runs go. By bisection: it assumes that the rate falls along the chain. The next one has been judged, too, and lost it.
+    """
+    good, bad = 0, len(chain) - 1
+    while bad - good > 1:
+        place = (good + bad) // 2
+        claim = judged(chain[place])
+        if not claim.verdict:
+            return claim.wanted + claim.later
+        good, bad = (place, bad) if claim.verdict == "kept" else (good, place)
+    return good

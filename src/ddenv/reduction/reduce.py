@@ -20,10 +20,10 @@ from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, Verdict, error_of
 from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate
 from ddenv.reduction import procedure as steps
+from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
 from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Partition, Round
-from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.settings import SETTINGS
 
@@ -212,7 +212,7 @@ def reduce(
         leg = caller.leg()
         caller.carry_out(steps.search_on(caller, leg))
         rests = [caller.left - Environment.of((element,)) for element in caller.left]
-        minimal = all(standing([rest], caller.shown, leg.rule).verdicts[0] == "dissimilar" for rest in rests)
+        minimal = all(standing([rest], caller.shown, leg.rule)[0] == ["dissimilar"] for rest in rests)
     tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
     return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
 

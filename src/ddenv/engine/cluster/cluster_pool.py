@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from queue import Empty, SimpleQueue
@@ -26,7 +26,7 @@ from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Changes, Start
+from ddenv.engine.worker import Broken, Run, Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -73,7 +73,7 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0)
+        self._whole = Run(frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0))
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.
@@ -93,7 +93,7 @@ class ClusterPool:
         tell(0, f"asking the Dask scheduler of {cluster}")
         self._link = Link(cluster, self._later(self._attached), self._later(self._there), self._later(self._lost))
         if self._compares:
-            self._here().submit(REFERENCE, *self._whole)
+            self._here().submit(REFERENCE, self._whole)
 
     def _here(self) -> Pool:
         """The process on this machine."""
@@ -123,21 +123,13 @@ class ClusterPool:
     def busy(self) -> int:
         return len(self._tests) + len(self._waiting) + len(self._ready)
 
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None:
+    def submit(self, test: int, run: Run) -> None:
         """Has a worker make a test, as soon as there is one; as `Pool.submit`."""
-        if self._reference is not None and full and not changes and (keep, seed) == self._whole:
+        if self._reference is not None and replace(run, limit=None) == self._whole:
             # It was made here in any case.
             self._ready.append((test, self._reference))
             return
-        self._waiting.append(Asked(self._run, self._topic, test, keep, seed, full, limit, changes))
+        self._waiting.append(Asked(self._run, self._topic, test, run))
         self._send()
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
@@ -224,7 +216,7 @@ class ClusterPool:
 
     def _ask(self, worker: _Worker) -> None:
         """Asks a new worker who it is, and what bits it computes."""
-        whole = Asked(self._run, self._topic, REFERENCE, *self._whole, True, None)
+        whole = Asked(self._run, self._topic, REFERENCE, self._whole)
         self._hand_out(worker, greet, whole, None)
 
     def _send(self) -> None:

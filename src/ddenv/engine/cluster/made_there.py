@@ -21,7 +21,7 @@ from distributed import Worker, get_worker
 from ddenv import __version__
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Changes
+from ddenv.engine.worker import Broken, Run
 from ddenv.robot.result import RunResult
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
@@ -41,16 +41,12 @@ Parts = tuple[Scenario, World, Model]
 
 @dataclass(frozen=True)
 class Asked:
-    """A test to make in the world of `run`, whose progress goes to `topic`. `limit` and `changes` as in `Pool.submit`."""
+    """A test to make in the world of `run`, whose progress goes to `topic`."""
 
     run: str
     topic: str
     test: int
-    keep: frozenset[str]
-    seed: int
-    full: bool
-    limit: float | None
-    changes: Changes = ()
+    task: Run
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,7 @@ def make(parts: bytes, asked: Asked) -> RunResult | Broken:
     worker = get_worker()
     key = worker.get_current_task()
     with _child(parts, asked.run) as child:
-        child.submit(asked.test, asked.keep, asked.seed, asked.full, asked.limit, asked.changes)
+        child.submit(asked.test, asked.task)
         due = 0.0
         while not (ended := child.finished(LOOK)):
             if not _is_wanted(worker, key):
