@@ -1,15 +1,18 @@
 """How many tests are left of a run, by the engine's forecast, and how many a reduction takes roughly."""
 
+import math
 from random import Random
 from statistics import median
 
+import numpy as np
 import pytest
 
+import ddenv
 from ddenv.evidence.certificate import Terms, error_of, falls, keeps, settle
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import narrowed
-from ddenv.runs.tests_left import left_said, remaining, rough_run, rough_tests
+from ddenv.runs.tests_left import left_said, remaining, rough_run, search_tests
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
@@ -25,6 +28,17 @@ MEASURED = (
 )
 
 
+# The paper's own algorithm.
+PAPER = {"growth": "paper", "skip": "known"}
+
+
+def first(algorithm, iterations, as_printed=False):
+    """The settings of a search that takes what shows f once."""
+    changes = {"algorithm": algorithm, "iterations": iterations, "accept_rate": "first"}
+    growth = {"growth": "paper" if as_printed else "steady"}
+    return load_scenario(DATA / "wall.yaml").reduction.model_copy(update=changes | growth)
+
+
 def state_of(run):
     return fold(run.file.events())
 
@@ -37,7 +51,7 @@ def left(run, at_work=True):
 def test_a_rough_interval_holds_what_random_worlds_took(algorithm, as_printed, cells):
     for models, steady, flaky in cells:
         for tests, iterations in ((steady, 0), (flaky, 3)):
-            low, likely, high = rough_tests(models, algorithm, 1 + iterations, as_printed)
+            low, likely, high = search_tests(models, first(algorithm, iterations, as_printed))
             assert low <= tests <= high
             assert low <= likely <= high
 
@@ -45,8 +59,40 @@ def test_a_rough_interval_holds_what_random_worlds_took(algorithm, as_printed, c
 @pytest.mark.parametrize("models", [0, 1, 2, 3])
 @pytest.mark.parametrize("algorithm", ["ddenv", "ddmin", "probdd", "splitting", "theirs"])
 def test_tiny_worlds_take_few_tests(models, algorithm):
-    low, likely, high = rough_tests(models, algorithm, 4, as_printed=True)
+    low, likely, high = search_tests(models, first(algorithm, 3, as_printed=True))
     assert 0 <= low <= likely <= high < 60
+
+
+def rounds_of(seed, options):
+    """The rounds of a search in a random world: how many models are left, and how many tests it makes from then on."""
+    places, rounds, made = np.random.default_rng(seed).uniform(0, 20, (24, 2)).tolist(), [], []
+    positions = {f"m{place}": (x, y, 0.0) for place, (x, y) in enumerate(places)}
+    near = sorted(positions, key=lambda name: math.dist(positions[name], (10, 10, 0)))
+    needed = set(Random(seed).sample(near[:8], 2 + seed % 3))
+    ddenv.reduce(
+        positions,
+        lambda kept: made.append(kept) or kept >= needed,
+        positions=positions,
+        failure_pose=(10, 10, 0),
+        iterations=3,
+        accept_rate="first",
+        check=False,
+        on_round=lambda round: rounds.append((len(round.environment), len(made))),
+        **options,
+    )
+    return [(models, len(made) - before) for models, before in rounds]
+
+
+@pytest.mark.parametrize(
+    "options", [PAPER, *({"algorithm": name} for name in ("ddenv", "ddmin", "probdd", "splitting"))]
+)
+@pytest.mark.rates
+def test_in_most_rounds_what_is_left_to_test_is_in_the_interval(options):
+    asked, inside = first(options.get("algorithm", "ddenv"), 3, options == PAPER), []
+    for models, left in (each for seed in range(6) for each in rounds_of(seed, options)):
+        low, _, high = search_tests(models, asked)
+        inside.append(low <= left <= high)
+    assert sum(inside) >= 0.8 * len(inside) >= 20
 
 
 def certified(rate, certify_rate, left, at_least, random):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,39 +41,6 @@ PATIENCE = 1.0
 # Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no display, a full disk), all tests
 # break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
 MOST_BROKEN = 25
-# The part of all time that background work may take; and besides that, s: at first, when most is unknown, and for each test that
-# has ended.
-SHARE, FIRST, AFTER_TEST = 0.01, 0.5, 0.002
-
-
-class Background:
-    """Work that may wait, such as forecasts: advances `steps` of some milliseconds as long as there is time for them.
-
-    What begins next takes the place of what is left.
-    """
-
-    def __init__(self) -> None:
-        self._steps: Iterator[object] = iter(())
-        self._began = time.monotonic()
-        self._spent = 0.0
-        self._ended = 0
-
-    def begin(self, steps: Iterator[object]) -> None:
-        """From now on advances `steps`."""
-        self._steps = steps
-
-    def test_ended(self) -> None:
-        """A test has ended: some more time may be taken."""
-        self._ended += 1
-
-    def step(self) -> bool:
-        """Makes one step; returns False where none is left, or no time for it."""
-        began = time.monotonic()
-        if self._spent > FIRST + AFTER_TEST * self._ended + SHARE * (began - self._began):
-            return False
-        made = next(self._steps, self) is not self
-        self._spent += time.monotonic() - began
-        return made
 
 
 class Bench:
@@ -98,10 +65,7 @@ class Bench:
         self._next_live = 0.0
         self._live_shown = False
         self._broken = 0
-        self.background = Background()
         self.rule = Acceptance(1)
-        # Whether no test ended at the last look: where tests end at once, nobody waits for what may wait.
-        self._quiet = False
 
     def work(self, tests: Sequence[Test]) -> None:
         """Starts as many of the wanted tests as workers are free, the first ones first, and looks around once.
@@ -264,14 +228,11 @@ class Bench:
 
     def _look_around(self, wait: float) -> None:
         self._control.poll()
-        works = self._quiet and self._pool.busy > 0 and self.background.step()
         taken, self._taken = self._taken, []
-        finished = sorted([*taken, *self._pool.finished(0.0 if works or taken else wait)], key=lambda one: one[0])
+        finished = sorted([*taken, *self._pool.finished(0.0 if taken else wait)], key=lambda one: one[0])
         for test, result in finished:
             self._record(test, result)
-            self.background.test_ended()
             self._give_up_if_all_break(result)
-        self._quiet = not finished
         # Before the search gets the workers that are free now.
         self._serve_trials()
         if self._busy == 0:

@@ -2,8 +2,8 @@
 
 It runs nothing itself. Where it needs tests it yields `Wants`, with the tests in the order of need, and goes on once some of them
 have ended; the driver makes the first, and as many more as it has workers. Every other step that it yields says what was found, and
-`Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce` with a function, the forecast with
-dice. A resumed run drives it again through what is known.
+`Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce` with a function. A resumed run
+drives it again through what is known.
 
 1. `baseline`: the whole world is run; its failure is f.
 2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
