@@ -158,10 +158,9 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     before, after = (fold(written[: kinds.index("noted") + more]) for more in (0, 1))
     said = news("noted", before, after)
     assert said.startswith(
-        "this world is slow: 0.25 s simulated in each second; at this rate a test of 5 s takes 20 s, "
+        "this world is slow: 0.25 s simulated in each second; at this rate a test of 5 s takes 20 s; "
+        "what helps: fewer models that can move"
     )
-    assert "the baseline of 3 runs about 40 s" in said
-    assert "what helps: fewer models that can move" in said
     # The report keeps it.
     assert said[1:] in str(content(read_run(path)).lead)
 

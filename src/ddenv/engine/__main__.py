@@ -44,25 +44,17 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     parser.add_argument("--cluster", help="where the tests are made, in place of what the scenario says")
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    parser.add_argument("--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow")
     parser.add_argument(
-        "--bits", choices=("same", "mixed"), default="same", help="whether tests with other bits may follow"
-    )
-    parser.add_argument(
-        "--anyway", choices=("yes", "no"), default="no", help="whether to start although the last engines died at once"
+        "--anyway", choices=("yes", "no"), default="no", help="start although the last engines died at once"
     )
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
+    parser.add_argument("--certify", type=int, help="one more certificate, with at least so many runs of what is left")
     parser.add_argument(
-        "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
+        "--certify-rate", type=float, help="the last certificate goes on until it shows this part of the rate"
     )
     parser.add_argument(
-        "--certify-rate",
-        type=float,
-        help="go on with the last certificate until it shows that this part of the rate is kept",
-    )
-    parser.add_argument(
-        "--isolate",
-        type=int,
-        help="find the nearest world that passes, with at least so many fresh runs of it; 0: as many as usual",
+        "--isolate", type=int, help="find the nearest world that passes, with so many fresh runs; 0: as usual"
     )
     parser.add_argument(
         "--margins", help="find margins of the numbers with these names, a JSON list of globs; []: of all"
@@ -77,7 +69,13 @@ def main() -> int:
         signal.signal(number, lambda *_: terminated.set())
     try:
         with RunFile(options.run) as file, engine_lock(options.run):
-            return _give_up(file) if options.give_up == "yes" else _work(file, options, terminated)
+            if options.give_up == "no":
+                return _work(file, options, terminated)
+            file.own()
+            journal = Journal(file)
+            if journal.state.isolating is not None:
+                journal.record(events.IsolationGivenUp())
+            return 0
     except UserError as error:
         _say(str(error))
         return 2
@@ -143,15 +141,6 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     finally:
         file.set_live([])
         file.settle()
-    return 0
-
-
-def _give_up(file: RunFile) -> int:
-    """Ends the isolation that is open."""
-    file.own()
-    journal = Journal(file)
-    if journal.state.isolating is not None:
-        journal.record(events.IsolationGivenUp())
     return 0
 
 

@@ -19,7 +19,7 @@ from ddenv.runfile.store import Live
 from ddenv.runs import processor
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
-from ddenv.text import about, between, count, duration
+from ddenv.text import between, count, duration
 from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
@@ -98,27 +98,13 @@ def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
     state = journal.state
     if state.baseline is not None or state.scenario.get("oracle") is not None or "slow" in dict(state.notes):
         return
+    timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
     for live, real in running:
         if real >= KNOWN_AFTER and live.time < SLOW * real:
-            note(journal, "slow", _slow(state, live.time / real))
-
-
-def _slow(state: RunState, rate: float) -> str:
-    """What a slow world will cost: its baseline in full, then what is left to test of it after the slice (`rough_run`)."""
-    asked = Reduction.model_validate(state.scenario["reduction"])
-    timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
-    if rate <= 0.0:
-        return f"this world is slow: not even a tenth of a second was simulated in {KNOWN_AFTER:g} s; {HELPS}"
-    each = timeout / rate
-    runs, jobs = asked.baseline_runs, max(1, state.jobs)
-    baseline = duration(each * -(-runs // jobs))
-    low, likely, high = (each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds)
-    whole = about(likely, low, high)
-    return (
-        f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
-        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run about {whole}; "
-        f"{HELPS}, more --jobs"
-    )
+            # The first tenth of a second may not be over.
+            rate = max(live.time, 0.1) / real
+            words = f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
+            note(journal, "slow", f"{words}{duration(timeout / rate)}; {HELPS}, more --jobs")
 
 
 def give_up_if_late(journal: Journal, late: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 from ddenv.evidence.certificate import (
     HELPS_AFTER,
@@ -60,21 +59,12 @@ def certificate_tests(
     # A damaged run file may ask for nothing, or for all.
     rate, certify_rate = min(max(rate, 0.0), 1.0), min(max(certify_rate, 0.01), 0.99)
     seen, tests = min(max(0, seen), MOST_PAIRS), max(0, now.tests)
-    end, sure_end = _rate(now.end, rate, WORTH)
+    end = _rate(now.end, rate, WORTH)
     without = [_rate(each, 0.0, WORTH_WITHOUT) for each in (*now.without[:left], *[(0, 0)] * (left - len(now.without)))]
-    rates = [each for each, _ in without]
-    expected = _Expected(certify_rate, at_least)
-    likely = expected.tests(rate, end, rates)
+    likely = _expected(certify_rate, at_least, rate, end, without)
     ends = [likely]
-    if seen > 0:
-        of_whole = wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN)
-        ends += [expected.tests(each, end if now.end[1] else each, rates) for each in of_whole]
-    if now.end[1] > 0:
-        ends += [expected.tests(rate, each, rates) for each in _ends(end, sure_end)]
-    if now.tests and without:
-        # Of all removals, the one that may take longest.
-        place = max(range(left), key=lambda one: _ends(*without[one])[1])
-        ends.append(expected.tests(rate, end, [*rates[:place], _ends(*without[place])[1], *rates[place + 1 :]]))
+    for each in wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ():
+        ends.append(_expected(certify_rate, at_least, each, end if now.end[1] else each, without))
     # What is not known of the rates and chance within the certificate are independent factors.
     shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / likely)))
     longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / likely)))
@@ -84,37 +74,29 @@ def certificate_tests(
     return math.floor(low), round(tests + still), math.ceil(high)
 
 
-def _rate(of: Shown, before: float, worth: int) -> tuple[float, int]:
-    """The rate that runs show after `worth` runs at the rate `before`, and from how many runs in all."""
+def _rate(of: Shown, before: float, worth: int) -> float:
+    """The rate that runs show after `worth` runs at the rate `before`."""
     runs = min(max(0, of[1]), MOST_PAIRS)
-    return (min(max(0, of[0]), runs) + worth * before) / (runs + worth), runs + worth
+    return (min(max(0, of[0]), runs) + worth * before) / (runs + worth)
 
 
-def _ends(rate: float, runs: int) -> tuple[float, float]:
-    return wilson_interval(round(rate * runs), runs, EIGHT_OF_TEN)
+def _expected(certify_rate: float, at_least: int, rate: float, end: float, without: Sequence[float]) -> float:
+    """Its tests where the whole world shows f at `rate`, and what is left, and that without each model, at these rates.
 
-
-@dataclass(frozen=True)
-class _Expected:
-    """As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest stake on average."""
-
-    certify_rate: float
-    at_least: int
-
-    def tests(self, rate: float, end: float, without: Sequence[float]) -> float:
-        """Where the whole world shows f at `rate`, and what is left, and that without each model, at these rates."""
-        kept = (1.0 / self.certify_rate - 1.0, 1.0 / self.certify_rate, -1.0)
-        both, mine, theirs = _shares(end, rate)
-        alone = max(float(self.at_least), NEEDS / _growth((both + mine, 0.0, theirs), kept))
-        if alone <= MOST_ALONE:
-            of_left, of_whole = alone, alone * (1.0 - end)
-        else:
-            of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, mine, theirs), kept))
-        needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
-        removals = [NEEDS / _growth(_shares(each, end), needed) for each in without]
-        removals = [max(self.at_least, each if each <= MOST_REMOVAL_PAIRS else HELPS_AFTER) for each in removals]
-        lost = 2.0 * NEEDS_AGAINST / _growth((both, mine, theirs), needed)
-        return min(lost, max(of_left, *removals, 0.0) + of_whole + sum(removals))
+    As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest stake on average.
+    """
+    kept = (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0)
+    both, mine, theirs = _shares(end, rate)
+    alone = max(float(at_least), NEEDS / _growth((both + mine, 0.0, theirs), kept))
+    if alone <= MOST_ALONE:
+        of_left, of_whole = alone, alone * (1.0 - end)
+    else:
+        of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, mine, theirs), kept))
+    needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
+    removals = [NEEDS / _growth(_shares(each, end), needed) for each in without]
+    removals = [max(at_least, each if each <= MOST_REMOVAL_PAIRS else HELPS_AFTER) for each in removals]
+    lost = 2.0 * NEEDS_AGAINST / _growth((both, mine, theirs), needed)
+    return min(lost, max(of_left, *removals, 0.0) + of_whole + sum(removals))
 
 
 def _shares(first: float, second: float) -> tuple[float, float, float]:
@@ -123,7 +105,6 @@ def _shares(first: float, second: float) -> tuple[float, float, float]:
     return both, first - both, second - both
 
 
-@lru_cache(maxsize=4096)
 def _growth(shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
     """How fast the wealth of a bet grows in a pair, in nats; nearly 0 if it shrinks."""
     pairs = tuple(zip(shares, gains, strict=True))

@@ -69,19 +69,6 @@ def make_guide(
     of the failure are known. `more` are the other fields of `Guide`.
     """
     split, rank = _made("partitioning", partitioning), _made("prioritization", prioritization)
-    return guide_of(split, rank, evidence, partitioning, prioritization, prior, **more)
-
-
-def guide_of(
-    split: Callable[..., Any],
-    rank: Callable[..., Any],
-    evidence: Callable[[], Evidence],
-    partitioning: str = "",
-    prioritization: str = "",
-    prior: str = "spatial",
-    **more: Any,
-) -> Guide:
-    """As `make_guide`, with schemas that are there; their names are for error messages."""
 
     def split_now(environment: Partition, n: int) -> list[Partition]:
         known = evidence()
