@@ -1,4 +1,4 @@
-"""Finds margins with workers and a run file: tries values of numbers as `reduction.margins` asks for them, in worlds built anew.
+"""Finds margins with workers and a run file: tries values of numbers as `evidence.margins` asks for them, in worlds built anew.
 
 All of it follows from the run file, so a search that was killed comes to the same table.
 """
@@ -21,7 +21,6 @@ from ddenv.errors import UserError
 from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction.margins import wanted
 from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
@@ -159,7 +158,7 @@ class _Search:
         earlier = sum(one.name == name for one in now.runs[: now.before_call])
         first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
         most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.budget - used)
-        return wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
+        return known.wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
 
     def _is_impossible(self, name: str, value: float) -> bool:
         """Whether a value is not possible; that is recorded then."""

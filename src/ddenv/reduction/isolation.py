@@ -81,8 +81,8 @@ class Each:
 
 
 @dataclass(frozen=True)
-class Checked:
-    """A step: fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
+class Checked(Step):
+    """Fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
 
     removed: Environment
     claims: tuple[NamedClaim, ...]
@@ -110,9 +110,7 @@ class Asked:
     block: int
 
 
-def isolation(
-    driver: Runs, asked: Asked, checks: Sequence[Checked] = ()
-) -> Generator[Step | Checked, Any, Environment | None]:
+def isolation(driver: Runs, asked: Asked, checks: Sequence[Checked] = ()) -> Generator[Step, Any, Environment | None]:
     """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
     checks = list(checks)
     while len(checks) < MOST_CHECKS:
@@ -137,7 +135,7 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
 
 def _search(
     driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
-) -> Generator[Step | Checked, Any, Environment]:
+) -> Generator[Step, Any, Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     if smaller:
         searching = by_chunks(tuple(model for model in asked.suspects if model in smaller))
@@ -157,7 +155,7 @@ def _search(
         winner = None if place is None else candidates[place]
 
 
-def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step | Checked, Any, Checked]:
+def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step, Any, Checked]:
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing, error = asked.whole - removed, error_of(number + 1) / 2.0
     backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}

@@ -13,7 +13,7 @@ drives it again through what is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, zip_longest
 from typing import Any, Protocol
@@ -56,18 +56,19 @@ class Test:
     without: int | None = None
 
 
-# The steps of the procedure. Each comment says what the driver answers; None unless it says something else.
+class Step:
+    """A step of the procedure. The driver answers None unless the step says something else."""
 
 
 @dataclass(frozen=True)
-class Wants:
+class Wants(Step):
     """The tests that are needed next, in the order in which a single worker would make them."""
 
     tests: tuple[Test, ...]
 
 
 @dataclass(frozen=True)
-class BaselineRan:
+class BaselineRan(Step):
     """The whole world was run so often; the first `chose` of these runs only choose f.
 
     The answer is what the `Baseline` shows, or None if there is no failure to reduce.
@@ -86,14 +87,14 @@ class Baseline:
 
 
 @dataclass(frozen=True)
-class FailureFixed:
+class FailureFixed(Step):
     """The baseline of so many runs is over. The answer is the leg with which the search begins."""
 
     runs: int
 
 
 @dataclass(frozen=True)
-class RoundBegan:
+class RoundBegan(Step):
     """A round of the search. The answer is None, or what is known of it if it was judged before this driver began."""
 
     number: int
@@ -108,7 +109,7 @@ class Past:
 
 
 @dataclass(frozen=True)
-class Judged:
+class Judged(Step):
     """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown".
 
     Its first `runs` runs decided; with none, it is part of what lost the rate.
@@ -121,7 +122,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Similar:
+class Similar(Step):
     """Candidate number `index` of a round can become the environment. The answer is whether it does."""
 
     number: int
@@ -130,7 +131,7 @@ class Similar:
 
 
 @dataclass(frozen=True)
-class RoundEnded:
+class RoundEnded(Step):
     """A round is over; `winner` is the place of the candidate that became the environment, or None."""
 
     number: int
@@ -138,19 +139,19 @@ class RoundEnded:
 
 
 @dataclass(frozen=True)
-class SearchEnded:
+class SearchEnded(Step):
     """Nothing more can be left out of an environment by the search."""
 
     environment: Environment
 
 
 @dataclass(frozen=True)
-class CertificateDue:
+class CertificateDue(Step):
     """Fresh runs are due. The answer is the `Certificate` that they are made for."""
 
 
 @dataclass(frozen=True)
-class Certified:
+class Certified(Step):
     """What fresh runs show of what is left, and then of it without each model, up to a claim that ends the certificate."""
 
     certificate: Certificate
@@ -158,7 +159,7 @@ class Certified:
 
 
 @dataclass(frozen=True)
-class SteppedBack:
+class SteppedBack(Step):
     """What is left lost the rate. The search goes back to place number `place` of the chain.
 
     It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on
@@ -171,27 +172,11 @@ class SteppedBack:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeftOut(Step):
     """Without `model` f shows about as often, so the search goes on in `environment`. The answer is the next leg."""
 
     model: int
     environment: Environment
-
-
-Step = (
-    Wants
-    | BaselineRan
-    | FailureFixed
-    | RoundBegan
-    | Judged
-    | Similar
-    | RoundEnded
-    | SearchEnded
-    | CertificateDue
-    | Certified
-    | SteppedBack
-    | LeftOut
-)
 
 
 @dataclass(frozen=True)
@@ -459,18 +444,15 @@ def settled(
         # Of each pair the larger world first: its run may imply the other one.
         next_ones = [sorted(one.claim.wanted, key=lambda test: -len(test[0])) for one in named]
         later = zip_longest(*(one.claim.later for one in named))
+        without = {one.environment: one.model for one in reversed(named)}
         wants = dict.fromkeys(
-            Test(environment, first_run + run, why, without=_left_out(named, environment))
+            Test(environment, first_run + run, why, without=without.get(environment))
             for tests in (*next_ones, *later)
             for environment, run in filter(None, tests)
         )
         if not wants:
             return tuple(named)
         yield Wants(tuple(wants))
-
-
-def _left_out(named: Iterable[NamedClaim], environment: Environment) -> int | None:
-    return next((claim.model for claim in named if claim.environment == environment), None)
 
 
 def onward(

@@ -5,7 +5,7 @@ UserError, in one line.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count, takewhile
@@ -30,6 +30,10 @@ from ddenv.settings import SETTINGS
 NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothing to reduce"
 # Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
 FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 1_000_000
+
+# Larger numbers are a mistake, and their squares could be infinite.
+LARGEST = 1e9
+PLACE = "x, y, z m"
 
 Test = Callable[[frozenset[str]], bool]
 Value = TypeVar("Value")
@@ -161,26 +165,22 @@ def reduce(
         "skip": skip,
         "prior": prior,
     }
-    for name, word in variants.items():
-        _check_choice(name, word, SETTINGS[name].choices)
-    # To repeat runs exactly takes seeds, and `test` has none.
-    _check_choice("accept_rate", accept_rate, ("first", "kept"))
-    counts = {"iterations": iterations, "n_partitions": n_partitions, "seed": seed, "baseline_runs": baseline_runs}
-    for name, number in counts.items():
-        _check_count(name, number)
-    _check_number("delta", delta)
-    _check_number("keep_rate", keep_rate, 0.95)
-    _check_number("certify_rate", certify_rate, 0.95)
+    _check_words(**variants, accept_rate=accept_rate)
+    _check_counts(iterations=iterations, n_partitions=n_partitions, seed=seed, baseline_runs=baseline_runs)
+    _check_numbers(LARGEST, delta=delta)
+    _check_numbers(0.95, keep_rate=keep_rate, certify_rate=certify_rate)
     path = _trajectory(trajectory)
-    failure = path[-1, 1:4] if failure_pose is None and path is not None else failure_pose
+    failure = _place(path[-1, 1:4] if failure_pose is None and path is not None else failure_pose)
+    if failure is None and failure_pose is not None:
+        raise _wrong("failure_pose", PLACE, failure_pose)
     known = Evidence(
         names,
-        _each("positions", positions, names, _place),
+        _each("positions", positions, names, PLACE, _place),
         path,
-        None if failure is None else _place("failure_pose", failure),
-        _each("first_sensed", first_sensed, None, _time),
+        failure,
+        _each("first_sensed", first_sensed, None, "a time in s", _time),
         None if touched is None else frozenset(touched),
-        _each("traits", traits, names, _known_traits),
+        _each("traits", traits, names, "ddenv.Traits", lambda value: value if isinstance(value, Traits) else None),
         delta=float(delta),
         seed=int(seed),
     )
@@ -379,28 +379,29 @@ class _Caller:
         return RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound)
 
 
-# Larger numbers are a mistake, and their squares could be infinite.
-LARGEST = 1e9
+def _wrong(what: str, expected: str, found: object) -> UserError:
+    return UserError(f"{what}: expected {expected}, found {found!r}")
 
 
-def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:
-    """Raises UserError for a word that is none of these."""
-    if value not in choices:
-        raise UserError(f"{name}: {value!r} is not allowed; use one of {', '.join(choices)}")
+def _check_words(**given: str) -> None:
+    # To repeat runs exactly takes seeds, and `test` has none.
+    for name, word in given.items():
+        choices = [one for one in SETTINGS[name].choices if one != "exact"]
+        if word not in choices:
+            raise UserError(f"{name}: {word!r} is not allowed; use one of {', '.join(choices)}")
 
 
-def _check_count(name: str, value: int) -> None:
-    """Raises UserError for what is no whole number, or less than the setting of this name can be."""
-    least = SETTINGS[name].least or 0
-    if not isinstance(value, Integral) or not least <= value < 2**31:
-        raise UserError(f"{name}: expected {least} or more, found {value!r}")
+def _check_counts(**given: int) -> None:
+    for name, number in given.items():
+        least = SETTINGS[name].least or 0
+        if not isinstance(number, Integral) or not least <= number < 2**31:
+            raise _wrong(name, f"{least} or more", number)
 
 
-def _check_number(name: str, value: float, most: float = LARGEST) -> None:
-    """Raises UserError for what is no number above 0, at most `most`."""
-    if not isinstance(value, Real) or not 0 < value <= most:
-        limit = "" if most == LARGEST else f", at most {most:g}"
-        raise UserError(f"{name}: expected a number above 0{limit}, found {value!r}")
+def _check_numbers(most: float, **given: float) -> None:
+    for name, number in given.items():
+        if not isinstance(number, Real) or not 0 < number <= most:
+            raise _wrong(name, f"a number above 0, at most {most:g}", number)
 
 
 def _names(elements: Iterable[str]) -> Names:
@@ -409,7 +410,7 @@ def _names(elements: Iterable[str]) -> Names:
         names = tuple(elements)
         twice = [name for name, times in Counter(names).items() if times > 1]
     except TypeError:
-        raise UserError(f"elements: expected names, found {elements!r}") from None
+        raise _wrong("elements", "names", elements) from None
     if twice:
         raise UserError(f"elements: {twice[0]!r} occurs twice; give each element its own name")
     return names
@@ -423,7 +424,7 @@ def _trajectory(trajectory: Floats | None) -> Floats | None:
         path = np.asarray(trajectory)
         path = path.astype(float, casting="safe" if path.dtype.kind in "cOSU" else "unsafe")
     except (TypeError, ValueError):
-        raise UserError("trajectory: expected finite numbers of shape (N, 5)") from None
+        path = np.zeros(0)
     if path.ndim != 2 or path.shape[1] != 5 or not len(path) or not (np.abs(path) <= LARGEST).all():
         raise UserError(f"trajectory: expected finite numbers of shape (N, 5), found shape {path.shape}")
     if (np.diff(path[:, 0]) < 0).any():
@@ -432,36 +433,33 @@ def _trajectory(trajectory: Floats | None) -> Floats | None:
 
 
 def _each(
-    what: str, values: Mapping[str, Any] | None, names: Names | None, read: Callable[[str, Any], Value]
+    what: str,
+    values: Mapping[str, Any] | None,
+    names: Names | None,
+    expected: str,
+    read: Callable[[Any], Value | None],
 ) -> dict[str, Value] | None:
-    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError if it is no mapping."""
+    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError where it makes nothing."""
     if values is None:
         return None
     if not isinstance(values, Mapping):
         raise UserError(f"{what}: expected a mapping from names to values, found {type(values).__name__}")
-    return {name: read(f"{what}[{name!r}]", values.get(name)) for name in (values if names is None else names)}
+    found: dict[str, Value] = {}
+    for name in values if names is None else names:
+        if (value := read(values.get(name))) is None:
+            raise _wrong(f"{what}[{name!r}]", expected, values.get(name))
+        found[name] = value
+    return found
 
 
-def _place(what: str, values: Any) -> Place:
-    """A position, m. Raises UserError, as those below."""
-    if values is None:
-        raise UserError(f"{what}: is missing")
+def _place(values: Any) -> Place | None:
     try:
-        numbers = [] if isinstance(values, str) else [float(value) for value in values][:3]
+        x, y, z = [float(value) for value in values][:3]
     except (TypeError, ValueError, OverflowError):
-        numbers = []
-    if len(numbers) < 3 or not all(abs(number) <= LARGEST for number in numbers):
-        raise UserError(f"{what}: expected x, y, z m, found {values!r}")
-    return numbers[0], numbers[1], numbers[2]
+        return None
+    bounded = all(abs(number) <= LARGEST for number in (x, y, z))
+    return (x, y, z) if bounded and not isinstance(values, str) else None
 
 
-def _time(what: str, value: float) -> float:
-    if not isinstance(value, Real) or not 0 <= value <= LARGEST:
-        raise UserError(f"{what}: expected a time in s, found {value!r}")
-    return float(value)
-
-
-def _known_traits(what: str, value: Any) -> Traits:
-    if not isinstance(value, Traits):
-        raise UserError(f"{what}: expected ddenv.Traits, found {value!r}")
-    return value
+def _time(value: Any) -> float | None:
+    return float(value) if isinstance(value, Real) and 0.0 <= float(value) <= LARGEST else None

@@ -37,9 +37,8 @@ RARER, LEAST_RATE = 1.5, 0.02
 # How many models are left, if nothing is known.
 SURVIVORS = 3
 # How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the rubble 27 to 34 of 36, among 5,000
-# models 31. After that, a test of the search takes so much of the time of a run of the whole world: 0.3 in the rubble, 0.5 in
-# friction, 0.8 in the ditch, where no model moves. A third of a certificate's runs are of the whole world.
-TOOK_PART, SHARE, OF_WHOLE = (5, 20, 35), (0.25, 0.4, 0.6), 0.35
+# models 31.
+TOOK_PART = (5, 20, 35)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,29 +139,15 @@ def search_tests(models: int, asked: Reduction, rate: float | None = None) -> tu
 
 @dataclass(frozen=True, slots=True)
 class Rough:
-    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`.
-
-    `share`: how long a test of the search takes, as a share of a run of the whole world.
-    """
+    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`."""
 
     baseline: int
     search: tuple[int, int, int]
     certificate: tuple[int, int, int]
-    share: tuple[float, float, float]
 
     @property
     def tests(self) -> tuple[int, int, int]:
         low, likely, high = (self.baseline + sum(each) for each in zip(self.search, self.certificate, strict=True))
-        return low, likely, high
-
-    @property
-    def worlds(self) -> tuple[float, float, float]:
-        """As long as so many runs of the whole world. Some runs of the certificate are such runs, the others have few models."""
-        parts = zip(self.search, self.certificate, self.share, strict=True)
-        low, likely, high = (
-            self.baseline + search * share + certificate * (OF_WHOLE + (1.0 - OF_WHOLE) * share)
-            for search, certificate, share in parts
-        )
         return low, likely, high
 
 
@@ -171,7 +156,7 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
 
     With `slices`, and if they are asked for, only what took part in the baseline is searched. That has little to do with the size
     of the world: `TOOK_PART` is how many models these were in the bundled worlds of 25 to 43 models and in one of 5,000: few,
-    usual, many. Without slices every model is searched, and each test counts as long as one of the whole world.
+    usual, many. Without slices every model is searched.
     """
     slices = slices and asked.slice
     searched = [min(models, most) if slices else models for most in TOOK_PART]
@@ -183,4 +168,4 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
     certificate = certificate_tests(rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
     if asked.accept_rate == "exact":
         certificate = (RUNS_BESIDE,) * 3
-    return Rough(asked.baseline_runs, (few[0], usual[1], many[2]), certificate, SHARE if slices else (1.0, 1.0, 1.0))
+    return Rough(asked.baseline_runs, (few[0], usual[1], many[2]), certificate)
