@@ -1,6 +1,4 @@
-"""What an engine does before its first test: it asks whether the engines before it died at once, whether it still computes the same
-as they did, and which models rest on which.
-"""
+"""What an engine asks before its first test: did those before it die at once, does it compute the same, what rests on what."""
 
 from __future__ import annotations
 
@@ -53,9 +51,9 @@ def check_crash_loop(journal: Journal) -> None:
 
 
 def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool) -> None:
-    """Makes the first baseline run again, and compares its bits, if this engine computes with anything else than the earlier ones.
+    """Makes the first baseline run again if this engine computes with anything else than the earlier ones.
 
-    Raises UserError if they differ, unless the run goes on `mixed`; and Stopped.
+    Raises UserError if the bits differ, unless the run goes on `mixed`; and Stopped.
     """
     state = journal.state
     test = _comparable(state)
@@ -91,10 +89,7 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
 
 
 def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> None:
-    """Does nothing where nothing can move, or if it is known. Notes what is wrong with the start of the world.
-
-    Raises UserError if stacks are to be kept and it cannot be known.
-    """
+    """Finds what rests on what, once. Raises UserError if stacks are to be kept and it cannot be known."""
     moves = any(model.links and not model.static for model in world.models)
     # A simulator in Python names the models that affected a run, and those that they rest on.
     in_python = scenario.oracle is not None and scenario.oracle.use is not None

@@ -1,7 +1,4 @@
-"""Makes the tests that are wanted, the first on a free worker, later ones on the others, and records all of them.
-
-Tries of the user come first.
-"""
+"""Makes the tests that are wanted, tries of the user first, and records all of them."""
 
 from __future__ import annotations
 
@@ -46,9 +43,7 @@ MOST_BROKEN = 25
 class Bench:
     """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges tries of the user.
 
-    A test that `others` have made has its result at once, and takes no worker.
-
-    Before f is fixed, a run that failed is recorded as "failed".
+    A test that `others` have made takes no worker. Before f is fixed, a run that failed is recorded as "failed".
     """
 
     def __init__(
@@ -68,7 +63,7 @@ class Bench:
         self.rule = Acceptance(1)
 
     def work(self, tests: Sequence[Test]) -> None:
-        """Starts as many of the wanted tests as workers are free, the first ones first, and looks around once.
+        """Starts as many of the wanted tests as workers are free, and looks around once.
 
         Raises Stopped, Steered, and UserError if nothing can be simulated or all tests break.
         """
@@ -107,7 +102,7 @@ class Bench:
     def _make(self, wanted: Test, trial: int | None = None) -> bool | None:
         """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
-        Raises Stopped if it is used up and no test runs.
+        Raises Stopped if the budget is used up and no test runs.
         """
         journal, full = self._journal, self._journal.is_full(wanted.why)
         source = journal.implying(wanted.environment, wanted.run, full)
@@ -212,9 +207,8 @@ class Bench:
     # Looking around.
 
     def tick(self) -> None:
-        """Obeys commands, records finished tests, shows the running robots. Raises as `work`.
-
-        Does not return if the user has changed something: the old search must not use a test that ends now.
+        """Obeys commands, records finished tests, shows the running robots. Raises as `work`: Steered where the user has changed
+        something, since the old search must not use a test that ends now.
         """
         self._look(WAIT)
 

@@ -1,5 +1,5 @@
-"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with its reason. And it watches what
-disturbs an engine from outside: a disk without space, a clock that jumps.
+"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with its reason. It also watches the
+disk and the clock.
 """
 
 from __future__ import annotations
@@ -116,8 +116,7 @@ class ClockJumps:
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `credit` is how many tests may still start before a pause, None for any number. `terminated` is set by a signal, `after` is
-    the number of the last command before this engine was asked to start. `disk` says whether there is space for more tests.
+    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start.
     """
 
     def __init__(

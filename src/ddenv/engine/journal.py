@@ -22,9 +22,9 @@ from ddenv.settings import SETTINGS, read
 class Journal:
     """The events of a run, `state` folded from them, and a memo of its finished tests by (environment, run, full).
 
-    A test in the memo is never made again, but one that broke is made twice, and again by the next engine where a verdict needs it.
-    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only
-    changes runs that it cuts. While a user's `command` is obeyed, events hold its number.
+    A test that broke is made twice, and again by the next engine where a verdict needs it. Tests that ran to their end have
+    `full` True, those that the search asked for False, most both: `early_stop` only changes runs that it cuts. While a user's
+    `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:

@@ -1,9 +1,7 @@
-"""What one test may take, real time and memory; and what is noted of a whole world that is slow, or odd at its start.
+"""What one test may take, real time and memory; and what is noted of a whole world that is slow.
 
-The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and all later tests a
-multiple of what these took: so a slow world or machine is not taken for a hanging one. The baseline's event holds it: a resumed
-engine uses the same. Without a size, the workers share most of what this process may use: no test may take the memory of others, or
-bring the kernel to kill the engine.
+The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and later tests a multiple
+of what these took; the baseline's event holds it. Without a size, the workers share most of what this process may use.
 """
 
 from __future__ import annotations
@@ -91,10 +89,7 @@ def note_rare(journal: Journal) -> None:
 
 
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
-    """Writes an event once a run of the whole world turns out to be slow. `running` tests took so long, s.
-
-    Own simulators keep their own time.
-    """
+    """Writes an event once a run of the whole world on Drake turns out to be slow. `running` tests took so long, s."""
     state = journal.state
     if state.baseline is not None or state.scenario.get("oracle") is not None or "slow" in dict(state.notes):
         return

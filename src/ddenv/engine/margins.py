@@ -1,6 +1,5 @@
-"""Finds margins with workers and a run file: tries values of numbers as `evidence.margins` asks for them, in worlds built anew.
-
-All of it follows from the run file, so a search that was killed comes to the same table.
+"""Finds margins with workers and a run file: tries values of numbers as `evidence.margins` asks for them. All of it follows from
+the run file, so a search that was killed comes to the same table.
 """
 
 from __future__ import annotations
@@ -67,7 +66,7 @@ def find_margins(
 ) -> None:
     """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or goes on with the open search.
 
-    The run is then as it `stood`: its status and why. Raises Stopped, and UserError if nothing can be found.
+    The run is then as it `stood`: its status and why. Raises Stopped, and UserError.
     """
     now = journal.state.margining
     if asked is not None:

@@ -1,8 +1,5 @@
-"""Runs as an MCAP file: what Foxglove, Rerun and `ros2 bag` show. The streams are made again from the seeds, bit for bit.
-
-Transforms, sensors, estimate, commands and models of each run are messages of ROS 2 (common_interfaces and geometry2), with their
-names, fields and units: m, s, rad, and quaternions x, y, z, w. What a message lacks is written as zeros, empty texts and empty
-lists.
+"""Runs as an MCAP file of ROS 2 messages, made again from the seeds, bit for bit: m, s, rad, and quaternions x, y, z, w. What a
+message lacks is written as zeros, empty texts and empty lists.
 """
 
 from __future__ import annotations
@@ -136,11 +133,10 @@ class Streams:
 
 
 def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) -> list[str]:
-    """Makes the failing run, that of what is left, and one that reaches its goal again (`_chosen` says which), and writes their
-    streams to `target`; returns a line about each.
+    """Makes the runs of `_chosen` again, and writes their streams to `target`; returns a line about each.
 
-    `progress(name, seconds)` gets the simulated time, s. Raises UserError, also for runs by a simulator of the user's own and for
-    runs that give other bits here; then nothing is written.
+    `progress(name, seconds)` gets the simulated time, s. Raises UserError, also for runs that give other bits here; then nothing
+    is written.
     """
     if target.exists():
         raise UserError(f"{target}: exists already; choose another name")
@@ -177,10 +173,8 @@ def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
 
 
 def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:
-    """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal.
-
-    That is in the nearest world that passes, where it is known, and then the first one has its seed; else in what is left
-    without a model of it.
+    """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal: in the nearest world that
+    passes, where it is known (then the first one has its seed), else in what is left without a model of it.
     """
     state = fold(file.events())
     passes = nearest(file, state)

@@ -1,7 +1,5 @@
-"""Reuses tests that other runs have made of the same models, with the same seed, in the same simulator.
-
-A simulation is deterministic to the last bit, so a reused test is the test that would be made. The user's own simulators and
-controllers may not be deterministic, so their tests are not reused.
+"""Reuses tests that other runs have made of the same models, with the same seed, in the same simulator: they have the same bits.
+The user's own simulators and controllers may not repeat, so their tests are not reused.
 """
 
 from __future__ import annotations

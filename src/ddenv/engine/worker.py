@@ -1,6 +1,5 @@
-"""A worker process, from both sides. It prepares the simulator once, and then runs one test at a time in it.
-
-The engine gives it tasks, hears its answers, and may kill it; what it prints goes to the log.
+"""A worker process, from both sides: it prepares the simulator once, and then runs one test at a time. What it prints goes to the
+log.
 """
 
 from __future__ import annotations
@@ -56,8 +55,8 @@ Make = Callable[[Scenario, World, Model], Simulator]
 class Start:
     """What rests on what in the settled world, as (upper, lower), and how it settled.
 
-    `ties` has models with others that they are tied to: without that a model would move by itself, as a ball without its shelf. So
-    without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
+    `ties` has models with what they are tied to: without it they would move by themselves. None: nothing is known without a
+    test.
     """
 
     supports: list[tuple[str, str]]
@@ -104,9 +103,8 @@ class Broken:
 
 @dataclass(frozen=True)
 class Moment:
-    """A test goes on: so far `time` s are simulated. The robot, and the models that are no longer where they started, are there.
-
-    The robot began to move at `begun`, s of `time.monotonic`.
+    """A test goes on: `time` s are simulated; the robot and the models that have moved are there. It began at `begun`, s of
+    `time.monotonic`.
     """
 
     begun: float
@@ -132,7 +130,7 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 def work(line: Connection, output: Connection, parts: Any) -> None:
     """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is printed goes to `output`.
 
-    `parts` has what to make the simulator with, pickled: shared memory, so that starting a worker takes no time in a large world.
+    `parts` has what to make the simulator with, pickled in shared memory.
     """
     _settle_in(output)
     make, of = pickle.loads(bytes(parts))
@@ -239,9 +237,7 @@ def _follow_parent(parent: int) -> None:
 
 
 class WorkerProcess:
-    """A process that runs `work`. Its answers come over one pipe, and what it prints over another: no output can be taken for an
-    answer, and each wakes up whoever waits for its `handles`.
-    """
+    """A process that runs `work`. Answers come over one pipe, output over another; each wakes up whoever waits for its `handles`."""
 
     def __init__(self, context: SpawnContext, parts: Any) -> None:
         self._line, theirs = context.Pipe()

@@ -31,7 +31,7 @@ MOST_RUNS, MOST_OF_NUMBER, FIRST_LOOK = 16, 60, 32
 RAREST = 0.25
 # So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction, its certificates and isolations.
 FIX_RUNS, MOST_FIXES, FIRST_FIX_RUN = 20, 3, 500_000_000
-# Values are tried outward from the present one by growing steps, so many to the end of the range, the first of them as a share of it.
+# Values are tried outward from the present one by growing steps: so many to the end of the range, the first as a share of it.
 STEPS, FIRST_SHARE = 3, 1.0 / 16.0
 # A limit is known well enough within this share of its distance from the present value.
 NEAR = 0.1

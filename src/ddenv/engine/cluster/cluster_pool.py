@@ -1,7 +1,5 @@
-"""Makes tests on the workers of a Dask cluster, as `Pool` does in processes here. Each test goes to one worker that is free.
-
-A worker is asked before it gets a test: it makes the first run of the whole world, and is left out if its bits
-are others than here.
+"""Makes tests on the workers of a Dask cluster, as `Pool` does in processes here. A worker gets tests once its first run of the
+whole world has the bits that it has here.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from distributed import Client, Future, KilledWorker
 
 from ddenv import __version__
 from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
-from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
+from ddenv.engine.cluster.made_there import Asked, Hello, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
 from ddenv.engine.worker import Broken, Run, Start
@@ -45,8 +43,8 @@ FETCHED = 20.0
 
 @dataclass(eq=False)
 class _Worker:
-    """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered. It is `accepted` once it
-    has shown the same bits. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
+    """A Dask worker that can make `threads` tests at a time; `accepted` once it has shown the same bits. `hello` is None until it
+    has answered. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
     """
 
     address: str
@@ -254,11 +252,8 @@ class ClusterPool:
         if asked is None:
             self._answered(worker, answer)
             return
-        if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker | TimeoutError):
+        if isinstance(answer, CancelledError | NotWanted | KilledWorker | TimeoutError):
             self._wait_again([asked])
-            if isinstance(answer, NotGreeted):
-                worker.accepted = False
-                self._ask(worker)
             return
         self._progress.pop(asked.test, None)
         if isinstance(answer, UserError):

@@ -25,8 +25,8 @@ GOODBYE = 2.0
 class Link:
     """A connection to the scheduler of `cluster` that is made again when it is lost.
 
-    In its thread it calls `attached` with each new connection: all that was known of an earlier one is void; `there` with the
-    addresses of all workers that are there, and how many tests each can make at the same time; and `lost` with the reason.
+    In its thread it calls `attached` with each new connection, `there` with the addresses of all workers and how many tests each
+    can make at a time, and `lost` with the reason.
     """
 
     def __init__(
