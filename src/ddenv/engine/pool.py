@@ -48,7 +48,7 @@ _one_at_a_time = threading.Lock()
 
 @contextmanager
 def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
-    """Adds `more` to the environment for a moment, unless the user has set it: a new process reads it before any Python code runs."""
+    """Adds `more` to the environment for a moment, unless the user has set it: new processes read it before any Python code."""
     with _one_at_a_time:
         added = [name for name in more if name not in os.environ]
         os.environ.update({name: more[name] for name in added})
@@ -209,7 +209,7 @@ class Pool:
         return sorted(ended, key=lambda one: one[0])
 
     def _look(self, seconds: float) -> None:
-        """Waits at most `seconds` for an answer, output or a death. Replaces what died, and kills what takes too long or too much."""
+        """Waits at most `seconds` for an answer, output or a death. Replaces what died, kills what takes too long or too much."""
         heard = set(wait([handle for slot in self._slots for handle in slot.worker.handles], seconds))
         for slot in self._slots:
             if not heard.isdisjoint(slot.worker.handles):

@@ -237,7 +237,7 @@ def _follow_parent(parent: int) -> None:
 
 
 class WorkerProcess:
-    """A process that runs `work`. Answers come over one pipe, output over another; each wakes up whoever waits for its `handles`."""
+    """A process that runs `work`. Answers come over one pipe, output over another; each wakes up who waits for its `handles`."""
 
     def __init__(self, context: SpawnContext, parts: Any) -> None:
         self._line, theirs = context.Pipe()

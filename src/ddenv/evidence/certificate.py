@@ -1,14 +1,14 @@
 """What fresh runs show of a result: what share of the rate of f it keeps, and how often f still shows without each model.
 
-Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the same seed. For each share there is
-a bet that the first one shows f at more than this share of the second one's rate. If it does not, the bet reaches a wealth of
-1 / error with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic statistics
-and safe anytime-valid inference", 2023). The wealth falls as the share rises, so the highest share whose bet has reached 1 / error
-is a lower bound of what is kept, valid at any time. A bet the other way gives an upper bound. Nothing is assumed about how runs
-with the same seed depend on each other.
+Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the same seed. For each share there
+is a bet that the first one shows f at more than this share of the second one's rate. If it does not, the bet reaches a wealth of
+1 / error with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic
+statistics and safe anytime-valid inference", 2023). So the highest share whose bet has reached 1 / error is a lower bound of
+what is kept; a bet the other way gives an upper bound. Nothing is assumed about how runs with the same seed depend on each
+other.
 
-A run that was not made, or broke, counts against the claim. So the whole world need not run where what is left shows f: it is then
-taken to show f, too, which can only make the bound smaller.
+A run that was not made, or broke, counts against the claim: the whole world need not run where what is left shows f, and is then
+taken to show f, too.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ STAKES = (0.15, 0.3, 0.5, 0.7, 0.9)
 
 @dataclass(frozen=True)
 class Terms:
-    """The terms of a certificate: the share of the whole world's rate that it has to show, the share at which the search aims, the
-    chance of error of a claim, and the minimum number of runs.
+    """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
+    of a claim, and the minimum number of runs.
 
-    `at_once`: the runs of a pair are made one right after the other, and none is part of two pairs. Without seeds all rates may
-    change in the course of time, and would between two runs that are far apart.
+    `at_once`: the runs of a pair are made one right after the other, and none is part of two pairs: without seeds all rates may
+    change in the course of time.
     """
 
     certify_rate: float
@@ -133,7 +133,6 @@ def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
 @dataclass(frozen=True)
 class Wanted:
     """What a procedure asks for: these `tests`, as (environment, run); `later` environments will run with later seeds, if at all.
-
     `bound` is what its tests have shown so far.
     """
 
@@ -148,9 +147,8 @@ Procedure = Generator[Wanted, tuple[Shown, ...], tuple[Verdict, float | None]]
 
 @dataclass(frozen=True)
 class Claim:
-    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run).
-
-    `wanted` are the tests that it needs next; `later` ones it may need after these. `broken` of its tests broke.
+    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run). `wanted` are the
+    tests that it needs next, `later` those that it may need after these. `broken` of its tests broke.
     """
 
     verdict: Verdict
@@ -204,8 +202,8 @@ def settle(procedure: Procedure, shown: Callable[[Environment, int], Shown], ahe
 def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     """What share of the rate of `whole` is kept by `left`: "kept" if at least `certify_rate` is, "lost", or "not shown".
 
-    The bound, and so "kept", is wrong with a probability of at most the terms' error. "lost" says that less than `keep_rate` is
-    kept; this is wrong with a probability of at most 1 / `REFUTED`.
+    "kept" is wrong with a probability of at most the terms' error; "lost", less than `keep_rate` is kept, of at most 1 /
+    `REFUTED`.
     """
     if left == whole:
         return (yield from _of_whole(left, max(1, terms.at_least)))
@@ -258,8 +256,8 @@ def falls(
 ) -> Procedure:
     """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
-    The bound, and so "needed", is wrong with a probability of at most the terms' error. "helps" says that f is rarer, but not by so
-    much; "not needed" that it shows about as often, which the next certificate has to show.
+    "needed" is wrong with a probability of at most the terms' error. "helps": f is rarer, but not by so much; "not needed": it
+    shows about as often, which the next certificate has to show.
     """
     assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
     for run in range(MOST_REMOVAL_PAIRS):

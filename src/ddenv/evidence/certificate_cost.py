@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ddenv.evidence.certificate import (
     HELPS_AFTER,
@@ -25,87 +23,52 @@ ALIKE = 0.4
 # The logarithm of the wealth that a bet of the first certificate needs, with what it costs to bet with several stakes at once; and
 # that of a bet against it.
 NEEDS, NEEDS_AGAINST = math.log(2.0 / error_of(1) * len(STAKES)), math.log(REFUTED * len(STAKES))
-# Before it has runs, what is left is taken to show f as often as the whole world, and a removal never to, as if so many of its runs
-# had shown that.
-WORTH, WORTH_WITHOUT = 3, 4
-# Eight of ten rates are in the interval of so many standard deviations. How little may be left, as a share of all, until it ends.
-EIGHT_OF_TEN, LEAST_LEFT = 1.28, 0.1
-
-# Of so many runs (the second number), so many showed f.
-Shown = tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class Made:
-    """The runs of a certificate so far: all `tests` that are finished, and how often what is left, and that without each model,
-    showed f.
-    """
-
-    tests: int = 0
-    end: Shown = (0, 0)
-    without: Sequence[Shown] = ()
+# Eight of ten rates are in the interval of so many standard deviations.
+EIGHT_OF_TEN = 1.28
 
 
 def certificate_tests(
-    rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0, made: Made | None = None
+    rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0
 ) -> tuple[int, int, int]:
     """Tests of a certificate of `left` needed models, as (low, likely, high): of ten, about eight take between low and high.
 
-    `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known. `made` says what the
-    certificate's own runs showed so far: only the others are open. It runs what is left, the whole world where that missed f, and
-    what is left without each model.
+    `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known.
     """
-    now = Made() if made is None else made
     # A damaged run file may ask for nothing, or for all.
-    rate, certify_rate = min(max(rate, 0.0), 1.0), min(max(certify_rate, 0.01), 0.99)
-    seen, tests = min(max(0, seen), MOST_PAIRS), max(0, now.tests)
-    end = _rate(now.end, rate, WORTH)
-    without = [_rate(each, 0.0, WORTH_WITHOUT) for each in (*now.without[:left], *[(0, 0)] * (left - len(now.without)))]
-    likely = _expected(certify_rate, at_least, rate, end, without)
-    ends = [likely]
-    for each in wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ():
-        ends.append(_expected(certify_rate, at_least, each, end if now.end[1] else each, without))
-    # What is not known of the rates and chance within the certificate are independent factors.
-    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / likely)))
-    longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / likely)))
-    most = 2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS
-    still = max(likely - tests, LEAST_LEFT * likely if tests else 0.0)
-    low, high = tests + max(0.0, likely - tests) / shorter, max(tests + still, min(most, tests + still * longer))
-    return math.floor(low), round(tests + still), math.ceil(high)
+    rate, certify_rate, seen = (
+        min(max(rate, 0.0), 1.0),
+        min(max(certify_rate, 0.01), 0.99),
+        min(max(0, seen), MOST_PAIRS),
+    )
+    rates = [rate, *(wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ())]
+    ends = [_expected(each, certify_rate, left, at_least) for each in rates]
+    # What is not known of the rate and chance within the certificate are independent factors.
+    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
+    longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
+    most = max(ends[0], min(2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS, ends[0] * longer))
+    return math.floor(ends[0] / shorter), round(ends[0]), math.ceil(most)
 
 
-def _rate(of: Shown, before: float, worth: int) -> float:
-    """The rate that runs show after `worth` runs at the rate `before`."""
-    runs = min(max(0, of[1]), MOST_PAIRS)
-    return (min(max(0, of[0]), runs) + worth * before) / (runs + worth)
-
-
-def _expected(certify_rate: float, at_least: int, rate: float, end: float, without: Sequence[float]) -> float:
-    """Its tests where the whole world shows f at `rate`, and what is left, and that without each model, at these rates.
+def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> float:
+    """Its tests where the whole world and what is left show f at `rate`, and that without any of its models never.
 
     As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest stake on average.
     """
     kept = (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0)
-    both, mine, theirs = _shares(end, rate)
-    alone = max(float(at_least), NEEDS / _growth((both + mine, 0.0, theirs), kept))
+    both = ALIKE * rate + (1.0 - ALIKE) * rate * rate
+    alone = max(float(at_least), NEEDS / _growth((rate, 0.0, rate - both), kept))
     if alone <= MOST_ALONE:
-        of_left, of_whole = alone, alone * (1.0 - end)
+        of_left, of_whole = alone, alone * (1.0 - rate)
     else:
-        of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, mine, theirs), kept))
+        of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, rate - both, rate - both), kept))
     needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
-    removals = [NEEDS / _growth(_shares(each, end), needed) for each in without]
-    removals = [max(at_least, each if each <= MOST_REMOVAL_PAIRS else HELPS_AFTER) for each in removals]
-    lost = 2.0 * NEEDS_AGAINST / _growth((both, mine, theirs), needed)
-    return min(lost, max(of_left, *removals, 0.0) + of_whole + sum(removals))
-
-
-def _shares(first: float, second: float) -> tuple[float, float, float]:
-    """Of pairs of these rates, the shares in which both show f, only the first, only the second."""
-    both = ALIKE * min(first, second) + (1.0 - ALIKE) * first * second
-    return both, first - both, second - both
+    removal = NEEDS / _growth((0.0, 0.0, rate), needed)
+    removal = max(at_least, removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER)
+    lost = 2.0 * NEEDS_AGAINST / _growth((both, rate - both, rate - both), needed)
+    return min(lost, max(of_left, removal if left else 0.0) + of_whole + left * removal)
 
 
 def _growth(shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
-    """How fast the wealth of a bet grows in a pair, in nats; nearly 0 if it shrinks."""
+    """How fast the wealth of a bet grows in a pair, in nats; nearly 0 if it shrinks. `shares` of all pairs have these `gains`."""
     pairs = tuple(zip(shares, gains, strict=True))
     return max(1e-4, *(sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES))

@@ -10,10 +10,10 @@ from statistics import median
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
 from ddenv.evidence.certificate import Terms, falls, keeps, often, settle
-from ddenv.evidence.certificate_cost import Made, certificate_tests
+from ddenv.evidence.certificate_cost import certificate_tests
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
-from ddenv.runfile.progress import Certificate, Claim, Isolation, narrowed
+from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
@@ -29,10 +29,7 @@ def is_minimal(certificate: Certificate) -> bool:
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
-    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much.
-
-    The one without which f shows most often comes first.
-    """
+    """The models but for which a certificate shows the end to be minimal; the one without which f shows most often comes first."""
     left, *removals = certificate.claims
     helps = [claim for claim in removals if claim.verdict != "needed"]
     if left.verdict != "kept" or {claim.verdict for claim in helps} != {"helps"}:
@@ -42,9 +39,8 @@ def helping(certificate: Certificate) -> tuple[str, ...]:
 
 
 def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settled]:
-    """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left.
-
-    It holds whenever one looks. Models that no run has left out yet are missing.
+    """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left. Models that no run
+    has left out yet are missing.
     """
     node, whole = state.nodes[certificate.node], state.environments[origin(state, certificate.node).id]
     left, outcomes = state.environments[node.id], dict[tuple[Environment, int], Shown]()
@@ -93,9 +89,8 @@ def current(state: RunState) -> Certificate | None:
 
 
 def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tuple[Test, ...]:
-    """The runs of a claim's environment that the certificate rests on (the chosen ones, if seeds were), but for those that broke.
-
-    Runs that were only made ahead of time are not among them.
+    """The sound runs of a claim's environment that the certificate rests on (the chosen ones, if seeds were), not those made ahead
+    of time.
     """
     if certificate.seeds:
         chosen = exact_runs(state)
@@ -109,9 +104,8 @@ def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tupl
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m: median and maximum.
-
-    Both are NaN where no distance is known.
+    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m: median and maximum; NaN
+    where no distance is known.
     """
 
     failure: str
@@ -144,29 +138,12 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
 
 
 def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
-    """How many runs a certificate of the current environment takes, as (low, likely, high).
-
-    Its own runs narrow what the rates before it foretold. Only where they contradict that do they stand alone.
-    """
-    left = len(state.environment) - len(state.pinned.intersection(state.environment))
-    made = 0
-    shown: dict[tuple[int, str | None], tuple[int, int]] = {}
-    for test in state.confirm_tests:
-        if test.run < now.first_run or not test.is_finished:
-            continue
-        made += 1
-        if test.outcome not in BROKEN:
-            hits, runs = shown.get((test.node, test.without), (0, 0))
-            shown[test.node, test.without] = hits + (test.outcome == "similar"), runs + 1
+    """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     if now.seeds:
         return now.at_least, now.at_least, now.at_least
+    left = len(state.environment) - len(state.pinned.intersection(state.environment))
     before = 0 if state.baseline is None else state.baseline.runs
-    without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
-    done = Made(made, shown.get((now.node, None), (0, 0)), without)
-    foretold, by_runs = (
-        certificate_tests(now.rate, now.certify_rate, left, now.at_least, before, known) for known in (None, done)
-    )
-    return narrowed(foretold, by_runs) if made < foretold[-1] else by_runs
+    return certificate_tests(now.rate, now.certify_rate, left, now.at_least, before)
 
 
 def has_dropped(state: RunState) -> bool:
@@ -190,11 +167,11 @@ def has_dropped(state: RunState) -> bool:
 class FreshRuns:
     """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
 
-    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome, with broken runs.
-    `low`..`high` is the 95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `is_left`: all that is
-    left ran. `claim` is what the certificate says of them, once it is finished; it makes none of the whole world, nor of earlier
-    environments. What is left keeps at least `bound` of the rate, by the runs so far; without the model f shows at most `bound`
-    times as often. `is_chosen`: the whole world ran only where what is left missed f, so these runs say nothing about its rate.
+    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome. `low`..`high` is the
+    95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `claim` is what the finished certificate
+    says of them. What is left keeps at least `bound` of the rate, by the runs so far; without the model f shows at most `bound`
+    times as often. `is_left`: all that is left ran. `is_chosen`: the whole world ran only where what is left missed f, so these
+    runs say nothing about its rate.
     """
 
     node: int
@@ -212,7 +189,7 @@ class FreshRuns:
 
     @property
     def shows_at_least(self) -> str:
-        """What the runs have shown: "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing yet."""
+        """ "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
         return f"{'≤' if self.without else '≥'} {percent(self.bound)}"

@@ -1,8 +1,7 @@
 """What runs with one number changed show: whether f still shows at a value, what a number's values add up to, and which is tried
-next. Nothing is assumed between the values that were tried, or beyond them.
+next: outward from the present one by growing steps, then by halves between values with other verdicts.
 
-From the present value outward by growing steps, up and down, then by halves between values with other verdicts. All follows from
-what is known of the values, so a search that was interrupted goes on as it would have.
+Nothing is assumed between the values that were tried, or beyond them. All follows from what is known of the values.
 """
 
 from __future__ import annotations
@@ -39,9 +38,7 @@ NEAR = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Wald's sequential tests of a value, where f shows at `rate` at the present one: a verdict is wrong with a probability of at
-    most `error`.
-    """
+    """Wald's sequential tests of a value, where f shows at `rate` at the present one: wrong with a chance of at most `error`."""
 
     rate: float
     error: float
@@ -186,7 +183,8 @@ def margins_of(margins: Margins) -> tuple[Margin, ...]:
 class Fix:
     """A changed number with which the robot reaches its goal, by runs of the search; `share` of the number's scale it is changed.
 
-    Of `runs` fresh runs it `reached` its goal in so many; `confirmed`: they show that it does. None: they are not all made.
+    Of `runs` fresh runs it `reached` its goal in so many; `confirmed` says whether they show it, None while they are not all
+    made.
     """
 
     name: str
@@ -255,9 +253,8 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
 
 
 def _between(asked: NumberAsked, up: bool, near: list[Value], limit: tuple[str, ...]) -> float | None:
-    """A value between the nearest one whose verdict is in `limit` and the one before it; None if that is near enough.
-
-    `near` has the values that were tried, the nearest to the present one first.
+    """A value between the nearest one whose verdict is in `limit` and the one before it; None if that is near enough. `near` has
+    the values that were tried, the nearest to the present one first.
     """
     place = next((place for place, one in enumerate(near) if one.verdict in limit), None)
     if place is None or (place and near[place - 1].verdict == "undecided"):

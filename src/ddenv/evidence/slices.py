@@ -67,36 +67,9 @@ def implies(took_part: Environment, there: Environment, keep: Environment, ties:
 
 
 def fresh_chance(met: Sequence[Environment]) -> float:
-    """The chance that a fresh run meets a model that none of these runs `met`, estimated by the models that only one of them met.
-
-    Good, "The population frequencies of species and the estimation of population parameters", 1953.
-    """
+    """The chance that a fresh run meets a model that none of these runs `met`, by the models that only one met (Good, 1953)."""
     once, more = NOTHING, NOTHING
     for models in met:
         more |= once & models
         once = (once | models) - more
     return min(1.0, len(once) / len(met)) if met else 1.0
-
-
-def reasons(
-    elements: Sequence[str],
-    before: Environment,
-    after: Environment,
-    met: Sequence[Environment],
-    pinned: Environment = NOTHING,
-) -> dict[str, str]:
-    """Why each model of `before` stays in `after` or goes, by name in the order of `elements`, the names of all models.
-
-    `met` took part in each of the runs known there.
-    """
-    one, runs = len(met) == 1, f"{len(met)} run{'s' * (len(met) != 1)}"
-
-    def why(model: int) -> str:
-        took_part = sum(model in models for models in met)
-        if model not in after:
-            return "took no part in the one run known" if one else f"took part in none of {runs}"
-        if took_part:
-            return f"took part in {took_part} of {runs}"
-        return "is pinned" if model in pinned else "one that took part is tied to it"
-
-    return {elements[model]: why(model) for model in before}

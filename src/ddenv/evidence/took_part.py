@@ -1,11 +1,10 @@
-"""Who took part in the runs of a run file, and what slices left out and why."""
+"""Who took part in the runs of a run file."""
 
 from __future__ import annotations
 
 from collections import Counter
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.evidence.slices import reasons
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, RunState
 
@@ -28,13 +27,6 @@ def met_by(state: RunState, node: Node) -> list[Environment]:
         test = state.tests[number - 1]
         met[test.run] = met.get(test.run, NOTHING) | (test.took_part or NOTHING)
     return list(met.values())
-
-
-def why_sliced(state: RunState, node: Node) -> dict[str, str]:
-    """Why each model of the environment before stays in a slice or goes, in the order of the world."""
-    before = NOTHING if node.parent is None else state.environments[state.nodes[node.parent].id]
-    pinned = Environment.of(model for model, name in enumerate(state.elements) if name in state.pinned)
-    return reasons(state.elements, before, state.environments[node.id], met_by(state, node), pinned)
 
 
 def simulated(state: RunState) -> int:

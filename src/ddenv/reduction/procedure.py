@@ -1,9 +1,8 @@
 """What ddenv does, from the first run of the whole world to a certified end: one pure coroutine.
 
-It runs nothing itself. Where it needs tests it yields `Wants`, with the tests in the order of need, and goes on once some of them
-have ended; the driver makes the first, and as many more as it has workers. Every other step that it yields says what was found, and
-`Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce` with a function. A resumed run
-drives it again through what is known.
+It runs nothing itself. Where it needs tests it yields `Wants`, and goes on once some of them have ended. Every other step that
+it yields says what was found; `Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce`
+with a function. A resumed run drives it again through what is known.
 
 1. `baseline`: the whole world is run; its failure is f.
 2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
@@ -69,9 +68,8 @@ class Wants(Step):
 
 @dataclass(frozen=True)
 class BaselineRan(Step):
-    """The whole world was run so often; the first `chose` of these runs only choose f.
-
-    The answer is what the `Baseline` shows, or None if there is no failure to reduce.
+    """The whole world was run so often; the first `chose` of these runs only choose f. The answer is what the `Baseline` shows, or
+    None if there is no failure to reduce.
     """
 
     runs: int
@@ -110,9 +108,8 @@ class Past:
 
 @dataclass(frozen=True)
 class Judged(Step):
-    """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown".
-
-    Its first `runs` runs decided; with none, it is part of what lost the rate.
+    """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown". Its first
+    `runs` runs decided; with none, it is part of what lost the rate.
     """
 
     index: int
@@ -181,13 +178,11 @@ class LeftOut(Step):
 
 @dataclass(frozen=True)
 class Leg:
-    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back.
+    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back. What is
+    left has to keep the rate of f in `whole`.
 
-    What is left has to keep the rate of f in `whole`.
-
-    `pinned` models always stay. `free` are the models that may go, each with those that go with it, by the one that stands for
-    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the
-    usual number. The groups `again` are left out first.
+    `pinned` models always stay. `free` are the models that may go, each with those that go with it. `rule` says when a candidate
+    is taken. The first round has `n_partitions`, None for the usual number. The groups `again` are left out first.
     """
 
     first_round: int
@@ -202,9 +197,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class Certificate:
-    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`.
-
-    With `exact` it claims what these runs of the search show; its fresh runs say how often f shows with other seeds.
+    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`. With `exact` it claims
+    what these runs of the search show; its fresh runs say how often f shows with other seeds.
     """
 
     number: int
@@ -215,9 +209,8 @@ class Certificate:
 
 @dataclass(frozen=True)
 class NamedClaim:
-    """A claim about an environment: about what is left, or about that without `model`.
-
-    It rests on the runs `exact` of the search alone, if there are any, else on fresh ones.
+    """A claim about an environment: what is left, or that without `model`. It rests on the runs `exact` of the search, or on fresh
+    ones.
     """
 
     model: int | None
@@ -350,8 +343,8 @@ def judge(
 ) -> Generator[Step, Any, int | None]:
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
-    Verdicts come in order: tests of later ones that have ended wait for their turn. What is dissimilar, but not by the `usual`
-    rule, was missed: the algorithm may come back to it.
+    Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
+    missed.
     """
     judged, refusals = 0, driver.refusals
     while True:
@@ -476,7 +469,7 @@ def onward(
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
     """Back to the last environment that is not shown to have lost the rate of all runs of the whole world.
 
-    Of each only runs by the seeds of this certificate count. By others it was taken, or went back to: these favour it.
+    Only runs by the seeds of this certificate count: by others it was taken, or went back to, which favour it.
     """
     first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
     rate = driver.rate()
@@ -513,8 +506,7 @@ def last_good(
 ) -> int | tuple[tuple[Environment, int], ...]:
     """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
 
-    `chain` begins with the whole world and ends with what has lost the rate. `judged` carries `good_enough` as far as the
-    finished runs go. By bisection: it assumes that the rate falls along the chain. The next one has been judged, too, and lost it.
+    `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.
     """
     good, bad = 0, len(chain) - 1
     while bad - good > 1:

@@ -1,6 +1,4 @@
-"""`ddenv.reduce`: the reduction as a function, for a test of your own. It needs neither Drake nor a robot. Wrong arguments raise
-UserError, in one line.
-"""
+"""`ddenv.reduce`: the reduction as a function, for a test of your own. It needs neither Drake nor a robot."""
 
 from __future__ import annotations
 
@@ -49,9 +47,8 @@ class Step:
 
 @dataclass(frozen=True)
 class NamedRound:
-    """A round, before it is tested: the environment, and its parts in the order in which they are tried.
-
-    A candidate is "partition" or "complement", and the number of its part.
+    """A round, before it is tested: the environment, its parts in the order in which they are tried, and its candidates:
+    "partition" or "complement", and the number of its part.
     """
 
     environment: Names
@@ -82,10 +79,9 @@ class RateClaim:
 class Reduction:
     """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test in `rounds` rounds.
 
-    `history` begins with all elements; each further step is a reduction, or a step back to more elements. The tests are those of
-    all elements at first, of the search, and those that show what the result is worth. `minimal`: what is kept shows the failure
-    often enough, and no single element can be left out; each was left out in a test. With the rule "kept", `claims` say what
-    fresh calls of the test showed of this; with "first" there are none.
+    `history` begins with all elements; each further step is a reduction, or a step back. `minimal`: what is kept shows the
+    failure often enough, and no single element can be left out; each was left out in a test. With the rule "kept", `claims` say
+    what fresh calls of the test showed of this.
     """
 
     kept: tuple[str, ...]
@@ -220,8 +216,7 @@ def reduce(
 @dataclass
 class _Caller:
     """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides.
-
-    `calls` counts them by what they were made for: "baseline", "round" or "certify".
+    `calls` counts them by what they were made for.
     """
 
     names: Names
@@ -268,8 +263,8 @@ class _Caller:
         return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
 
     def rate(self) -> float:
-        """From the baseline, and from fresh calls: at first these are made only where what is left does not show the failure, which
-        would show the rate as too low, so none counts after the first that was not made.
+        """From the baseline, and from fresh calls up to the first not made: they are made only where what is left missed the
+        failure.
         """
         shown = list(self._of_whole)
         for number in range(1, self._certificates + 1):

@@ -1,7 +1,5 @@
-"""Stacks: models that are connected by which models rest on which, as one element of a search.
-
-The algorithm gets one model of each stack, and searches as ever. Its rounds are expanded, so that whatever is tested has all
-of a stack or nothing of it.
+"""Stacks: models that rest on each other, as one element of a search. The algorithm gets one model of each; its rounds are
+expanded, so that whatever is tested has all of a stack or nothing of it.
 """
 
 from __future__ import annotations

@@ -36,12 +36,10 @@ class Rule(Protocol):
 class Acceptance:
     """The rule of a search. A candidate is dissimilar after `most_misses` runs without f and none with it.
 
-    With `rate` 0 the first run with f makes it similar, as in the paper. Otherwise `rate` is the estimated rate of f in the whole
-    world, and Bayes decides between three rates of the candidate: that one, one that is clearly below `keep_rate` of it, and
-    `SPURIOUS`. After each of `steps_back` the rule is stricter: the search has taken worlds where f is rarer. It bounds no error
-    by itself, the certificate does; it makes a refuted certificate rare.
-
-    With `exact` the runs of these numbers decide, and no others.
+    With `rate` 0 the first run with f makes it similar, as in the paper. Otherwise `rate` is the estimated rate of f in the
+    whole world, and Bayes decides between three rates of the candidate: that one, one clearly below `keep_rate` of it, and
+    `SPURIOUS`; stricter after each of `steps_back`. It bounds no error by itself, the certificate does. With `exact` the runs of
+    these numbers decide, and no others.
     """
 
     most_misses: int
@@ -74,8 +72,7 @@ class Acceptance:
     @property
     def proves(self) -> bool:
         """Whether a search has to show by itself that its end is minimal; else the certificate alone does, with fewer runs in all.
-
-        Where many misses are chance, or models turned out to take a bit of the rate each, that would cost another certificate.
+        Where many misses are chance, that would cost another certificate.
         """
         return not self.rate or self.steps_back > 0 or (1.0 - self.rate) ** self.misses > FEW_MISSED
 

@@ -79,8 +79,10 @@ def left_said(state: RunState, at_work: bool) -> tuple[str, ...]:
 
 
 def _is_overdue(state: RunState) -> bool:
-    """Whether the search takes more tests than were foretold."""
-    forecast = state.forecast
+    """Whether the search, or the certificate, takes more tests than were foretold."""
+    forecast, now = state.forecast, in_the_making(state)
+    if now is not None:
+        return fresh_runs_made(state, now) >= expected_fresh_runs(state, now)[-1]
     searches = not (state.ended or state.confirming or state.isolating is not None)
     return searches and forecast is not None and state.tests_done - forecast.tests_done >= forecast.tests[-1]
 
@@ -91,7 +93,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         return None
     if state.confirming:
         now = in_the_making(state)
-        if now is None:
+        if now is None or _is_overdue(state):
             return None
         (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
         return low - done, likely - done, high - done

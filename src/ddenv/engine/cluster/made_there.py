@@ -1,4 +1,4 @@
-"""What runs inside a Dask worker: each test in a child process that keeps the simulator, since Dask cannot end a test that hangs."""
+"""What runs inside a Dask worker: each test in a child process that keeps the simulator: Dask cannot end what hangs."""
 
 from __future__ import annotations
 
