@@ -174,7 +174,7 @@ def engine(
 def drive(path: Path, pool: FakePool, mixed: bool = False, **options) -> RunState:
     """Works on a run to its end; `options` are those of `engine`."""
     with engine(path, pool, **options) as one:
-        check_repeats(one.journal, pool, one.control, mixed)
+        check_repeats(one.journal, one.bench, mixed)
         one.driver.reduce()
         return one.journal.state
 

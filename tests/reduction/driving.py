@@ -142,7 +142,7 @@ class Driver:
             broke=broke,
             proves=leg.rule.proves,
         )
-        inside = stacks.inside(leg.chain[-1])
+        inside = tuple(first for first, stack in stacks.by_first.items() if stack <= leg.chain[-1])
         return stacks.expand(tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide)))
 
     def leg(self, again=()):

@@ -66,13 +66,7 @@ def main() -> int:
         signal.signal(number, lambda *_: terminated.set())
     try:
         with RunFile(options.run) as file, engine_lock(options.run):
-            if options.give_up == "no":
-                return _work(file, options, terminated)
-            file.own()
-            journal = Journal(file)
-            if journal.state.isolating is not None:
-                journal.record(events.IsolationGivenUp())
-            return 0
+            return _give_up(file) if options.give_up == "yes" else _work(file, options, terminated)
     except UserError as error:
         _say(str(error))
         return 2
@@ -110,10 +104,10 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         control = Control(journal, terminated, after, disk)
         others = None if options.share is None else tests_of_others(file, scenario, options.share)
         with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
-            if scenario.oracle is None:
-                check_repeats(journal, pool, control, options.bits == "mixed")
-            note_start(scenario, world, robot, journal)
             bench = Bench(journal, pool, control, others)
+            if scenario.oracle is None:
+                check_repeats(journal, bench, options.bits == "mixed")
+            note_start(scenario, world, robot, journal)
             if options.certify:
                 Driver(scenario, world, journal, bench, control).certify(options.certify, options.certify_rate)
             elif options.isolate is not None or journal.state.isolating is not None:
@@ -138,6 +132,15 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     finally:
         file.set_live([])
         file.settle()
+    return 0
+
+
+def _give_up(file: RunFile) -> int:
+    """Ends the isolation that is open."""
+    file.own()
+    journal = Journal(file)
+    if journal.state.isolating is not None:
+        journal.record(events.IsolationGivenUp())
     return 0
 
 

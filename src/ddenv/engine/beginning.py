@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from ddenv.engine.bench import Bench, made_again
-from ddenv.engine.control import Control
+from ddenv.engine.bench import Bench
 from ddenv.engine.journal import Journal
 from ddenv.engine.limits import note
-from ddenv.engine.pool import Workers
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
@@ -50,7 +48,7 @@ def check_crash_loop(journal: Journal) -> None:
         )
 
 
-def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool) -> None:
+def check_repeats(journal: Journal, bench: Bench, mixed: bool) -> None:
     """Makes the first baseline run again if this engine computes with anything else than the earlier ones.
 
     Raises UserError if the bits differ, unless the run goes on `mixed`; and Stopped.
@@ -59,7 +57,7 @@ def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool
     test = _comparable(state)
     if state.physics.now == state.physics.proven or test is None:
         return
-    result = made_again(journal, pool, control, test)
+    result = bench.made_again(test)
     if result is not None and not mixed:
         raise UserError(_differs(journal, result))
     journal.record(events.Compared(result is None))

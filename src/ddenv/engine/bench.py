@@ -155,11 +155,18 @@ class Bench:
         return result
 
     def made_again(self, test: KnownTest) -> RunResult | Broken | None:
-        """As the function `made_again`, once all workers are idle."""
+        """Makes a run of the whole world again, once all workers are idle; returns how it ended unless it repeats bit for bit."""
         while self._busy:
             # A search that is due begins after this.
             self._look_around(WAIT)
-        return made_again(self._journal, self._pool, self._control, test)
+        journal = self._journal
+        journal.record(Comparing(test.id))
+        self._pool.submit(0, Run(frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state)))
+        while not (ended := self._pool.finished(WAIT)):
+            self._control.poll()
+        result = ended[0][1]
+        same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
+        return None if same else result
 
     # Tries of the user.
 
@@ -281,17 +288,6 @@ class Bench:
             spec = FailureSpec.model_validate(state.scenario["failure"])
             self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
         return self._failures
-
-
-def made_again(journal: Journal, pool: Workers, control: Control, test: KnownTest) -> RunResult | Broken | None:
-    """Makes a run of the whole world again; returns how it ended unless it repeats to the last bit. Raises Stopped."""
-    journal.record(Comparing(test.id))
-    pool.submit(0, Run(frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state)))
-    while not (ended := pool.finished(WAIT)):
-        control.poll()
-    result = ended[0][1]
-    same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
-    return None if same else result
 
 
 def _samples(trajectory: np.ndarray) -> bytes:

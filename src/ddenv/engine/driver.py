@@ -397,15 +397,9 @@ class Driver:
         if not self._certificate.claims:
             first, journal = step.certificate.first_run, self._journal
             claims = tuple(self._claim_made(claim, first) for claim in step.claims)
-            rested_on = {
-                test
-                for claim in step.claims
-                for environment, run in claim.claim.rests_on
-                for test in journal.tests(environment, (first + run,), full=True)
-            }
-            for claim in step.claims:
-                rested_on |= set(journal.tests(claim.environment, step.certificate.exact))
-            journal.record(events.CertificateFinished(claims, tuple(sorted(rested_on))))
+            rested_on = journal.full_tests((test for one in step.claims for test in one.claim.rests_on), first)
+            chosen = (test for one in step.claims for test in journal.tests(one.environment, step.certificate.exact))
+            journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
 
     @property
     def _certificate(self) -> Certificate:
@@ -430,9 +424,8 @@ class Driver:
     def _stepped_back(self, step: steps.SteppedBack) -> None:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
-        tests = {test for one, run in step.tests for test in journal.tests(one, (run,), full=True)}
         node, lost = nodes[step.place].number, nodes[step.place + 1].number
-        journal.record(events.RateLost(node, lost, step.again, tuple(sorted(tests))))
+        journal.record(events.RateLost(node, lost, step.again, journal.full_tests(step.tests)))
         self._wait_for_search()
 
     def _left_out(self, step: steps.LeftOut) -> None:

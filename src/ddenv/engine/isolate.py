@@ -169,15 +169,10 @@ class _Isolator:
     def _check(self, check: Checked) -> None:
         journal, now = self._journal, _open(self._journal)
         first = now.first_run + len(now.checks) * now.block
-        rests_on = {
-            test
-            for claim in check.claims
-            for environment, run in claim.claim.rests_on
-            for test in journal.tests(environment, (first + run,), full=True)
-        }
+        rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)
         claims = tuple(self._made(claim, first) for claim in check.claims)
         environment = journal.number(self._whole - check.removed)
-        journal.record(events.IsolationChecked(environment, claims, tuple(sorted(rests_on))))
+        journal.record(events.IsolationChecked(environment, claims, rests_on))
 
     def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
         shown = [self.shown(named.environment, run) for run in named.exact or [first + run for run in named.runs]]

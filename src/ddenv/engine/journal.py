@@ -157,6 +157,10 @@ class Journal:
         tests = (self.test(environment, run, full) for run in runs)
         return tuple(test.id for test in tests if test is not None)
 
+    def full_tests(self, tests: Iterable[tuple[Environment, int]], first: int = 0) -> tuple[int, ...]:
+        """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
+        return tuple(sorted({one for models, run in tests for one in self.tests(models, (first + run,), full=True)}))
+
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a run showed f; None if it is not made yet."""
         test = self.test(environment, run, full)

@@ -20,7 +20,7 @@ from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
@@ -156,7 +156,9 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     writer.write_message(RESULT, schemas[WORDS], {"data": result_is}, nanoseconds(0.0))
     for one in chosen:
         streams = Streams()
-        result = template.run(one.models, one.seed, _progress(progress, one.name), one.full, streams)
+        result = template.run(
+            one.models, one.seed, lambda seconds, *_, name=one.name: progress(name, seconds), one.full, streams
+        )
         if not np.array_equal(result.trajectory, stored[one.test]):
             raise UserError(f"{run}: test {one.test} gives other bits here: another Drake or another processor made it")
         for topic, kind, seconds, message in messages(one, result, streams, subject):
@@ -166,10 +168,6 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     writer.finish()  # type: ignore[no-untyped-call]
     write_file(target, output.getvalue())
     return said
-
-
-def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
-    return lambda seconds, *_: progress(name, seconds)
 
 
 def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:

@@ -198,7 +198,7 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
         if not isinstance(error, UserError):
             traceback.print_exception(error)
             sys.stderr.flush()
-        return Broken("error", _reason(error))
+        return Broken("error", reason_of(error))
 
 
 def _progress(tell: Callable[[Moment], object]) -> Progress:
@@ -219,7 +219,7 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
     return report
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
     """An exception in one line."""
     text = " ".join(str(error).split())
     words = text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"

@@ -32,10 +32,6 @@ class Stacks:
         """All models of the stacks for which `representatives` stand, one stack after the other."""
         return tuple(model for first in representatives for model in self.by_first[first])
 
-    def inside(self, models: Environment) -> Partition:
-        """The representatives of the stacks of which all models are among `models`."""
-        return tuple(first for first, stack in self.by_first.items() if stack <= models)
-
     def of_any(self, models: Environment) -> Environment:
         """All models of the stacks of which any model is among `models`."""
         whole = NOTHING

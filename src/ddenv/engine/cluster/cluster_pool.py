@@ -20,11 +20,11 @@ import numpy as np
 from distributed import Client, Future, KilledWorker
 
 from ddenv import __version__
-from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
+from ddenv.engine.cluster.link import GOODBYE, Link
 from ddenv.engine.cluster.made_there import Asked, Hello, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Run, Start
+from ddenv.engine.worker import Broken, Run, Start, reason_of
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -259,7 +259,7 @@ class ClusterPool:
         if isinstance(answer, UserError):
             raise answer
         broke = isinstance(answer, BaseException)
-        self._ready.append((asked.test, Broken("error", printable(in_a_line(answer))) if broke else answer))
+        self._ready.append((asked.test, Broken("error", reason_of(answer)) if broke else answer))
 
     # Who may make tests.
 
@@ -267,7 +267,7 @@ class ClusterPool:
         if isinstance(answer, CancelledError | KilledWorker):
             return
         if isinstance(answer, BaseException):
-            self._leave_out(worker, f"it cannot make tests: {printable(in_a_line(answer))}")
+            self._leave_out(worker, f"it cannot make tests: {reason_of(answer)}")
             return
         worker.hello, run = answer
         self._greeted.append((worker, run))
