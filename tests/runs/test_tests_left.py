@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import ddenv
-from ddenv.evidence.certificate import Terms, error_of, falls, keeps, settle
-from ddenv.evidence.certificate_cost import certificate_tests
+from ddenv.evidence.certificate import Terms, certificate_tests, error_of, falls, keeps, settle
 from ddenv.runfile.fold import fold
 from ddenv.runs.tests_left import left_said, remaining, rough_run, search_tests
 from ddenv.settings import PRINTED

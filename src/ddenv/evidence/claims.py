@@ -9,8 +9,7 @@ from statistics import median
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
-from ddenv.evidence.certificate import Terms, falls, keeps, often, settle
-from ddenv.evidence.certificate_cost import certificate_tests
+from ddenv.evidence.certificate import Terms, certificate_tests, falls, keeps, often, settle
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
 from ddenv.runfile.progress import Certificate, Claim, Isolation

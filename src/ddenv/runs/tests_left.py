@@ -9,8 +9,7 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from ddenv.evidence.certificate import RUNS_BESIDE
-from ddenv.evidence.certificate_cost import certificate_tests
+from ddenv.evidence.certificate import RUNS_BESIDE, certificate_tests
 from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState

@@ -82,22 +82,15 @@ class ClusterPool:
         self._said = 0
         self._client: Client | None = None
         self._sent: Future[bytes] | None = None
-        self._compares = scenario.oracle is None
+        # The process here that makes the run to compare with; runs of the user's own simulator are not compared.
+        self._home = Pool(*self._parts, 1) if scenario.oracle is None else None
         self._reference: RunResult | None = None
-        self._home: Pool | None = None
-        self._settling = False
         # What has happened in other threads, to be done in that of the engine.
         self._due: SimpleQueue[Callable[[], None]] = SimpleQueue()
         tell(0, f"asking the Dask scheduler of {cluster}")
         self._link = Link(cluster, self._later(self._attached), self._later(self._there), self._later(self._lost))
-        if self._compares:
-            self._here().submit(REFERENCE, self._whole)
-
-    def _here(self) -> Pool:
-        """The process on this machine."""
-        if self._home is None:
-            self._home = Pool(*self._parts, 1)
-        return self._home
+        if self._home is not None:
+            self._home.submit(REFERENCE, self._whole)
 
     def _later(self, happened: Callable[..., None]) -> Callable[..., None]:
         return lambda *what: self._due.put(partial(happened, *what))
@@ -145,16 +138,14 @@ class ClusterPool:
 
     def _look_here(self) -> None:
         """Raises UserError if the run to compare with broke."""
-        if self._home is not None and self._compares and self._reference is None:
-            for _, result in self._home.finished(0.0):
-                if isinstance(result, Broken):
-                    raise UserError(
-                        f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
-                    )
-                self._reference = result
-        if self._home is not None and not self._settling and (self._reference is not None or not self._compares):
-            self._home.close()
-            self._home = None
+        if self._home is None or self._reference is not None:
+            return
+        for _, result in self._home.finished(0.0):
+            if isinstance(result, Broken):
+                raise UserError(
+                    f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
+                )
+            self._reference = result
 
     # What happens to the cluster.
 
@@ -190,7 +181,11 @@ class ClusterPool:
             self._workers[worker.address] = worker
             self._ask(worker)
         if new:
-            first = ": first the whole world once, as it is made here, to compare the bits" if self._compares else ""
+            first = (
+                ": first the whole world once, as it is made here, to compare the bits"
+                if self._home is not None
+                else ""
+            )
             self._news.append(f"{count(len(new), 'worker')} came to the cluster{first}")
 
     def _gone(self, address: str) -> int:
@@ -274,7 +269,7 @@ class ClusterPool:
 
     def _take_in(self) -> None:
         """Compares what new workers made, once there is something to compare with."""
-        if self._compares and self._reference is None:
+        if self._home is not None and self._reference is None:
             return
         for worker, run in self._greeted:
             if worker.hello is None or worker is not self._workers.get(worker.address):
@@ -302,18 +297,15 @@ class ClusterPool:
     # As of `Pool`.
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
-        """As `Pool.settle`, on this machine: once the run to compare with is made, since there is one process."""
-        self._settling = True
+        """As `Pool.settle`, in the process here once that has made the run to compare with."""
         asked: list[Callable[[], Start | Broken | None]] = []
 
         def found() -> Start | Broken | None:
+            if self._home is None or self._reference is None:
+                return None
             if not asked:
-                if self._compares and self._reference is None:
-                    return None
-                asked.append(self._here().settle(elements))
-            result = asked[0]()
-            self._settling = result is None
-            return result
+                asked.append(self._home.settle(elements))
+            return asked[0]()
 
         return found
 
