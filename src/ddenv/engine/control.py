@@ -92,25 +92,9 @@ class DiskSpace:
 SMALL = 2.0
 
 
-class ClockJumps:
-    """Compares Unix time with a clock that stands still while the machine sleeps, and that nobody can set; both in s."""
-
-    def __init__(
-        self,
-        journal: Journal,
-        clock: Callable[[], float] = time.time,
-        steady: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._journal = journal
-        self._offset: Callable[[], float] = lambda: clock() - steady()
-        self._last = self._offset()
-
-    def look(self) -> None:
-        """Records a jump since the last look: what is reckoned from the time that the run took would be wrong."""
-        offset = self._offset()
-        jump, self._last = offset - self._last, offset
-        if abs(jump) > SMALL:
-            self._journal.record(events.ClockJumped(jump))
+def clock_offset() -> float:
+    """Unix time less that of a clock that stands still while the machine sleeps, and that nobody can set, s."""
+    return time.time() - time.monotonic()
 
 
 class Control:
@@ -130,7 +114,7 @@ class Control:
         self._searches = False
         self._last = -math.inf
         self._disk = disk
-        self._jumps = ClockJumps(journal)
+        self._offset = clock_offset()
         self._catch_up(after)
 
     def _catch_up(self, after: float) -> None:
@@ -147,13 +131,20 @@ class Control:
         """Obeys new commands. Raises Stopped."""
         if self._terminated.is_set():
             raise Stopped("the engine was terminated")
-        self._jumps.look()
+        self._look_at_clock()
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
             if KINDS.get(command.kind) is Accept:
                 # The reduction comes before any other decision.
                 return
+
+    def _look_at_clock(self) -> None:
+        """Records a jump since the last look: what is reckoned from the time that the run took would be wrong."""
+        offset = clock_offset()
+        jump, self._offset = offset - self._offset, offset
+        if abs(jump) > SMALL:
+            self._journal.record(events.ClockJumped(jump))
 
     def search_begins(self) -> None:
         """From now on what the user changes ends a search."""

@@ -346,18 +346,9 @@ def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | No
     if isinstance(there, Broken):
         return f"its first run of the whole world broke: {there.failure}"
     if there is None or not _same_bits(there, here):
-        return f"its first run of the whole world has other bits than here; {_difference(hello)}"
+        theirs, ours = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
+        return f"its first run of the whole world has other bits than here; it has {theirs}; here is {ours}"
     return ""
-
-
-def _difference(hello: Hello) -> str:
-    there = f"{hello.simulator}, {hello.machine}".split(", ")
-    here = f"{simulator()}, {machine()}".split(", ")
-    theirs = ", ".join(each for each in there if each not in here)
-    ours = ", ".join(each for each in here if each not in there)
-    return (
-        f"it has {theirs}, here is {ours}" if theirs else "it says that it has the same versions and the same processor"
-    )
 
 
 def _same_bits(one: RunResult, other: RunResult) -> bool:
