@@ -57,16 +57,12 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     def shown(environment: Environment, run: int) -> Shown:
         return outcomes.get((environment, run))
 
-    terms = terms_of(certificate)
+    # Half of the errors is for rates kept, half for removals.
+    terms = Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
     if certificate.seeds:
         return {None: settle(often(left, terms.at_least), shown)}
     claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
     return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
-
-
-def terms_of(certificate: Certificate) -> Terms:
-    """The terms of each claim of a certificate: half of the errors is for rates kept, half for removals."""
-    return Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
@@ -148,15 +144,10 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, in
 def has_dropped(state: RunState) -> bool:
     """Whether the runs of the current environment so far show that f is rarer in it than it may be."""
     here = state.here
-    whole = None if here is None else origin(state, here.number)
-    if (
-        settings(state).accept_rate == "exact"
-        or here is None
-        or whole is None
-        or here is whole
-        or not here.runs
-        or not whole.runs
-    ):
+    if here is None or settings(state).accept_rate == "exact":
+        return False
+    whole = origin(state, here.number)
+    if here is whole or not here.runs or not whole.runs:
         return False
     least = settings(state).keep_rate * whole.shown / len(whole.runs)
     return wilson_interval(here.shown, len(here.runs))[1] < least
@@ -188,7 +179,7 @@ class FreshRuns:
 
     @property
     def shows_at_least(self) -> str:
-        """ "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
+        """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
         return f"{'≤' if self.without else '≥'} {percent(self.bound)}"
@@ -198,11 +189,8 @@ class FreshRuns:
         """The same in words."""
         if self.bound is None or not self.shows_at_least:
             return ""
-        return (
-            f"at most {percent(self.bound)} as often"
-            if self.without
-            else f"keeps at least {percent(self.bound)} of the rate"
-        )
+        share = percent(self.bound)
+        return f"at most {share} as often" if self.without else f"keeps at least {share} of the rate"
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
