@@ -135,22 +135,17 @@ def reduce(
     `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and returns whether the failure showed.
     A test that returns False is repeated up to `iterations` times, for failures that do not show every time.
 
-    With `accept_rate` "first", the first run with the failure decides, as in the paper; the end may fail far more rarely than all
-    elements do. With "kept", the default if there are `iterations`, all elements are run `baseline_runs` times at first, and more
-    often if the failure is rare. The search takes what seems to keep `keep_rate` of their failure rate. Fresh runs show at the end
-    whether at least `certify_rate` of it is kept, and without which elements the failure is rarer; where a claim fails, the search
-    steps back or goes on.
-    All claims together are wrong with a probability of at most 5 %.
+    With `accept_rate` "first", the first run with the failure decides, as in the paper. With "kept", the default if there are
+    `iterations`, all elements are run `baseline_runs` times or more at first, the search takes what seems to keep `keep_rate` of
+    their failure rate, and fresh runs show at the end whether at least `certify_rate` of it is kept, and without which elements
+    the failure is rarer. All claims together are wrong with a probability of at most 5 %.
 
     `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of the run that failed.
     `failure_pose` is where it failed, beginning with x, y, z (m); the default is the trajectory's end. `first_sensed` maps names to
-    the time (s) when the robot first sensed them; other names were never sensed. `touched` are the names that it touched. `traits`
-    maps each name to its `ddenv.Traits`. Only what the chosen schemas look at is required. `n_partitions`, `candidates`,
-    `complement_order`, `growth`, `skip`, `prior` and `delta` (rad/s) mean the same as in a scenario's section `reduction`.
-
-    With `check`, all elements are tested first, as "kept" always does: without the failure there is nothing to reduce. `on_round`
-    is called with each round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are
-    passed on.
+    the time (s) when the robot first sensed them, `traits` to `ddenv.Traits`. Only what the chosen schemas look at is required.
+    `n_partitions` and what follows, to `delta` (rad/s), mean the same as in a scenario's section `reduction`. With `check`, all
+    elements are tested first. `on_round` is called with each round before it is tested. Raises UserError, in one line, for wrong
+    arguments; exceptions of `test` are passed on.
     """
     names = _names(elements)
     accept_rate = accept_rate or ("kept" if iterations else "first")
