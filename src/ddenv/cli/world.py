@@ -269,7 +269,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
     """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what did not affect the
     runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
     """
-    from ddenv.evidence.took_part import in_whole_world
+    from ddenv.evidence.slices import in_whole_world
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.nearest import removed_in_passing
