@@ -5,8 +5,8 @@ A command is its kind with its fields as JSON: `veto {"round": 2, "candidate": 3
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any, get_args
 
 from ddenv.errors import UserError
@@ -14,7 +14,7 @@ from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
 from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
 from ddenv.guiding.situation import Situation, named, waiting
-from ddenv.runfile.reading import Invalid, read
+from ddenv.runfile.reading import Invalid, plain, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.text import as_sentence, count, snake_case
@@ -83,9 +83,7 @@ def send(file: RunFile, command: Command) -> int:
 
 def written(command: Command) -> tuple[str, dict[str, Any]]:
     """A command as it stands in the run file: its kind, and its fields as JSON."""
-    values = {field.name: getattr(command, field.name) for field in fields(command)}
-    data = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-    return snake_case(type(command).__name__), data
+    return snake_case(type(command).__name__), plain(command)
 
 
 def parse(kind: str, data: Mapping[str, Any]) -> Command:
@@ -93,6 +91,7 @@ def parse(kind: str, data: Mapping[str, Any]) -> Command:
     if kind not in KINDS:
         raise UserError(f"there is no command '{kind[:40]}'")
     try:
-        return read(KINDS[kind], data)
+        command: Command = read(KINDS[kind], json.dumps(data))
     except Invalid as invalid:
         raise UserError(f"no such {invalid}") from None
+    return command

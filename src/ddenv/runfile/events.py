@@ -10,17 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.reading import OneOf, Range
+from ddenv.environment import NOTHING
+from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Positive, Real, Seconds, Share
 from ddenv.text import snake_case
 
-Natural = Annotated[int, Range(0)]
-Number = Annotated[int, Range(1)]
-Share = Annotated[float, Range(0, 1)]
-Seconds = Annotated[float, Range(0)]
 Pair = tuple[Natural, Natural]
-Pose = tuple[float, float, float, float, float, float, float]
-Place = tuple[float, float, float]
+Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
+Place = tuple[Real, Real, Real]
 Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "isolate")]
 Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]
 Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
@@ -72,7 +68,7 @@ class Created(Event):
 class EngineStarted(Event):
     """`version` is that of ddenv, `simulator` has those of Drake and numpy, or the oracle, `machine` Python and the processor."""
 
-    pid: int
+    pid: Natural
     jobs: Natural
     version: str
     simulator: str
@@ -124,7 +120,7 @@ class DiskSpace(Event):
 class ClockJumped(Event):
     """Unix time went on or back by so many seconds at once: the machine slept, or its clock was set."""
 
-    seconds: float
+    seconds: Real
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +183,7 @@ class EnvironmentNamed(Event):
     """These models are environment number `environment`, from 0; the whole world is number 0 without an event."""
 
     environment: Number
-    models: Environment
+    models: Models
 
 
 # Tests.
@@ -237,14 +233,14 @@ class TestFinished(Event):
     test: Number
     outcome: Outcome
     failure: str
-    distance: float | None
+    distance: Real | None
     end_pose: Pose | None
     simulated_seconds: Seconds
     wall_seconds: Seconds
     first_sensed: tuple[tuple[Natural, Seconds], ...] = ()
     first_touched: tuple[tuple[Natural, Seconds], ...] = ()
     cut: bool = False
-    took_part: Environment | None = None
+    took_part: Models | None = None
     taken: str = ""
 
 
@@ -259,8 +255,8 @@ class TestLost(Event):
 class Outcomes:
     """Tests that are judged anew, by their ids: their outcomes, and how far from f they ended, m."""
 
-    outcomes: dict[int, Outcome]
-    distances: dict[int, float]
+    outcomes: dict[Natural, Outcome]
+    distances: dict[Natural, Real]
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,8 +335,8 @@ class RoundStarted(Event):
     n_partitions: Natural
     environment: Natural
     partitions: tuple[tuple[Natural, ...], ...]
-    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, float | None], ...]
-    pinned: Environment = NOTHING
+    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, Real | None], ...]
+    pinned: Models = NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -434,10 +430,10 @@ class CertificateStarted(Event):
     certificate: Number
     run: Natural
     rate: Share
-    keep_rate: Annotated[float, Range(1e-9, 1)]
-    error: Annotated[float, Range(1e-9, 1)]
+    keep_rate: Part
+    error: Part
     at_least: Natural
-    certify_rate: Annotated[float, Range(1e-9, 1)] | None = None
+    certify_rate: Part | None = None
     seeds: tuple[Natural, ...] = ()
 
 
@@ -510,7 +506,7 @@ class IsolationStarted(Event):
     wanted: Share
     rather_than: Share
     keep_rate: Share
-    error: Annotated[float, Range(1e-9, 1)]
+    error: Part
     at_least: Natural
     suspects: tuple[Natural, ...]
     size: Natural
@@ -571,11 +567,11 @@ class NumberAsked:
     """
 
     name: str
-    now: float
-    low: float
-    high: float
-    scale: Annotated[float, Range(1e-12)]
-    resolution: Annotated[float, Range(1e-12)]
+    now: Real
+    low: Real
+    high: Real
+    scale: Positive
+    resolution: Positive
     unit: str = ""
 
 
@@ -590,7 +586,7 @@ class MarginsStarted(Event):
     numbers: tuple[NumberAsked, ...]
     environment: Natural
     rate: Share
-    error: Annotated[float, Range(1e-9, 1)]
+    error: Part
     budget: Number
     certified: bool
     status: Annotated[str, OneOf("finished", "stopped")]
@@ -602,12 +598,12 @@ class MarginRan(Event):
     """How a run ended in which the number `name` had a `value`; outcome, failure, distance and end as in `TestFinished`."""
 
     name: str
-    value: float
+    value: Real
     run: Natural
     seed: Natural
     outcome: Outcome
     failure: str
-    distance: float | None
+    distance: Real | None
     end_pose: Pose | None
     wall_seconds: Seconds
 
@@ -617,7 +613,7 @@ class MarginImpossible(Event):
     """The number `name` cannot have this `value`, and `why`."""
 
     name: str
-    value: float
+    value: Real
     why: str
 
 
