@@ -43,9 +43,7 @@ def drops(command: Command, state: RunState) -> str:
     if waits is None:
         return ""
     sizes = f"{len(state.environment)} → {count(waits.size, 'model')}"
-    gone = named([name for name in command.new(state) if name not in waits.models]) if isinstance(command, Pin) else ""
-    lost = f" Accepting it removes {gone}, which you want to pin." if gone else ""
-    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it.{lost}"
+    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it."
 
 
 def _begins_anew(command: Command, state: RunState) -> bool:

@@ -464,4 +464,4 @@ def _as_it_was(state: RunState, at: float) -> Changes:
     if state.isolating is None:
         margins = fold_claims.open_margins(state)
         return _ended(state, margins.status, margins.before, at)
-    return _ended(state, "finished", state.isolating.before, at)
+    return _ended(state, "finished", state.isolating.asked.before, at)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.events import EngineStarted, MarginImpossible, MarginRan, NumberAsked
+from ddenv.runfile.events import EngineStarted, IsolationStarted, MarginImpossible, MarginRan, NumberAsked
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,29 +207,14 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Isolation:
-    """A search for the fewest models that have to go from the whole world so that the robot reaches its goal.
+    """A search for the fewest models that have to go from the whole world so that the robot reaches its goal, as it was `asked`.
 
-    It passes if it reaches it at the rate `wanted` rather than at `rather_than`; of a world with a model put back, the rate has to
-    fall below `keep_rate` of what it is without it. All claims are wrong with a probability of at most `error`. `first_run` is the
-    number of the first run with a fresh seed; each check has `block` of them. The `suspects` are removed first to last, at first
-    `size` of them: what the reduction left. `before` is why the reduction had ended.
     `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: the last word is
     spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: the user
-    gave it up, or ended it by another decision. With `chosen` runs a world passes if each of these does, and no rate is asked for.
+    gave it up, or ended it by another decision.
     """
 
-    number: int
-    first_run: int
-    block: int
-    wanted: float
-    rather_than: float
-    keep_rate: float
-    error: float
-    at_least: int
-    suspects: tuple[str, ...]
-    size: int
-    before: str
-    chosen: tuple[int, ...] = ()
+    asked: IsolationStarted
     checks: tuple[Check, ...] = ()
     ended: bool = False
     found: int | None = None
