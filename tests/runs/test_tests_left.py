@@ -156,9 +156,6 @@ def test_slices_leave_little_of_a_large_world_to_test():
     assert rough_run(43, asked) == sliced
     assert rough_run(5000, asked.model_copy(update={"slice": False})) == whole
     assert all(few < many for few, many in zip(sliced.search, whole.search, strict=True))
-    # Tests with few models are shorter than those of the whole world, but for the baseline.
-    assert all(asked.baseline_runs < time < tests for time, tests in zip(sliced.worlds, sliced.tests, strict=True))
-    assert whole.worlds == pytest.approx(whole.tests)
 
 
 def test_each_test_leaves_one_less(run):

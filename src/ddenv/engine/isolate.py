@@ -172,7 +172,7 @@ class _Isolator:
 
     def _check(self, check: Checked) -> None:
         journal, now = self._journal, _open(self._journal)
-        first = now.first_run + len(now.checks) * now.block
+        first = now.asked.run + len(now.checks) * now.asked.block
         rests_on = {
             test
             for claim in check.claims

@@ -19,7 +19,7 @@ from ddenv.runfile.store import Live
 from ddenv.runs import processor
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
-from ddenv.text import about, between, count, duration
+from ddenv.text import between, count, duration
 from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
@@ -112,11 +112,10 @@ def _slow(state: RunState, rate: float) -> str:
     each = timeout / rate
     runs, jobs = asked.baseline_runs, max(1, state.jobs)
     baseline = duration(each * -(-runs // jobs))
-    low, likely, high = (each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds)
-    whole = about(likely, low, high)
+    low, _, high = rough_run(len(state.elements), asked).tests
     return (
         f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
-        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run about {whole}; "
+        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}; a whole run takes {between(low, high)} tests; "
         f"{HELPS}, more --jobs"
     )
 

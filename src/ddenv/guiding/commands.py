@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
 from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
-from ddenv.guiding.situation import Situation, named, waiting
+from ddenv.guiding.situation import Situation, waiting
 from ddenv.runfile.reading import Invalid, plain, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile

@@ -20,7 +20,7 @@ from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, wi
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, PastRound, Point, narrowed
 from ddenv.runfile.state import Candidate, Round, RunState, Split
-from ddenv.runfile.store import Recorded, RunFile, uncollected
+from ddenv.runfile.store import Recorded, RunFile
 from ddenv.text import count
 
 # Verdicts that tests led to, not the user.
@@ -29,8 +29,7 @@ JUDGED = ("similar", "missed", "dissimilar", "unknown")
 
 def fold(recorded: Iterable[Recorded], state: RunState | None = None) -> RunState:
     """The state after these events, from the beginning or from an earlier `state`. Raises UserError for invalid ones."""
-    with uncollected():
-        return reduce(apply, recorded, state or RunState())
+    return reduce(apply, recorded, state or RunState())
 
 
 def apply(state: RunState, recorded: Recorded) -> RunState:

@@ -4,6 +4,7 @@ margins; and what its tests were computed with.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -93,6 +94,15 @@ class Node:
     shown: int = 0
     sliced_by: tuple[int, ...] = ()
     to_audit: bool = False
+
+
+def path(nodes: Sequence[Node], number: int | None) -> tuple[Node, ...]:
+    """The nodes from the whole world to one of them, both included."""
+    found: list[Node] = []
+    while number is not None and number < len(nodes):
+        found.append(nodes[number])
+        number = nodes[number].parent
+    return tuple(reversed(found))
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from ddenv.runfile.progress import (
     Point,
     Refusal,
     Removal,
+    path,
 )
 
 # The first of each two models rests on the second, or is tied to it.
@@ -215,11 +216,7 @@ class RunState:
     @property
     def path(self) -> tuple[Node, ...]:
         """The nodes from the whole world to the current one."""
-        path, node = [], self.here
-        while node is not None:
-            path.append(node)
-            node = None if node.parent is None else self.nodes[node.parent]
-        return tuple(reversed(path))
+        return path(self.nodes, self.node)
 
     @property
     def finished_tests(self) -> tuple[Test, ...]:

@@ -6,7 +6,6 @@ are text, event data is JSON, trajectories are rows of little-endian float64.
 
 from __future__ import annotations
 
-import gc
 import json
 import math
 import os
@@ -146,18 +145,6 @@ class NoRoom(UserError):
     """The disk takes no more: what was to be written is not there, and nothing else has changed."""
 
 
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Does not look for garbage while many events are read: all that is made of them stays."""
-    looks = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if looks:
-            gc.enable()
-
-
 class RunFile:
     """An open run file. Raises UserError for a file that is missing, not a run file, or of another format.
 
@@ -228,8 +215,7 @@ class RunFile:
 
     def events(self, after: int = 0, most: int = -1) -> list[Recorded]:
         """All events with an id above `after`, in order; at most `most` unless that is negative. Raises UserError."""
-        with uncollected():
-            return list(self.read(after, most))
+        return list(self.read(after, most))
 
     def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
         """The same, one after the other, so that those before a damaged one can be used."""

@@ -37,9 +37,8 @@ RARER, LEAST_RATE = 1.5, 0.02
 # How many models are left, if nothing is known.
 SURVIVORS = 3
 # How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the rubble 27 to 34 of 36, among 5,000
-# models 31. After that, a test of the search takes so much of the time of a run of the whole world: 0.3 in the rubble, 0.5 in
-# friction, 0.8 in the ditch, where no model moves. A third of a certificate's runs are of the whole world.
-TOOK_PART, SHARE, OF_WHOLE = (5, 20, 35), (0.25, 0.4, 0.6), 0.35
+# models 31.
+TOOK_PART = (5, 20, 35)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +96,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
         return low - done, likely - done, high - done
     forecast, baseline = state.forecast, state.baseline
-    if forecast is None or baseline is None:
-        return None
-    if _is_overdue(state):
+    if forecast is None or baseline is None or _is_overdue(state):
         return None
     done = state.tests_done - forecast.tests_done
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
@@ -136,29 +133,15 @@ def rough_tests(models: int, algorithm: str, runs: int, as_printed: bool = False
 
 @dataclass(frozen=True, slots=True)
 class Rough:
-    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`.
-
-    `share`: how long a test of the search takes, as a share of a run of the whole world.
-    """
+    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`."""
 
     baseline: int
     search: tuple[int, int, int]
     certificate: tuple[int, int, int]
-    share: tuple[float, float, float]
 
     @property
     def tests(self) -> tuple[int, int, int]:
         low, likely, high = (self.baseline + sum(each) for each in zip(self.search, self.certificate, strict=True))
-        return low, likely, high
-
-    @property
-    def worlds(self) -> tuple[float, float, float]:
-        """As long as so many runs of the whole world. Some runs of the certificate are such runs, the others have few models."""
-        parts = zip(self.search, self.certificate, self.share, strict=True)
-        low, likely, high = (
-            self.baseline + search * share + certificate * (OF_WHOLE + (1.0 - OF_WHOLE) * share)
-            for search, certificate, share in parts
-        )
         return low, likely, high
 
 
@@ -167,7 +150,7 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
 
     With `slices`, and if they are asked for, only what took part in the baseline is searched. That has little to do with the size
     of the world: `TOOK_PART` is how many models these were in the bundled worlds of 25 to 43 models and in one of 5,000: few,
-    usual, many. Without slices every model is searched, and each test counts as long as one of the whole world.
+    usual, many. Without slices every model is searched.
     """
     runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
         asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
@@ -186,4 +169,4 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
     elif asked.accept_rate == "kept":
         low, likely, high = (round(each * max(rate, LEAST_RATE) ** -RARER) for each in search)
         search = low, likely, high
-    return Rough(asked.baseline_runs, search, certificate, SHARE if slices else (1.0, 1.0, 1.0))
+    return Rough(asked.baseline_runs, search, certificate)
