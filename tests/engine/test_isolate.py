@@ -301,7 +301,7 @@ def test_where_chosen_runs_are_reduced_they_pass_and_one_fails_with_any_one_mode
     one, gone = state.isolated, removed(state)
     passing, baseline = frozenset(ELEMENTS) - gone, [test for test in state.tests if test.phase == "baseline"]
     seeds = [test.seed for test in baseline if test.run in one.asked.chosen]
-    assert len(seeds) == len(one.chosen) <= most
+    assert len(seeds) == len(one.asked.chosen) <= most
     assert all(oracle(frozenset(ELEMENTS), seed) == "similar" for seed in seeds)
     assert all(oracle(passing, seed) == "pass" for seed in seeds)
     assert all(any(oracle(passing | {name}, seed) != "pass" for seed in seeds) for name in gone)

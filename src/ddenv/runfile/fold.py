@@ -361,14 +361,10 @@ def _vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
 
 def _unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
     candidate, round = tried(state, event), current(state)
-    words = {
-        "rejected": f"took back the rejection of {_described(state, candidate)}",
-        "undone": f"allowed {_described(state, candidate)} again",
-    }.get(candidate.verdict, f"took back the veto of {_described(state, candidate)}")
     known = next((one for one in state.refused if one.environment == candidate.kept), None)
     changes = {
         **with_candidate(state, replace(candidate, verdict="")),
-        **decision(state, at, "unveto", words),
+        **decision(state, at, "unveto", f"allowed {_described(state, candidate)} again"),
         "refused": tuple(one for one in state.refused if one is not known),
         "refusals": state.refusals + 1,
         # A refusal in an earlier round has blocked candidates since, so the search starts again.

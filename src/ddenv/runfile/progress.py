@@ -109,11 +109,9 @@ def path(nodes: Sequence[Node], number: int | None) -> tuple[Node, ...]:
 class Certificate:
     """What fresh runs show of the environment of `node`; number 1 is the run's first certificate.
 
-    `first_run` is the number of its first run. They have to show that what is left keeps `certify_rate` of the whole world's rate,
-    which was estimated as `rate`; the search aimed at `keep_rate`. All claims together are wrong with a probability of at most
-    `error`. What is left is run `at_least` so often. `claims` are empty while its tests are made. `past`: a search began since.
-    `branch`: the environment is in a branch whose f is another failure, so that the rate where that branch begins stands for the
-    whole world's. With `seeds`, on which what is left shows f, it claims what chosen runs of the search show, and asks for no rate.
+    Its terms are those of `CertificateStarted`, and `first_run` is the number of its first run. `claims` are empty while its tests
+    are made. `past`: a search began since. `branch`: the environment is in a branch whose f is another failure, so that the rate
+    where that branch begins stands for the whole world's.
     """
 
     number: int
@@ -132,14 +130,11 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One claim of a certificate: about what is left, or, if `without` is a model, about that without it.
+    """One claim of a certificate, as in `ClaimMade`: about what is left, or, if `without` is a model, about that without it.
 
     `verdict`: what is left is "kept" (it keeps the rate), "lost", or "exact" (its rate was only measured); a model is "needed"
     (without it f is rare enough), "helps" (f is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide,
-    "unknown" if they broke. `shown` of `runs` showed f; `outcomes` has the number of each outcome. `low`..`high` is the 95 %
-    interval of the rate, 0..1 without runs. What is left keeps at least `bound` of the rate; without a model f shows at most
-    `bound` times as often as with it. None is not known.
-    A claim that `is_exact` is about these runs of the search, and about no rate.
+    "unknown" if they broke. A claim that `is_exact` is about these runs of the search, and about no rate.
     """
 
     without: str | None
@@ -195,8 +190,7 @@ class Returned:
     """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back.
 
     `verdict`: the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not
-    decide, "unknown" if they broke. The robot reached its goal in `reached` of `runs`; `low`..`high` is the 95 % interval of that
-    rate, 0..1 without runs, or both are its share where the claim is about chosen runs.
+    decide, "unknown" if they broke.
     """
 
     back: str | None
