@@ -10,7 +10,7 @@ import umsgpack
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
-from ddenv.runs.wanted import Wanted
+from ddenv.runfile.tested import Wanted
 from ddenv.scene.camera import view
 from ddenv.scene.draw import MOST_LETTERS, Scenery, path_on_ground, safe_name
 from ddenv.scene.mesh import box, outline, paint, sphere

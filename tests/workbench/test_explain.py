@@ -295,7 +295,7 @@ def test_tries_and_pins_are_named_beside_the_round(run):
 
 def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run):
     fake_moments.guided(run).go_back(1)
-    assert told(run)[1].startswith("Went to 6 models (part A).")
+    assert told(run)[1].startswith("Went to 6 models (#1, part A).")
     run.write("changed", settings={"iterations": 5})
     assert told(run)[1].startswith("Changed iterations from 3 to 5, from this round on.")
     run.try_out(run.elements[:3])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,7 +33,7 @@ from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import margins, what_is_left, why
 from ddenv.runfile.events import DEEDS, Place, deed
 from ddenv.runfile.fold import spent
-from ddenv.runfile.reading import Invalid, vector
+from ddenv.runfile.reading import Invalid, Real, read
 from ddenv.runfile.state import RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.claims import ended, for_everyone
@@ -116,7 +117,7 @@ def _failure(state: RunState) -> list[Paragraph]:
 def _short_of(state: RunState, position: Place) -> str:
     goal = section(state.scenario, "goal")
     try:
-        x, y = vector((goal.get("x"), goal.get("y")), 2)
+        x, y = read(tuple[Real, Real], json.dumps((goal.get("x"), goal.get("y"))))
     except Invalid:
         return ""
     return f", {math.dist((x, y), position[:2]):.1f} m short of the goal at ({x:g}, {y:g})"

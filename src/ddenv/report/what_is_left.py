@@ -134,7 +134,7 @@ def margins(record: Record) -> Section | None:
 
 
 def _passing(record: Record, found: Nearest) -> list[Block]:
-    """The nearest world that passes, and the two runs side by side."""
+    """The nearest world that passes, with the ways of two runs."""
     blocks: list[Block] = [say(plain(found.sentences))]
     one = found.parting
     if one is None:
@@ -144,16 +144,7 @@ def _passing(record: Record, found: Nearest) -> list[Block]:
             f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without"
         )
         blocks.append(_map(record, record.elements, found.gone, one, "nearest", words, found.gone))
-    rows = tuple(
-        (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
-        for each in found.instants
-    )
-    head = ("time, s", "whole world: x, y, m", "nearest world that passes: x, y, m", "apart, m")
-    return [*blocks, Table(head, rows, {0, 1, 2, 3})]
-
-
-def _place(point: tuple[float, float]) -> str:
-    return f"{point[0]:.2f}, {point[1]:.2f}"
+    return blocks
 
 
 def _map(

@@ -16,11 +16,11 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
+from ddenv.runfile.tested import Wanted, made_for
 from ddenv.runs.nearest import nearest
 from ddenv.runs.playback import played
 from ddenv.runs.reasons import Parting, reasons
 from ddenv.runs.subject import read_parts
-from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
@@ -163,7 +163,7 @@ class Player:
         # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
         self._live = self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
         self._position.catch_up()
-        row = row_of(self._state, self._wanted)
+        row = made_for(self._state, self._wanted)
         idle = now - self._ran_at
         following = shot_of(self._state, row, self._live) if row else shot(self._state, self._live, self._shot, idle)
         if any(row.test == following.test for row in self._live):

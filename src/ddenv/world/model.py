@@ -205,12 +205,21 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True)
+class Shared:
+    """A byte range (start, end) of a world's text that goes when all of `models` are gone."""
+
+    span: tuple[int, int]
+    models: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
 class World:
     """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 
     `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
     everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
-    `ties` has (model, other) where a model is welded to another and so cannot stay without it.
+    `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
+    that go when several models are gone.
     """
 
     path: Path
@@ -223,6 +232,7 @@ class World:
     anchors: frozenset[str] = frozenset()
     resources: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     ties: tuple[tuple[str, str], ...] = ()
+    shared: tuple[Shared, ...] = ()
 
     def model(self, name: str) -> Model:
         for model in self.models:
