@@ -8,14 +8,6 @@ from ddenv.world.model import Model
 
 Color = tuple[float, float, float, float]
 
-_BY_WORD: tuple[tuple[tuple[str, ...], Color], ...] = (
-    (("asphalt", "road", "street", "platform"), (0.30, 0.31, 0.33, 1.0)),
-    (("wood", "board", "plank", "pallet", "tile", "lumber"), (0.72, 0.53, 0.33, 1.0)),
-    (("grass", "tree", "bush", "plant"), (0.38, 0.55, 0.30, 1.0)),
-    (("brick", "cinder", "concrete", "block", "rock", "stone"), (0.58, 0.57, 0.55, 1.0)),
-    (("ice", "water", "wet"), (0.60, 0.78, 0.88, 1.0)),
-    (("patch", "friction"), (0.36, 0.50, 0.66, 1.0)),
-)
 STILL: Color = (0.62, 0.62, 0.64, 1.0)
 MOVABLE: Color = (0.76, 0.56, 0.34, 1.0)
 
@@ -34,11 +26,7 @@ SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
 
 
 def default_color(model: Model) -> Color:
-    """The colour for a word in the model's name, else for whether it can move."""
-    name = model.name.lower()
-    for words, color in _BY_WORD:
-        if any(word in name for word in words):
-            return color
+    """The colour for whether the model can move."""
     return STILL if model.static else MOVABLE
 
 
