@@ -53,27 +53,14 @@ def terminal_map(
     margin = np.maximum(0.3, 0.03 * (high - low))
     low, high = low - margin, high + margin
     entries = [entry for entry in _entries(models) if entry[1] not in dim]
-    # The legend stands beside the picture or below it, whichever leaves the larger map.
-    widths = _widths(entries, columns // 2)
-    lines = min(1 + math.ceil(len(entries) / _blocks(widths, columns)), max(3, rows // 3)) if entries else 0
-    view = _view(low, high, columns - AXIS, rows - AROUND - lines)
-    room, beside = columns - AXIS - len(GAP) - _wide(widths), False
-    if entries and room >= 2 * NUMBERS:
-        other = _view(low, high, room, rows - AROUND)
-        if beside := view.scale >= other.scale:
-            view, lines = other, rows - 1
+    legend = _legend(entries, columns, max(3, rows // 3))
+    view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))
     axes = _axes(view)
     canvas = picture(models, view, color=color, dim=dim)
     _grid(canvas, *axes)
     _marks(canvas, view, spawn, goal, color)
-    drawn = list(_framed(canvas, view, *axes, color))
-    legend = _legend(entries, columns - AXIS - view.columns - len(GAP) if beside else columns, lines)
     title = shortened(_title(world, models, spawn, goal), columns)
-    if not beside:
-        return "\n".join([title, *drawn, *legend])
-    empty = " " * (view.columns + AXIS)
-    both = zip_longest(drawn, legend)
-    return "\n".join([title, *(f"{line or empty}{GAP}{text or ''}".rstrip() for line, text in both)])
+    return "\n".join([title, *_framed(canvas, view, *axes, color), *legend])
 
 
 def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
@@ -110,37 +97,21 @@ def _numbers(each: Drawn) -> tuple[str, str]:
     return f"{x:.2f}, {y:.2f}", words
 
 
-def _widths(entries: Sequence[Entry], columns: int) -> list[int]:
-    """The widths of the legend's columns: the names get the rest."""
-    own = [max(map(width, column)) for column in zip(HEADER, *entries, strict=True)]
-    own[1] = max(SHORTEST_NAME, min(own[1], LONGEST_NAME, columns - own[0] - own[2] - own[3] - 3 * len(GAP)))
-    return own
-
-
 def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
-    """At most `most` lines with as many models as fit, from top to bottom and then from left to right."""
+    """At most `most` lines below the map with as many models as fit, from top to bottom and then from left to right."""
     if not entries:
         return []
-    widths = _widths(entries, columns)
-    lines = most - 1
-    room = lines * _blocks(widths, columns)
-    shown = entries if len(entries) <= room else entries[: room - 1]
+    widths = [max(map(width, column)) for column in zip(HEADER, *entries, strict=True)]
+    rest = sum(widths) - widths[1] + 3 * len(GAP)
+    widths[1] = max(SHORTEST_NAME, min(widths[1], LONGEST_NAME, columns - rest))
+    blocks = max(1, (columns + 2 * len(GAP)) // (rest + widths[1] + 2 * len(GAP)))
+    lines = min(most - 1, math.ceil(len(entries) / blocks))
+    shown = entries if len(entries) <= lines * blocks else entries[: lines * blocks - 1]
     cells = [_cell(entry, widths) for entry in shown]
-    if len(shown) < len(entries):
-        words = f"... and {len(entries) - len(shown)} more"
-        remedy = f"{words} (--svg FILE names them)"
-        cells.append(padded(remedy if len(remedy) <= columns else words, _wide(widths)))
+    if more := len(entries) - len(shown):
+        cells.append(shortened(f"... and {more} more (--svg FILE names them)", columns))
     stacks = [[_cell(HEADER, widths), *cells[start : start + lines]] for start in range(0, len(cells), lines)]
     return [shortened((2 * GAP).join(row).rstrip(), columns) for row in zip_longest(*stacks, fillvalue="")]
-
-
-def _wide(widths: Sequence[int]) -> int:
-    return sum(widths) + 3 * len(GAP)
-
-
-def _blocks(widths: Sequence[int], columns: int) -> int:
-    """How many legends fit side by side."""
-    return max(1, (columns + 2 * len(GAP)) // (_wide(widths) + 2 * len(GAP)))
 
 
 def _cell(entry: Entry, widths: Sequence[int]) -> str:
