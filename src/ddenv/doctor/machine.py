@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-import locale
 import math
 import os
 import platform
 import shutil
-import socket
 import sqlite3
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -63,33 +61,13 @@ def terminal() -> Iterator[Finding]:
         small = columns < SMALLEST[0] or lines < SMALLEST[1]
         advice = f"the workbench is made for {SMALLEST[0]} by {SMALLEST[1]} and more" if small else ""
         yield Finding("terminal", "size", f"{columns} columns, {lines} lines", "note" if small else "ok", advice)
-    yield Finding("terminal", "colours", _colors())
-    encoding = locale.getpreferredencoding(False)
-    told = encoding.lower().replace("-", "") == "utf8"
-    yield Finding("terminal", "letters", encoding, "ok" if told else "note", "" if told else "export LANG=C.UTF-8")
-    known = {"SSH_CONNECTION": "ssh", "TMUX": "tmux", "STY": "screen"}
-    ways = [words for name, words in known.items() if os.environ.get(name)]
-    yield Finding("terminal", "by way of", ", ".join(ways) or "this machine's own")
 
 
-def _colors() -> str:
-    term = os.environ.get("TERM") or "unset"
-    if os.environ.get("NO_COLOR"):
-        return f"none, as NO_COLOR asks; TERM is {term}"
-    if os.environ.get("COLORTERM", "").lower() in ("truecolor", "24bit"):
-        return f"16 million; TERM is {term}"
-    return f"{256 if '256' in term else 16 if term not in ('unset', 'dumb') else 'none'}; TERM is {term}"
-
-
-def machine(ports: Mapping[str, int]) -> Iterator[Finding]:
-    """What may be used of the machine; `ports` are those that programs of ddenv begin with, by what they are for."""
+def machine() -> Iterator[Finding]:
+    """What may be used of the machine."""
     cores, all_cores = processor.usable_cores(), os.cpu_count() or 1
     yield Finding("machine", "cores", f"{cores} of {all_cores} may be used; {processor.name()}")
     yield _memory()
-    for use, port in ports.items():
-        free = _is_free(port)
-        says = f"{port} on 127.0.0.1 is {'free' if free else 'in use; another one is taken'}"
-        yield Finding("machine", f"port, {use}", says)
     yield _space("temporary files", Path(tempfile.gettempdir()), "machine")
 
 
@@ -101,16 +79,6 @@ def _memory() -> Finding:
     if free >= LITTLE_MEMORY:
         return Finding("machine", "memory", says)
     return Finding("machine", "memory", says, "note", "fewer tests at the same time: --jobs 1")
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return False
-    return True
 
 
 def runs() -> Iterator[Finding]:
