@@ -297,21 +297,21 @@ def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run
     fake_moments.guided(run).go_back(1)
     assert told(run)[1].startswith("Went to 6 models (part A).")
     run.write("changed", settings={"iterations": 5})
-    assert told(run)[1].startswith("Changed iterations from 3 to 5, from this round on.")
+    assert told(run)[1].startswith("Changed iterations from 3 to 5.")
     run.try_out(run.elements[:3])
     run.finish(run.start_hand(4), "similar", 0.1, failure="stuck")
     run.judge_trial(4, "similar", [run.tests])
     run.adopt(4, run.elements[:3], run.tests)
     words = told(run)[1]
-    assert words.startswith("You adopted try 4: 6 → 3 models. Round 4")
+    assert words.startswith("Adopted try 4: 3 models. Round 4")
     run.write(
         "accepted_other", test=8, what="try 2", trial=2, environment=[0, 1], outcomes={"8": "similar"}, distances={}
     )
-    assert told(run)[1].startswith("You accepted the other failure of try 2 as f: 3 → 2 models.")
+    assert told(run)[1].startswith("Accepted another failure as f: try 2")
     run.start_round(2, run.elements[:2])
     run.dissimilar(0)
     run.write("round_finished")
-    assert "You accepted" not in told(run)[1]
+    assert "Accepted another" not in told(run)[1]
 
 
 def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):

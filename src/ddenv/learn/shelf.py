@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from string import Template
@@ -65,12 +65,12 @@ class Opened:
 
     @cached_property
     def foretold(self) -> tuple[Foretelling | None, ...]:
-        """What each step asks to foretell. A reason is asked for once; where it is the same again, it is told."""
+        """What each step asks to foretell. The same reason is asked for once."""
         found: list[Foretelling | None] = []
         kinds = {""}
         for step, at in zip(self.lesson.steps, self.places, strict=True):
             each = None if step.foretell is None else foretelling(self.position, at, step.foretell)
-            found.append(each.told if each is not None and each.kind in kinds else each)
+            found.append(replace(each, reason=None) if each is not None and each.kind in kinds else each)
             kinds |= {"" if each is None else each.kind}
         return tuple(found)
 
