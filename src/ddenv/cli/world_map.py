@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import product, zip_longest
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 
 import numpy as np
 
-from ddenv.map.cells import FAINT, picture, signs
+from ddenv.map.cells import picture, signs
 from ddenv.map.colors import PLAIN
 from ddenv.map.drawing import tick_step, tick_text, ticks
 from ddenv.map.footprints import Drawn, plan
@@ -57,7 +57,6 @@ def terminal_map(
     view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))
     axes = _axes(view)
     canvas = picture(models, view, color=color, dim=dim)
-    _grid(canvas, *axes)
     _marks(canvas, view, spawn, goal, color)
     title = shortened(_title(world, models, spawn, goal), columns)
     return "\n".join([title, *_framed(canvas, view, *axes, color), *legend])
@@ -132,14 +131,6 @@ def _axes(view: View) -> tuple[dict[int, str], dict[int, str]]:
     return {cell[1]: text for cell, text in across.items() if cell}, {
         cell[0]: text for cell, text in down.items() if cell
     }
-
-
-def _grid(canvas: Canvas, across: Iterable[int], down: Iterable[int]) -> None:
-    """A dot on free ground where the lines of two numbers cross."""
-    for row, column in product(down, across):
-        if canvas.chars[row, column] == ord(" "):
-            canvas.chars[row, column] = ord("·")
-            canvas.fore[row, column] = FAINT
 
 
 def _marks(canvas: Canvas, view: View, spawn: Pose | None, goal: Point | None, color: bool) -> None:

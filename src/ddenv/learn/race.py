@@ -299,7 +299,8 @@ def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> 
         return f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"
     found, least = f"You found {held} in {tests}", bound(len(oracle.models), len(attempt.held))
     if len(attempt.tried) < least:
-        return f"{found}, fewer than {least}: luck or a look at the map helped you.{f' The algorithms: {others}.' if others else ''}"
+        luck = f"{found}, fewer than {least}: luck or a look at the map helped you."
+        return f"{luck} The algorithms: {others}." if others else luck
     if not done:
         return f"{found}; who knows nothing in advance needs at least {least}."
     quicker = [play.name for play in done if play.tests < len(attempt.tried)]

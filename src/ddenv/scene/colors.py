@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ddenv.world.model import Model
 
 Color = tuple[float, float, float, float]
@@ -28,14 +26,6 @@ SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
 def default_color(model: Model) -> Color:
     """The colour for whether the model can move."""
     return STILL if model.static else MOVABLE
-
-
-def varied(color: Color, number: int) -> Color:
-    """`color` slightly brighter or darker, to distinguish neighbouring shapes of one colour."""
-    # The fractions of multiples of the golden ratio are evenly spread and never repeat.
-    factor = 0.92 + 0.16 * math.modf(number * 0.6180339887)[0]
-    red, green, blue = (min(1.0, part * factor) for part in color[:3])
-    return red, green, blue, color[3]
 
 
 def of_bytes(color: tuple[int, int, int]) -> Color:

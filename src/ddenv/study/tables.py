@@ -6,7 +6,6 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from html import escape
-from operator import itemgetter
 from pathlib import Path
 from statistics import geometric_mean
 
@@ -266,9 +265,8 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     for times, rows in sorted(methods, key=lambda method: method[0] or math.inf):
         cells = [_cell(row, least) for row, least in zip(rows, fewest, strict=True)]
         table.append((rows[0].method.label, *cells, "–" if times is None else f"{times:.1f}"))
-    words = [paragraph for rows in scenarios for paragraph in _words(rows)]
     ranking = Table(head, tuple(table), range(1, len(head)))
-    return Section("Which is best where", (*words, ranking, say(BOUNDS)))
+    return Section("Which is best where", (ranking, say(BOUNDS)))
 
 
 def _certain(row: Row) -> float | None:
@@ -294,16 +292,3 @@ def _bound(rows: Sequence[Row], which: int) -> str:
     """One of the bounds as a range, since cells may differ in how many models are left."""
     bounds = [result.bounds[which] for row in rows for result in row.minimal]
     return " to ".join(map(str, sorted({min(bounds), max(bounds)}))) if bounds else "–"
-
-
-def _words(rows: Sequence[Row]) -> Iterator[Paragraph]:
-    """The best and the worst method of a scenario."""
-    known = [(tests, row.method.label) for row in rows if (tests := _certain(row)) is not None]
-    ranked = sorted(known, key=itemgetter(0))
-    if ranked:
-        (fewest, first), most = ranked[0], ranked[-1][0]
-        last = next(label for tests, label in ranked if tests == most)
-        equal = sum(tests == fewest for tests, _ in ranked) - 1
-        also = f" and {count(equal, 'other')}" if equal else ""
-        words = f": {first}{also} with the fewest tests, {fewest:g}; {last} with the most, {most:g}."
-        yield say(Strong(plain(rows[0].scenario.name)), words)
