@@ -125,11 +125,10 @@ def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection
 
 
 def _fill(each: Drawn, index: int) -> int:
-    """Floors are greyish; low models are darker than high ones, and models drawn one after the other differ."""
+    """Floors are greyish, and models drawn one after the other differ."""
     if each.floor:
         return packed(_visible(blend(each.color, GREY, 0.6)))
-    dark = 0.15 * (1 - each.shade) + 0.14 * (index % 2)
-    return packed(_visible(blend(each.color, (0, 0, 0), dark)))
+    return packed(_visible(blend(each.color, (0, 0, 0), 0.14 * (index % 2))))
 
 
 def _visible(color: RGB) -> RGB:

@@ -132,7 +132,7 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A model to draw from above. `center` and `size` are of the box around it, m; `shade` is 0 for low, 1 for high models.
+    """A model to draw from above. `center` and `size` are of the box around it, m.
 
     `color` covers most of it, or is the default of its kind if the file has none.
     """
@@ -143,7 +143,6 @@ class Drawn:
     size: Vector
     color: RGB
     floor: bool
-    shade: float
 
     @property
     def top(self) -> float:
@@ -159,13 +158,11 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     models = [model for model in world.models if not is_ground(model)]
     outlines = [footprint(model, corners) for model in models]
     boxes = [_box(model) for model in models]
-    tops = np.array([center[2] + size[2] / 2 for center, size in boxes])
     limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
     floors = [len(models) > 2 and each.area > limit for each in outlines]
-    shades = _shades(tops, np.array(floors, dtype=bool))
     drawn = [
-        Drawn(model, outline, *box, _color(model), floor, shade)
-        for model, outline, box, floor, shade in zip(models, outlines, boxes, floors, shades, strict=True)
+        Drawn(model, outline, *box, _color(model), floor)
+        for model, outline, box, floor in zip(models, outlines, boxes, floors, strict=True)
     ]
     return tuple(sorted(drawn, key=_turn))
 
@@ -183,15 +180,6 @@ def _box(model: Model) -> tuple[Vector, Vector]:
         return model.pose.position, (0.0, 0.0, 0.0)
     low, high = bounds
     return vector((low + high) / 2), vector(high - low)
-
-
-def _shades(tops: np.ndarray, floors: np.ndarray) -> list[float]:
-    """Heights on a scale from the lowest (0) to the highest (1) model other than floors; 1 for all if these are equal."""
-    others = tops[~floors]
-    if not len(others) or np.ptp(others) < 0.01:
-        return [1.0] * len(tops)
-    shades: list[float] = np.clip((tops - others.min()) / np.ptp(others), 0.0, 1.0).tolist()
-    return shades
 
 
 def _color(model: Model) -> RGB:

@@ -87,8 +87,8 @@ def _model(each: Drawn, frame: Frame) -> str:
 
 
 def _fill(each: Drawn) -> RGB:
-    """Floors are light, and low models are paler than high ones."""
-    return blend(WHITE, each.color, 0.2 if each.floor else 0.6 + 0.25 * each.shade)
+    """Floors are light."""
+    return blend(WHITE, each.color, 0.2 if each.floor else 0.8)
 
 
 def _tooltip(each: Drawn) -> str:

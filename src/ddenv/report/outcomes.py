@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ddenv.evidence.claims import FreshRuns, current, fresh_runs, never_left_out
+from ddenv.evidence.claims import FreshRuns, current, fresh_runs
 from ddenv.evidence.took_part import why_sliced
 from ddenv.page.blocks import (
     Block,
@@ -26,7 +26,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.baseline import failed_in, missed
-from ddenv.words.claims import drift, means, missing, promise, verdict_on
+from ddenv.words.claims import drift, means, missing, promise
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # The maximum number of models with a row each.
@@ -198,13 +198,7 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         )
     if state.certified:
         words += f" {as_sentence(promise(state, found))}"
-    # Other certificates of the same environment: each stands for itself.
-    earlier = (
-        say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
-        for one in state.certificates
-        if one.node == found.node and one.claims and one is not state.certificate
-    )
-    return [table, say(words), *earlier]
+    return [table, say(words)]
 
 
 def _fresh_row(state: RunState, each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:

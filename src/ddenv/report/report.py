@@ -36,7 +36,7 @@ from ddenv.words.claims import ended, for_everyone
 from ddenv.world.access import write_file
 
 KINDS = (".html", ".htm", ".md")
-PICTURES = ("map", "near", "chart")
+PICTURES = ("map", "chart")
 # Models are named up to this number.
 MOST_NAMES = 6
 
