@@ -41,7 +41,7 @@ def test_every_model_but_the_ground_has_a_shape_with_its_name_size_and_pose():
 def test_the_head_names_the_file_and_counts():
     told = words(tree_of(GROUND, box("a", 0, 0), box("b", 3, 0, static=False), file="dir/my.sdf"))
     assert "my.sdf" in told
-    assert "2 models · 1 dynamic · ground not drawn" in told
+    assert "2 models, without the ground" in told
     assert {"x, m", "y, m"} <= set(told)
 
 

@@ -95,7 +95,6 @@ def test_what_slices_save_stands_beside_the_papers_way():
     )
     assert table.rows[0][1:8] == ("2 of 2", "60", "268", "21", "40", "12", "88 %")
     told = words_of(Path("nowhere"), group)
-    assert "With slices 1 of 2 cells end at the same models as without them, and 1 are certified." in told
     assert f"Not certified: {PAIRS[0]}, seed 100000, with slices: it is not shown." in told
 
 

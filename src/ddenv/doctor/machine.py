@@ -18,7 +18,6 @@ from ddenv import __version__
 from ddenv.doctor import Finding
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX, runs_folder
-from ddenv.runs.programs import how_to_install
 from ddenv.text import count
 
 # By the names that packages are installed as, with the module that shows that they are there.
@@ -40,9 +39,6 @@ def installation() -> Iterator[Finding]:
         else:
             yield Finding("installation", name, "not installed", "wrong", f"pip install {name}")
     yield Finding("installation", "SQLite", sqlite3.sqlite_version)
-    missing = f"not installed; only 'ddenv serve' needs it: {how_to_install('serve')}"
-    served = _version("textual-serve") if importlib.util.find_spec("textual_serve") is not None else missing
-    yield Finding("installation", "textual-serve", served)
 
 
 def _version(name: str) -> str:

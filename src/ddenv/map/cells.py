@@ -16,10 +16,8 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
 
 Cell = tuple[int, int]
-# With fewer cells than `ROOM` per letter, one letter is kept in each `BLOCK` (rows, columns), and one of each group unless that
-# leaves fewer than `LEAST_ROOM` cells per letter.
-ROOM, LEAST_ROOM = 20, 4
-BLOCK = 3, 8
+# Cells for each letter, so that the map stays readable.
+ROOM = 20
 # One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN, FLOORS, FAINT_SIGN = "+", ".:", "░"
@@ -54,15 +52,10 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
     seen = np.flatnonzero((cells[:, 0] >= 0) & named)
     sizes = np.bincount(grid[grid >= 0], minlength=len(centers))
     seen = seen[np.lexsort((-sizes[seen], signs.rank[seen], ~signs.sure[seen]))]
-    if len(seen) * ROOM > rows * columns:
-        # The sure ones, and the first of each block.
-        blocks: np.ndarray = cells[seen] // BLOCK
-        kept: np.ndarray = signs.sure[seen].copy()
-        kept[np.unique(blocks[:, 0] << 20 | blocks[:, 1], return_index=True)[1]] = True
-        _, first = np.unique(signs.groups[seen], return_index=True)
-        if sum(len(signs.texts[index]) for index in seen[first].tolist()) * LEAST_ROOM <= rows * columns:
-            kept[first] = True
-        seen = seen[kept]
+    # The sure ones, the first of each group, and as many more as stay readable.
+    kept: np.ndarray = signs.sure[seen] | (np.arange(len(seen)) < rows * columns // ROOM)
+    kept[np.unique(signs.groups[seen], return_index=True)[1]] = True
+    seen = seen[kept]
     occupied, placed = set(taken), dict[int, Cell]()
 
     def put(index: int, row: int, column: int) -> bool:

@@ -9,7 +9,7 @@ from ddenv.map.colors import RGB, blend, packed
 from ddenv.map.drawing import Frame, Point, at, badge, labels, path_of, plot, tick, written
 from ddenv.map.footprints import Drawn, plan
 from ddenv.text import count, shortened
-from ddenv.world.model import World, is_ground
+from ddenv.world.model import World
 
 # Maximum width and height and minimum width of the map, and its margins, pixels.
 WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0
@@ -66,13 +66,9 @@ def svg_map(world: World, *, spawn: tuple[float, float, float] | None = None, go
 
 
 def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
-    moving = sum(not each.model.static for each in models)
-    parts = [count(len(models), "model")]
-    parts += [f"{moving} dynamic"] if moving else []
-    parts += ["ground not drawn"] if any(map(is_ground, world.models)) else []
     name = written(shortened(world.path.name, 48))
     yield f'<text class="title" x="{LEFT:.0f}" y="34">{name}</text>'
-    yield tick(LEFT, 56, "start", " · ".join(parts))
+    yield tick(LEFT, 56, "start", f"{count(len(models), 'model')}, without the ground")
 
 
 def _model(each: Drawn, frame: Frame) -> str:

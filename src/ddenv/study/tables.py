@@ -128,7 +128,7 @@ def section(folder: Path, rows: Sequence[Row]) -> Section:
     title = plain(scenario.name) + (f", {count(models(rows), 'model')}" if models(rows) else "")
     title += f" (Table {table} of the paper)" if table else ""
     blocks: list[Block] = [say(plain(scenario.description))] if scenario.description else []
-    blocks += [numbers(rows), *_slices(rows), *_problems(rows)]
+    blocks += [numbers(rows), *_problems(rows)]
     if over(rows):
         caption = "Models left after each test of the search, a line for each method (the paper's Figure 2):"
         blocks += [behind(rows), say(caption), Picture(f"figure-2-{file}", chart(rows), caption)]
@@ -173,19 +173,6 @@ def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]
     if beside:
         yield "paper", str(paper.minutes) if paper else "–"
     yield "certificate minutes", spread([result.certificate_seconds / 60 for result in results], "{:.1f}".format)
-
-
-def _slices(rows: Sequence[Row]) -> Iterator[Paragraph]:
-    """What the cells with slices came to, beside those without."""
-    pairs = [pair for row in rows if row.sliced for pair in zip(row.results, row.sliced, strict=True)]
-    ended = [(without, sliced) for without, sliced in pairs if without.certificate and sliced.certificate]
-    if ended:
-        alike = sum(frozenset(without.left) == frozenset(sliced.left) for without, sliced in ended)
-        certified = sum(sliced.minimal for _, sliced in ended)
-        yield say(
-            f"With slices {alike} of {count(len(ended), 'cell')} end at the same models as without them, and {certified} are "
-            "certified."
-        )
 
 
 def _whole(value: float) -> str:
