@@ -21,7 +21,7 @@ from ddenv.world.pose import Pose
 SIDES = 24  # of the polygon that stands for a circle
 # Minimum distance between points of a drawn trajectory, m: a robot that stands still leaves one point.
 TUBE_STEP = 0.04
-# An edge of a mesh looks smooth if its faces bend by less than this, rad.
+# A corner of a mesh looks smooth if its faces deviate by less than this from their mean normal, rad.
 SMOOTH = math.radians(30.0)
 
 
@@ -130,11 +130,20 @@ def _arc(radius: float, begin: float, end: float, pieces: int) -> list[tuple[flo
 
 def creased(mesh: Mesh) -> Surface:
     """The surface of a mesh, smooth where it bends little, with sharp edges elsewhere."""
-    from trimesh import Trimesh
-    from trimesh.graph import smooth_shade
-
-    shaded = smooth_shade(Trimesh(mesh.vertices, mesh.faces, process=False), angle=SMOOTH, facet_minarea=None)
-    return Surface(np.asarray(shaded.vertices), np.asarray(shaded.faces, dtype=np.uint32))
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat, count = mesh.faces.ravel(), len(mesh.vertices)
+    weights = np.repeat(normals, 3, axis=0)
+    common = np.column_stack([np.bincount(flat, weights[:, axis], count) for axis in range(3)])[mesh.faces]
+    along = np.einsum("fi,fci->fc", normals, common)
+    lengths = np.linalg.norm(normals, axis=1)[:, None] * np.linalg.norm(common, axis=2)
+    sharp = along < math.cos(SMOOTH) * lengths
+    faces = mesh.faces.astype(np.int64)
+    faces[sharp] = count + np.arange(sharp.sum())
+    used = np.zeros(count + int(sharp.sum()), dtype=bool)
+    used[faces] = True
+    number = np.cumsum(used) - 1
+    return Surface(np.concatenate([mesh.vertices, corners[sharp]])[used], number[faces].astype(np.uint32))
 
 
 def tube(points: np.ndarray, radius: float) -> Surface:
