@@ -111,7 +111,6 @@ def _whole_world(state: RunState) -> FreshRuns | None:
 
 
 def summary_lines(state: RunState, path: Path) -> list[str]:
-    """The same for people."""
     before, after = len(state.elements), len(state.environment)
     if state.baseline is None:
         return [printable(f"run file: {path}")]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ddenv.cli.options import Numbers, reading_options, scenarios, together
-from ddenv.cli.terminal import announce, announced, say_written, terminal_columns, wrapped
+from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
 from ddenv.text import count, first_of, printable, shortened
@@ -330,8 +330,8 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     able = sum(bool(model.links) and not model.static for model in world.models)
     # Drake's plant needs a robot; piles settle as if there were none.
     scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
-    with announced(f"settling {count(able, 'model')} that can move"):
-        settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
+    announce(f"settling {count(able, 'model')} that can move")
+    settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
     for about, words in (*note_inside(world), *notes_on(world, settled)):
         if about != "unrest":
             announce(words)

@@ -84,7 +84,6 @@ def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Poin
 
 
 def _entries(models: Sequence[Drawn]) -> list[Entry]:
-    """Sign, name, centre and size of each model, the largest first."""
     letters = signs(models)
     order = sorted(range(len(models)), key=lambda index: -models[index].outline.area)
     return [(letters[index], models[index].model.name, *_numbers(models[index])) for index in order]
@@ -123,7 +122,6 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
 
 
 def _axes(view: View) -> tuple[dict[int, str], dict[int, str]]:
-    """The numbers along x by column, and along y by row."""
     wide, high = view.columns * view.scale / 2, view.rows * view.scale
     x_step, y_step = tick_step(2 * wide, max(1, view.columns // 8)), tick_step(2 * high, max(1, view.rows // 4))
     across = {view.cell(x, view.y): tick_text(x, x_step) for x in ticks(view.x - wide, view.x + wide, x_step)}

@@ -28,7 +28,6 @@ LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000
 
 
 def installation() -> Iterator[Finding]:
-    """What is installed."""
     yield Finding("installation", "ddenv", f"{__version__}, {Path(__file__).parents[1]}")
     yield Finding("installation", "Python", f"{platform.python_version()}, {sys.executable}")
     for name, module in NEEDED.items():
@@ -49,7 +48,6 @@ def _version(name: str) -> str:
 
 
 def terminal() -> Iterator[Finding]:
-    """What the workbench would be drawn on."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         yield Finding("terminal", "terminal", "none: input or output is no terminal; 'ddenv run' works without one")
     else:
@@ -60,7 +58,6 @@ def terminal() -> Iterator[Finding]:
 
 
 def machine() -> Iterator[Finding]:
-    """What may be used of the machine."""
     cores, all_cores = processor.usable_cores(), os.cpu_count() or 1
     yield Finding("machine", "cores", f"{cores} of {all_cores} may be used; {processor.name()}")
     yield _memory()
@@ -78,7 +75,6 @@ def _memory() -> Finding:
 
 
 def runs() -> Iterator[Finding]:
-    """Where runs are kept."""
     folder = runs_folder()
     yield Finding("runs", "folder", f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
     nearest = next(each for each in (folder, *folder.parents) if each.exists())

@@ -131,7 +131,6 @@ class Attempt:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """The student's environment."""
         return self._chain[-1]
 
     @property

@@ -13,7 +13,6 @@ FIGURES = (("models", "models"), ("left", "left"), ("search_tests", "tests of ca
 
 
 def handout(opened: Opened) -> Report:
-    """The page of a lesson."""
     lesson, state = opened.lesson, opened.position.end
     end = state.revision
     about = f"The lesson takes about {lesson.minutes} minutes; its run is {lesson.run.name}."

@@ -102,7 +102,6 @@ class Course:
 
     @property
     def page(self) -> Page:
-        """What is shown beside the run."""
         text, after, asked = blocks(self._text()), blocks(self._after()), self._asked
         if asked is None:
             return Page(text, after=after)
@@ -132,7 +131,6 @@ class Course:
 
     @property
     def is_open(self) -> bool:
-        """Whether a question waits for its answer."""
         return self._asked is not None and self._asked.chosen is None
 
     def _said(self, words: str) -> str:
@@ -178,7 +176,6 @@ class Course:
         return True
 
     def _return(self) -> None:
-        """From a prediction back to the step, as it was."""
         assert self._own is not None
         (self._asked, at), self._own = self._own, None
         self.position.go(at)
@@ -242,7 +239,6 @@ class Course:
 
     @property
     def activity(self) -> Activity | None:
-        """What there is to do in this step."""
         here = self.here
         return None if here is None else "race" if here.race else "try" if here.budget else None
 
@@ -271,7 +267,6 @@ class Course:
             self.due = False
 
     def watched(self) -> None:
-        """After a race."""
         self.due = False
 
     # Moves in the run.

@@ -103,7 +103,6 @@ def _first_slice(state: RunState) -> Node | None:
 
 
 def _sliced(state: RunState) -> int:
-    """How many models the first slice left."""
     node = _first_slice(state)
     return len(state.elements if node is None else node.environment)
 
@@ -187,7 +186,6 @@ _OF_SET = re.compile(r"(rate|chance) of (\S.*)")
 
 
 def names() -> tuple[str, ...]:
-    """All names that a text may have between braces."""
     return (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
 
 
@@ -259,7 +257,6 @@ class Figures:
 
 
 def _claim(state: RunState, model: str) -> Claim:
-    """The last certificate's claim about a model."""
     certificate = _certificate(state)
     found = next((each for each in certificate.claims if each.without == model), None) if certificate else None
     if found is None:

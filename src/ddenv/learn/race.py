@@ -61,7 +61,6 @@ class Play:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """What is left at the end."""
         return self.after(self.tests)
 
     def after(self, tests: int) -> tuple[str, ...]:
@@ -245,7 +244,6 @@ def _and(names: Sequence[str]) -> str:
 
 
 def bet(plays: Sequence[Play]) -> Question:
-    """Asks before a race who will need the fewest tests."""
     fewest = min(play.tests for play in plays)
     best = [play.name for play in plays if play.tests == fewest]
     tie = len(best) > 1
@@ -290,7 +288,6 @@ def bound(models: int, needed: int) -> int:
 
 
 def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> str:
-    """How the student's search compares."""
     tests, held = count(len(attempt.tried), "test"), count(len(attempt.held), "model")
     done = sorted((play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests)
     others = first_of([f"{play.name} {play.tests}" for play in done], NAMED)

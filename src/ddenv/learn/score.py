@@ -32,7 +32,6 @@ class Score:
 
     @property
     def right(self) -> int:
-        """How many answers were right."""
         return sum(self.answered.values())
 
     def with_answer(self, key: str, answer: Answer) -> Score:

@@ -55,7 +55,6 @@ class Opened:
         return None if step.budget is None or self.oracle is None else Attempt(self.oracle, step.budget, moves)
 
     def racers(self, step: Step) -> tuple[Play, ...]:
-        """The searches that race in a step."""
         return tuple(self.plays[name] for name in step.race)
 
     def text(self, words: str, at: int) -> str:
@@ -83,7 +82,6 @@ class Opened:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """The event that each step shows."""
         found, at = [], self.position.ids[0]
         for step in self.lesson.steps:
             at = step.at or at

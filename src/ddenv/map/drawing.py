@@ -86,7 +86,6 @@ class Frame:
         return pixels
 
     def pixel(self, point: Point) -> Point:
-        """A point (m) on the page, pixels."""
         x, y = self.pixels(np.array([point]))[0].tolist()
         return x, y
 
@@ -142,7 +141,6 @@ def _grid(value: float) -> str:
 
 
 def tick(x: float, y: float, anchor: str, words: str) -> str:
-    """A number or a name at an axis."""
     return f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{words}</text>'
 
 
@@ -152,7 +150,6 @@ def at(point: Point, drawn: str) -> str:
 
 
 def badge(name: str, letter: str) -> str:
-    """The mark of the start or the goal, around (0, 0)."""
     return f'<circle class="badge {name}" r="10"/><text class="sign" y="4.5">{letter}</text>'
 
 

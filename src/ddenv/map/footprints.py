@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
 
 from ddenv.map.colors import RGB
-from ddenv.world.extent import convex_hull, model_bounds, shape_bounds
+from ddenv.world.extent import convex_hull, model_bounds
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -134,7 +133,7 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
 class Drawn:
     """A model to draw from above. `center` and `size` are of the box around it, m.
 
-    `color` covers most of it, or is the default of its kind if the file has none.
+    `color` is that of its first visual, or the default of its kind if the file has none.
     """
 
     model: Model
@@ -183,14 +182,8 @@ def _box(model: Model) -> tuple[Vector, Vector]:
 
 
 def _color(model: Model) -> RGB:
-    areas: dict[RGB, float] = defaultdict(float)
-    for link in model.links:
-        for visual in link.visuals:
-            if visual.color is None or visual.color[3] <= 0 or isinstance(visual.shape, Plane):
-                continue
-            low, high = shape_bounds(visual.shape, visual.pose)
+    for visual in (visual for link in model.links for visual in link.visuals):
+        if visual.color is not None and visual.color[3] > 0 and not isinstance(visual.shape, Plane):
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
-            areas[red, green, blue] += float(np.prod((high - low)[:2]))
-    if areas:
-        return max(areas, key=lambda color: areas[color])
+            return red, green, blue
     return STATIC if model.static else DYNAMIC

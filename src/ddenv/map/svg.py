@@ -83,7 +83,6 @@ def _model(each: Drawn, frame: Frame) -> str:
 
 
 def _fill(each: Drawn) -> RGB:
-    """Floors are light."""
     return blend(WHITE, each.color, 0.2 if each.floor else 0.8)
 
 

@@ -16,7 +16,6 @@ LONGEST_VALUE = 120
 
 
 def settings(record: Record) -> Section:
-    """The section with the settings."""
     scenario, jobs = record.state.scenario, record.state.jobs
     rows = [
         (one.label, _read(scenario, record.asked, one), one.meaning)
@@ -59,7 +58,6 @@ def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
 
 
 def repeat(record: Record) -> Section:
-    """The section on what to type."""
     state, run = record.state, shlex.quote(plain(record.path))
     blocks: list[Block] = []
     if state.baseline is not None:

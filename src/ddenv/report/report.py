@@ -42,7 +42,6 @@ MOST_NAMES = 6
 
 
 def content(record: Record) -> Report:
-    """The report on a run."""
     state = record.state
     about = (what_is_left, worth, why, margins, way, guiding, others_met, sureness, settings, repeat)
     sections = [each(record) for each in about]

@@ -83,7 +83,6 @@ def _row(state: RunState, round: Round, tests: int, undone: bool) -> tuple[Cell,
 
 
 def _summed(rounds: Sequence[Round], tests: int) -> tuple[Cell, ...]:
-    """Several rounds in one row."""
     wins = sum(each.winner is not None for each in rounds)
     numbers = " to ".join(str(number) for number in dict.fromkeys((rounds[0].number, rounds[-1].number)))
     words = f"{wins} of {len(rounds)} reduced" if wins else "none"

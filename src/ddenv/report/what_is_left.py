@@ -25,7 +25,6 @@ MOST_MODELS, MOST_NAMES, MOST_DROPPED, MOST_MAPS = 200, 12, 3, 6
 
 
 def what_is_left(record: Record) -> Section:
-    """The section on what is left."""
     state = record.state
     title = "The minimal environment" if state.certified else "What is left so far"
     if state.baseline is None:

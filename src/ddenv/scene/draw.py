@@ -99,7 +99,6 @@ class Scenery:
         return max(heights, default=0.0)
 
     def show(self, shot: Shot) -> None:
-        """Shows the environment of `shot`."""
         for name, key in self.keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
         for path, thing in self._together(shot):
@@ -169,7 +168,6 @@ class Scenery:
         return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
-        """Draws the robot's path in the run that shows f."""
         tube = None if samples is None else _tube(path_on_ground(samples, self._lowest), colors.EVIDENCE)
         self._stage.draw(EVIDENCE, tube, shadow=False)
 

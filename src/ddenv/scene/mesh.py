@@ -42,7 +42,6 @@ class Surface:
         return replace(self, vertices=self.vertices @ pose.rotation().T + pose.position)
 
     def painted(self, color: Sequence[float]) -> Surface:
-        """This surface in one colour."""
         *tint, alpha = color
         return replace(self, tints=np.tile(tint, (len(self.vertices), 1)), alpha=alpha)
 

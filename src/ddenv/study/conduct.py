@@ -64,7 +64,6 @@ class Work:
         return _made(self.state) - _made(self.before)
 
     def catch_up(self) -> None:
-        """Reads the new events."""
         self.state = fold(self.file.events(self.state.revision), self.state)
 
     def has_ended(self) -> bool:
@@ -177,7 +176,6 @@ class Runner:
             self._record()
 
     def _collect(self) -> None:
-        """Says what has ended."""
         for work in tuple(self.running):
             if work.has_ended():
                 self.running.remove(work)
@@ -215,7 +213,6 @@ class Runner:
         return " · ".join((self._share, *(f"{work.cell.label}: {_doing(work)}" for work in self.running)))
 
     def _ending(self, work: Work) -> str:
-        """How a cell ended, in one line."""
         if work.problem:
             return work.problem
         result = read_cell(self._folder, work.cell)

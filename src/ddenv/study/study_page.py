@@ -187,7 +187,6 @@ def _row(folder: Path, result: Result) -> dict[str, object]:
 
 
 def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path) -> Section:
-    """The section on how the study was made."""
     # A name that begins with a dash would be an option.
     start = f"./{folder}" if str(folder).startswith("-") else folder
     example = shlex.quote(plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv"))

@@ -122,7 +122,6 @@ def _map(folder: Path, result: Result, name: str) -> Block:
 
 
 def section(folder: Path, rows: Sequence[Row]) -> Section:
-    """The section on one scenario."""
     scenario = rows[0].scenario
     file, table = file_name(scenario), next((row.paper.table for row in rows if row.paper), "")
     title = plain(scenario.name) + (f", {count(models(rows), 'model')}" if models(rows) else "")
@@ -137,7 +136,6 @@ def section(folder: Path, rows: Sequence[Row]) -> Section:
 
 
 def _table(rows: Sequence[Sequence[tuple[str, Cell]]], right: Collection[int]) -> Table:
-    """A table of rows whose cells have titles."""
     head = tuple(title for title, _ in rows[0])
     return Table(head, tuple(tuple(cell for _, cell in row) for row in rows), right)
 
@@ -150,7 +148,6 @@ def numbers(rows: Sequence[Row]) -> Table:
 
 
 def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]:
-    """The titles and cells of a row."""
     results, paper = row.over, row.paper
     sliced = [result for result in row.sliced if result.certificate is not None]
     certified = f"{len(row.minimal)} of {len(row.results)}"
@@ -223,7 +220,6 @@ def _left(results: Sequence[Result]) -> Cell:
 
 
 def _problems(rows: Sequence[Row]) -> Iterator[Paragraph]:
-    """The cells that are not certified, and why."""
     cells = defaultdict[str, list[str]](list)
     for row in rows:
         for result in (*row.results, *row.sliced):

@@ -350,7 +350,6 @@ def sliced(state: RunState) -> tuple[str, ...]:
 
 
 def implied(state: RunState) -> tuple[str, ...]:
-    """That the last test that ended was not simulated."""
     last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
@@ -358,6 +357,5 @@ def implied(state: RunState) -> tuple[str, ...]:
 
 
 def refuted(state: RunState) -> tuple[str, ...]:
-    """That slices are wrong here."""
     words = refuted_words(state)
     return (as_sentence(words),) if words else ()

@@ -119,7 +119,6 @@ KINDS: tuple[Kind, ...] = ("algorithm", "partitioning", "prioritization")
 
 
 def chosen(algorithm: str, pair: str) -> dict[Kind, str]:
-    """The three names by kind."""
     partitioning, _, prioritization = pair.partition("/")
     return {"algorithm": algorithm, "partitioning": partitioning, "prioritization": prioritization}
 
@@ -159,7 +158,6 @@ GROUPS = ("probdd", "splitting")
 
 
 def beginning(options: Settings, models: int) -> str:
-    """How the next round is made; E has this many `models`."""
     kept = f"the {count(models, 'model')} of E"
     names = chosen(options.algorithm, options.pair)
     match options.algorithm:
