@@ -139,6 +139,9 @@ trust_option = click.option(
     "--trust", is_flag=True, help="Start the controller or the simulator that the scenario brings along."
 )
 
+# For commands that start an engine on a run that is there.
+engine_options = together(jobs_option(), cluster_option, trust_option, json_option)
+
 # For commands that take a scenario.
 scenario_options = together(
     click.option(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 from meshcat.geometry import Object
@@ -45,18 +44,9 @@ def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
     return samples[:, 1:4] + (lowest + ABOVE) * up
 
 
-class Letter(NamedTuple):
-    """The letter of a partition over a model: its colour as in CSS, where it belongs, m, and what the browser calls the model.
-
-    `key` is empty where the model cannot move.
-    """
-
-    letter: str
-    color: str
-    x: float
-    y: float
-    z: float
-    key: str
+# The letter of a partition over a model: the letter, its colour as in CSS, where it belongs, x, y, z in m, and what the browser
+# calls the model, "" where it cannot move.
+Letter = tuple[str, str, float, float, float, str]
 
 
 class Scenery:
@@ -161,7 +151,7 @@ class Scenery:
                     edges.setdefault(color, []).append(ends)
                 if listed:
                     css = f"#{colors.hexadecimal(color):06x}"
-                    places.append(Letter(letter, css, float(x), float(y), float(high[2]), key))
+                    places.append((letter, css, float(x), float(y), float(high[2]), key))
         # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
         for number, (color, all_ends) in enumerate(edges.items()):
             self._stage.draw((*PARTS, str(number)), lines(np.concatenate(all_ends), color), shadow=False)
