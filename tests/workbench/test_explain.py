@@ -8,7 +8,7 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.words.baseline import baseline_sentence
+from ddenv.words.baseline import baseline
 from ddenv.words.explain import explain
 from ddenv.workbench.run.status import facts
 from ddenv.workbench.shared.poll import Poll
@@ -210,7 +210,9 @@ def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
 
 def test_other_failures_in_the_baseline_are_named_and_counted(run):
     state = fold(run.created().baseline(others=2).file.events())
-    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs." in baseline_sentence(state)
+    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs (--failure reduces another one)." in baseline(
+        state
+    )
 
 
 def test_a_baseline_that_goes_on_says_why(run):
@@ -261,9 +263,9 @@ def test_a_killed_engine_is_named_with_the_key_that_resumes(run):
 def test_the_chance_to_miss_f_names_the_cure(run):
     state = fold(run.created().baseline(failures=1).file.events())
     words = "a 95 % chance to see f needs --iterations 2"
-    assert words not in baseline_sentence(state)
+    assert words not in baseline(state)
     state.scenario["reduction"] = {"iterations": 1}
-    assert words in baseline_sentence(state)
+    assert words in baseline(state)
 
 
 def test_long_lists_of_models_are_cut(run):

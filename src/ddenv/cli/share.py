@@ -133,7 +133,7 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
     with RunFile(run) as opened:
         trusted_scenario(opened, asking(trust))
     announce(f"making runs of {run.stem} again ...")
-    lines = write_mcap(run, file, lambda name, seconds: None)
+    lines = write_mcap(run, file)
     print("\n".join([f"wrote {file}", *(f"  {line}" for line in lines)]))
 
 

@@ -8,7 +8,7 @@ lists.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import islice
@@ -23,7 +23,7 @@ from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
@@ -135,11 +135,11 @@ class Streams:
         self.heard.append((reading, command))
 
 
-def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) -> list[str]:
+def write_mcap(run: Path, target: Path) -> list[str]:
     """Makes the failing run, that of what is left, and one that reaches its goal again (`_chosen` says which), and writes their
     streams to `target`; returns a line about each.
 
-    `progress(name, seconds)` gets the simulated time, s. Raises UserError, also for runs by a simulator of the user's own and for
+    Raises UserError, also for runs by a simulator of the user's own and for
     runs that give other bits here; then nothing is written.
     """
     if target.exists():
@@ -160,7 +160,7 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     writer.write_message(RESULT, schemas[WORDS], {"data": result_is}, nanoseconds(0.0))
     for one in chosen:
         streams = Streams()
-        result = template.run(one.models, one.seed, _progress(progress, one.name), one.full, streams)
+        result = template.run(one.models, one.seed, None, one.full, streams)
         if not np.array_equal(result.trajectory, stored[one.test]):
             raise UserError(f"{run}: test {one.test} gives other bits here: another Drake or another processor made it")
         for topic, kind, seconds, message in messages(one, result, streams, subject):
@@ -170,10 +170,6 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     writer.finish()  # type: ignore[no-untyped-call]
     write_file(target, output.getvalue())
     return said
-
-
-def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
-    return lambda seconds, *_: progress(name, seconds)
 
 
 def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:

@@ -99,10 +99,8 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         ours, more = (duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES)
         yield say(
             f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
-            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, one test after another, and "
-            f"the certificates, which the paper does not have, {more}. The worlds follow the paper's descriptions but are not "
-            "its worlds, and the simulator differs: compare the methods with each other, and the minutes only roughly with the "
-            "paper's."
+            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, and the certificates {more}. "
+            "The worlds and the simulator differ from the paper's: compare the methods with each other."
         )
     if missing := len(results) - len(minimal):
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)

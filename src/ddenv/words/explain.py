@@ -12,7 +12,7 @@ from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.text import as_sentence, count, first_of, plain
-from ddenv.words.baseline import baseline_sentence
+from ddenv.words.baseline import baseline
 from ddenv.words.certifying import certifying
 from ddenv.words.claims import ended, instead, of_passing, of_runs, promise
 from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
@@ -152,7 +152,7 @@ def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
     arrived = arrival(state)
     if arrived:
         return (arrived, first)
-    then = baseline_sentence(state) if state.round is None else follows(options, state.round)
+    then = baseline(state) if state.round is None else follows(options, state.round)
     return (first, then) if then else (first,)
 
 
@@ -288,7 +288,7 @@ def _finished(state: RunState) -> Happening:
     kept = count(len(state.environment), "model")
     if state.baseline is None:
         return None, (_reason(state, "The run ended in the baseline."),)
-    base = baseline_sentence(state)
+    base = baseline(state)
     if not state.certified:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else helping(found)
