@@ -175,6 +175,12 @@ reading_options = together(
         type=click.Choice(IGNORABLE),
         help="Skip such elements instead of refusing the file; may be repeated.",
     ),
+    click.option(
+        "--inside",
+        is_flag=True,
+        default=None,
+        help="Remove single parts of models that never move, such as the walls of a house, in place of whole models.",
+    ),
 )
 
 

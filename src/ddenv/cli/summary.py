@@ -8,7 +8,7 @@ from typing import Any
 
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out
 from ddenv.evidence.rates import wilson_interval
-from ddenv.evidence.took_part import simulated
+from ddenv.evidence.slices import simulated
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import attach_name

@@ -53,7 +53,7 @@ def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     scenario = load_scenario(path) if kind == "scenario" else None
     file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
     read_as = reading_of(own, **reading)
-    return read_world(file, read_as, announce), read_as
+    return read_world(file, read_as), read_as
 
 
 # How a world was read: a table for people, plain data for programs.
@@ -72,7 +72,6 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 def world_report(world: World) -> dict[str, Any]:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.placement import inside
-    from ddenv.world.sdf.official import refused
 
     removable = frozenset(world.elements())
     return {
@@ -83,7 +82,6 @@ def world_report(world: World) -> dict[str, Any]:
         "models": [_described(model, world, removable) for model in world.models],
         "notes": _notes(world, ""),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
-        "refused": [{"why": why, "place": place} for why, place in refused(world)],
     }
 
 
@@ -142,7 +140,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     table = _table((_row(model, ", ".join(by_model.get(model.name, ()))) for model in world.models), columns)
     notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
     below = ["", "notes", *notes] if notes else []
-    wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
+    wrong = [line for words in _inside(world) for line in wrapped(words, columns)]
     gravity = " ".join(f"{part:g}" for part in world.gravity)
     what = world.version if is_directives(world.path) else f"SDF {world.version}"
     title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
@@ -153,19 +151,6 @@ def _inside(world: World) -> list[str]:
     from ddenv.world.placement import note_inside
 
     return [words for _, words in note_inside(world)]
-
-
-def _refused(world: World) -> list[str]:
-    """A line for each reason for which the official checker would refuse the file."""
-    from ddenv.world.sdf.official import refused
-
-    places: dict[str, list[str]] = {}
-    for why, place in refused(world):
-        places.setdefault(why, []).append(place)
-    times = {why: f", and {len(at) - 1} more" if len(at) > 1 else "" for why, at in places.items()}
-    return [
-        printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{times[why]}") for why, at in places.items()
-    ]
 
 
 def _text(note: Note) -> str:
@@ -269,7 +254,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
     """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what did not affect the
     runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
     """
-    from ddenv.evidence.took_part import in_whole_world
+    from ddenv.evidence.slices import in_whole_world
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.nearest import removed_in_passing

@@ -6,7 +6,6 @@ import math
 from collections import Counter
 
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs
-from ddenv.evidence.took_part import why_sliced
 from ddenv.page.blocks import (
     Block,
     Cell,
@@ -119,9 +118,7 @@ def _slices(state: RunState) -> list[Block]:
         blocks.append(say(f"{known} {TEACHING}"))
     for node in state.nodes:
         if node.how == "sliced":
-            rows = tuple((Name(name), why) for name, why in why_sliced(state, node).items())
             blocks.append(say(f"Environment {node.number}: {slice_words(state, node)}."))
-            blocks.append(Table(("model", "which"), rows[:MOST_ROWS]))
     if words := refuted_words(state):
         blocks.append(say(Strong("Slices were wrong."), f" {plain(words)}.", notice=True))
     return blocks
