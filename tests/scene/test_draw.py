@@ -11,7 +11,7 @@ import umsgpack
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runs.wanted import Wanted
-from ddenv.scene.camera import set_up
+from ddenv.scene.camera import view
 from ddenv.scene.draw import MOST_LETTERS, Scenery, path_on_ground, safe_name
 from ddenv.scene.mesh import box, outline, paint, sphere
 from ddenv.scene.player import Player
@@ -34,7 +34,6 @@ class Screen:
         self.things: dict[str, dict] = {}
         self.visible: dict[str, bool] = {}
         self.poses: dict[str, np.ndarray] = {}
-        self.properties: dict[str, object] = {}
         self.count = 0
 
     def take(self, message: bytes, _: bool = False) -> None:
@@ -51,8 +50,6 @@ class Screen:
                     del kept[key]
         elif command["property"] == "visible":
             self.visible[path] = command["value"]
-        else:
-            self.properties[command["property"]] = command["value"]
 
     def shown(self, folder: str) -> set[str]:
         return {path.rsplit("/", 1)[-1] for path, on in self.visible.items() if on and f"/{folder}/" in path}
@@ -255,11 +252,8 @@ def test_an_earlier_moment_and_a_row_of_it_are_shown_until_the_present_is_wanted
         assert words["title"].startswith(title)
 
 
-def test_the_camera_sees_the_robot_go_to_the_right(screen, stage):
-    set_up(stage, (0.0, 0.0, 0.0), (10.0, 0.0, 0.0))
-    assert screen.poses["/world"][:3, 3].tolist() == [-5, 0, 0]
-    # In the camera's frame y points upwards, and z towards the south.
-    _, up, south = screen.properties["position"]
-    assert up > 0 and south > 0
-    set_up(stage, (1.0, 1.0, 0.0), (1.0, 1.0, 0.0))
-    assert max(map(abs, screen.properties["position"])) > 1
+def test_the_camera_sees_the_robot_go_to_the_right():
+    seen = view((0.0, 0.0, 0.0), (10.0, 0.0, 0.0))
+    assert seen.center == (5, 0, 0)
+    assert seen.camera[1] < 0 < seen.camera[2]
+    assert view((1.0, 1.0, 0.0), (1.0, 1.0, 0.0)).radius > 0

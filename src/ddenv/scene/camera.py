@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 from ddenv.scene import colors
 from ddenv.scene.draw import WORLD
 from ddenv.scene.stage import DRAWN, Stage
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import Pose, Vector, vector
 
 FIELD_OF_VIEW = 38.0  # vertical, degrees
 ELEVATION = 32.0  # of the camera above the horizon, degrees
@@ -16,26 +17,25 @@ ASIDE = 20.0  # rotation of the camera from perpendicular to the path towards th
 _CAMERA = ("Cameras", "default", "rotated", DRAWN)
 
 
-def set_up(stage: Stage, start: Vector, goal: Vector) -> None:
-    """Sets camera, light and background for a robot that drives from `start` to `goal`, m."""
+@dataclass(frozen=True, slots=True)
+class View:
+    """The camera looks at `center`, m; `camera` and `sun` are relative to it, m; `radius` is the visible distance around it, m."""
+
+    center: Vector
+    camera: Vector
+    sun: Vector
+    radius: float
+
+
+def view(start: Vector, goal: Vector) -> View:
+    """The view of a robot that drives from `start` to `goal`."""
     dx, dy = goal[0] - start[0], goal[1] - start[1]
-    # The visible distance around the middle of the way, m.
     radius = max(2.5, 0.5 * math.hypot(dx, dy) + 1.8)
     along = math.atan2(dy, dx)
-    x, y, z = (0.5 * (a + b) for a, b in zip(start, goal, strict=True))
-    # The viewer's camera orbits the scene's origin, so the world is moved instead of the camera.
-    stage.move(WORLD, Pose((-x, -y, -z)))
-    east, north, up = _polar(2.2 * radius, along - math.radians(90 + ASIDE), ELEVATION)
-    # In the camera's frame y points upwards.
-    for name, value in (("fov", FIELD_OF_VIEW), ("near", 0.1), ("far", 600.0), ("position", [east, up, -north])):
-        stage.set(_CAMERA, name, value)
-    lights = ("PointLightNegativeX", "PointLightPositiveX", "FillLight", "SpotLight")
-    for path in (("Grid",), ("Axes",), *(("Lights", name) for name in lights)):
-        stage.show(path, False)
-    stage.set(("Lights", "AmbientLight", DRAWN), "intensity", 0.62)
-    stage.draw_json(("Lights", "Sun"), _sun(_polar(3.0 * radius, along - math.radians(165), 50.0), radius))
-    for name, color in zip(("top_color", "bottom_color"), colors.SKY, strict=True):
-        stage.set(("Background",), name, list(color))
+    center = vector(0.5 * (a + b) for a, b in zip(start, goal, strict=True))
+    camera = _polar(2.2 * radius, along - math.radians(90 + ASIDE), ELEVATION)
+    sun = _polar(3.0 * radius, along - math.radians(165), 50.0)
+    return View(center, camera, sun, radius)
 
 
 def _polar(distance: float, azimuth: float, elevation: float) -> Vector:
@@ -43,11 +43,28 @@ def _polar(distance: float, azimuth: float, elevation: float) -> Vector:
     return flat * math.cos(azimuth), flat * math.sin(azimuth), distance * math.sin(math.radians(elevation))
 
 
-def _sun(place: Vector, radius: float) -> dict[str, Any]:
-    reach = 1.7 * radius
-    sides = {"left": -reach, "right": reach, "top": reach, "bottom": -reach, "near": 0.1, "far": 8 * radius}
+def set_up(stage: Stage, view: View) -> None:
+    # The viewer's camera orbits the scene's origin, so the world is moved instead of the camera.
+    x, y, z = view.center
+    stage.move(WORLD, Pose((-x, -y, -z)))
+    east, north, up = view.camera
+    # In the camera's frame y points upwards.
+    for name, value in (("fov", FIELD_OF_VIEW), ("near", 0.1), ("far", 600.0), ("position", [east, up, -north])):
+        stage.set(_CAMERA, name, value)
+    lights = ("PointLightNegativeX", "PointLightPositiveX", "FillLight", "SpotLight")
+    for path in (("Grid",), ("Axes",), *(("Lights", name) for name in lights)):
+        stage.show(path, False)
+    stage.set(("Lights", "AmbientLight", DRAWN), "intensity", 0.62)
+    stage.draw_json(("Lights", "Sun"), _sun(view))
+    for name, color in zip(("top_color", "bottom_color"), colors.SKY, strict=True):
+        stage.set(("Background",), name, list(color))
+
+
+def _sun(view: View) -> dict[str, Any]:
+    reach = 1.7 * view.radius
+    sides = {"left": -reach, "right": reach, "top": reach, "bottom": -reach, "near": 0.1, "far": 8 * view.radius}
     camera = {"type": "OrthographicCamera", **sides}
     shadow = {"bias": -0.0004, "normalBias": 0.01, "radius": 2, "mapSize": [2048, 2048], "camera": camera}
-    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *place, 1]
+    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *view.sun, 1]
     light = {"type": "DirectionalLight", "color": 0xFFFAF2, "intensity": 0.62, "matrix": matrix}
     return {**light, "castShadow": True, "shadow": shadow}

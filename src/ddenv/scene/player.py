@@ -22,7 +22,7 @@ from ddenv.runs.reasons import Parting, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
-from ddenv.scene.camera import set_up
+from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
 from ddenv.scene.shot import Shot, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
@@ -67,7 +67,7 @@ class Player:
             (place.x, place.y, self._scenery.height(place.x, place.y))
             for place in (scenario.robot.spawn, scenario.goal)
         )
-        set_up(stage, start, end)
+        set_up(stage, view(start, end))
         mark(stage, "start", start, 0.6, colors.START)
         mark(stage, "goal", end, scenario.goal.tolerance, colors.GOAL, FLAG)
         mark(stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL, PIN)
