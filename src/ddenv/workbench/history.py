@@ -176,4 +176,4 @@ def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]
 
 
 def _named(names: Sequence[str]) -> str:
-    return f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}"
+    return f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}" if names else "none"
