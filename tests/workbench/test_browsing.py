@@ -8,7 +8,8 @@ import pytest
 from attached import Attached
 from textual.widgets import OptionList
 
-from ddenv.runs.wanted import Wanted, read
+from ddenv.runfile.reading import Invalid, read
+from ddenv.runfile.tested import Wanted
 from ddenv.words.signs import CLAIM, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.signs import SignsDialog, signs
@@ -158,7 +159,7 @@ async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch,
     )
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
-        last = lambda: read(told.read_text().splitlines()[-1]) if told.exists() else None  # noqa: E731
+        last = lambda: read(Wanted, told.read_text().splitlines()[-1]) if told.exists() else None  # noqa: E731
         await session.press("m")
         await session.app.workers.wait_for_complete()
         await session.press("escape", "down", "down")
@@ -171,4 +172,5 @@ async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch,
 
 def test_lines_that_are_no_wish_are_no_wish():
     for line in ("", "nonsense", "[1]", '{"at": "x"}', '{"at": true}', '{"other": 1}'):
-        assert read(line) is None
+        with pytest.raises(Invalid):
+            read(Wanted, line)

@@ -30,7 +30,6 @@ def test_the_way_to_where_the_run_is_goes_straight_down():
     assert tree(0, 1, 1, here=1) == ["0", "1", "├─2", "3"]
     # Long histories are drawn at once.
     assert tree(*range(1500), here=1500)[-1] == "1500"
-    assert branches.path([], 0) == []
 
 
 def test_what_a_node_is_has_a_sign_words_and_tests_of_its_own(run):

@@ -12,9 +12,10 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
 from ddenv.guiding.commands import question, refusal
-from ddenv.guiding.course import GoBack, place
+from ddenv.guiding.course import GoBack
 from ddenv.guiding.situation import Situation
 from ddenv.runfile import branches
+from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.progress import Node
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen

@@ -160,7 +160,8 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
 
 
 def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
-    for part in location:
+    # Keys of a mapping to sections are no fields.
+    for part in (each for each in location if each in model.model_fields):
         hint = model.model_fields[part].annotation
         # A section that may be missing is a union with None.
         model = next(each for each in (hint, *get_args(hint)) if isinstance(each, type) and issubclass(each, BaseModel))

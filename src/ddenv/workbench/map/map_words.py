@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.evidence.took_part import in_last
+from ddenv.evidence.slices import in_last
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import Names, drops
 from ddenv.text import count, shortened

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ddenv.evidence.took_part import in_last
+from ddenv.evidence.slices import in_last
 from ddenv.map.cells import Signs
 from ddenv.map.colors import HUES
 from ddenv.map.paint import Canvas

@@ -8,7 +8,7 @@ from textual.widget import Widget
 
 from ddenv import __version__
 from ddenv.evidence.claims import has_dropped
-from ddenv.runfile.branches import path
+from ddenv.runfile.progress import path
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
@@ -124,11 +124,11 @@ def branch_of(state: RunState) -> int | None:
     None on the newest one: that is where a run usually is.
     """
     nodes = state.nodes
-    if not 0 <= state.node < len(nodes) or state.node in path(nodes, len(nodes) - 1):
+    if not 0 <= state.node < len(nodes) or state.here in path(nodes, len(nodes) - 1):
         return None
     above = {node.parent for node in nodes if not node.rejected}
     leaves = [node.number for node in nodes if node.number not in above and not node.rejected]
-    return next((place for place, leaf in enumerate(leaves, start=1) if state.node in path(nodes, leaf)), None)
+    return next((place for place, leaf in enumerate(leaves, start=1) if state.here in path(nodes, leaf)), None)
 
 
 def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:

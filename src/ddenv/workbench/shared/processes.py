@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 from contextlib import suppress
@@ -9,7 +10,8 @@ from pathlib import Path
 from threading import Thread
 
 from ddenv.errors import UserError
-from ddenv.runs.wanted import Wanted, written
+from ddenv.runfile import reading
+from ddenv.runfile.tested import Wanted
 from ddenv.text import plain
 
 # Maximum time that the screen waits for a program to end, s.
@@ -93,7 +95,7 @@ class Scene:
         # A scene that hangs must not stop the screen, and one that has ended needs nothing.
         with suppress(OSError):
             os.set_blocking(self._process.stdin.fileno(), False)
-            os.write(self._process.stdin.fileno(), written(self._wanted).encode())
+            os.write(self._process.stdin.fileno(), f"{json.dumps(reading.plain(self._wanted))}\n".encode())
 
     def wait(self) -> None:
         """Blocks until the program has printed its URL or has ended: not for the screen's thread."""

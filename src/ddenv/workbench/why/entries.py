@@ -33,7 +33,7 @@ class Entry:
     """Something that is left out of the environment of `snapshot`: the models `gone`, which have the sign `letter` on the map.
 
     `sentence` says what happens then, `more` the rates; `parting` compares two runs with one seed, whose ways are called `ways`;
-    `rows` has these runs side by side: time, s, both places and how far apart they are. `claim` is that of a certificate.
+    `claim` is that of a certificate.
     """
 
     name: str
@@ -45,7 +45,6 @@ class Entry:
     ways: tuple[str, str]
     snapshot: Snapshot
     claim: Claim | None = None
-    rows: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -83,16 +82,8 @@ def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) 
 
 def _of_nearest(state: RunState, one: Nearest) -> Entry:
     """The whole world fails, and without `gone` it passes."""
-    rows = tuple(
-        f"{each.seconds:6.1f} s   {_place(each.failing)}   {_place(each.passing)}   {each.apart:.2f} m"
-        for each in one.instants
-    )
     snapshot = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
-    return Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ("fails", "passes"), snapshot, rows=rows)
-
-
-def _place(point: tuple[float, float]) -> str:
-    return f"{point[0]:6.2f} {point[1]:6.2f}"
+    return Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ("fails", "passes"), snapshot)
 
 
 def head(width: int) -> Text:
@@ -120,9 +111,6 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
         text.append(f"\n\n{plain(words)}", "not bold")
     for words in lacks:
         text.append(f"\n\n▲ {plain(words)}", "bold")
-    if one.rows:
-        text.append(f"\n\n{'time':>8}   {'fails: x, y':>13}   {'passes: x, y':>13}   apart", "dim not bold")
-        text.append("".join(f"\n{line}" for line in one.rows), "not bold")
     return text
 
 
