@@ -15,8 +15,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.words.explain import explain
 from ddenv.words.news import news
 from ddenv.words.slices import slice_in_short
-from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
-from ddenv.workbench.run.models import FREE, Course, steps
+from ddenv.workbench.run.candidate_rows import listed, words
 from tests.command import in_process
 from tests.engine.fake import drive
 from tests.engine.participation import MODELS, Participation, sliced_run
@@ -82,16 +81,6 @@ def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):
     rows = [words(shown, listing, row) for row in range(len(listing))]
     by = rf"tests? (\d+, )*{event.by}\b"
     assert any(re.match(f"○ dissimilar, implied by {by}", row["verdict"]) for row in rows)
-    assert any(re.match(f"○ by {by}", row.get(IN_SHORT, "")) for row in rows)
-
-
-def test_the_chart_marks_what_went_without_a_test(moments):
-    state = moments[-1][2]
-    free = tuple(node.tests for node in state.nodes if node.how == "sliced")
-    assert free
-    text = steps(Course(state.history, state.tests_done, 0, (), free), 60, 12).plain
-    assert FREE in text.split("\n")[-2]
-    assert f"{FREE} without a test" in text
 
 
 def test_a_program_gets_the_number_of_simulated_tests(run, moments):

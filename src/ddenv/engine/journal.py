@@ -14,7 +14,7 @@ from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import BROKEN, CERTIFY, FIRST_FRESH_RUN, FRESH_RUNS, ISOLATE, Round, RunState, Test
-from ddenv.runfile.store import Motions, RunFile, uncollected
+from ddenv.runfile.store import Motions, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.settings import SETTINGS, read
 
@@ -31,9 +31,8 @@ class Journal:
         self.file = file
         self.state = RunState()
         self.command: int | None = None
-        with uncollected():
-            for recorded in file.events():
-                self.state = apply(self.state, recorded)
+        for recorded in file.events():
+            self.state = apply(self.state, recorded)
         self._number_of = {name: number for number, name in enumerate(self.state.elements)}
         self._numbers: dict[Environment, int] = {}
         self._tests: dict[tuple[int, int, bool], int] = {}

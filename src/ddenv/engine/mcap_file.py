@@ -5,7 +5,7 @@ message lacks is written as zeros, empty texts and empty lists.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -131,11 +131,10 @@ class Streams:
         self.heard.append((reading, command))
 
 
-def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) -> list[str]:
+def write_mcap(run: Path, target: Path) -> list[str]:
     """Makes the runs of `_chosen` again, and writes their streams to `target`; returns a line about each.
 
-    `progress(name, seconds)` gets the simulated time, s. Raises UserError, also for runs that give other bits here; then nothing
-    is written.
+    Raises UserError, also for runs that give other bits here; then nothing is written.
     """
     if target.exists():
         raise UserError(f"{target}: exists already; choose another name")
@@ -155,9 +154,7 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     writer.write_message(RESULT, schemas[WORDS], {"data": shown(state)}, nanoseconds(0.0))
     for one in chosen:
         streams = Streams()
-        result = template.run(
-            one.models, one.seed, lambda seconds, *_, name=one.name: progress(name, seconds), one.full, streams
-        )
+        result = template.run(one.models, one.seed, None, one.full, streams)
         if not np.array_equal(result.trajectory, stored[one.test]):
             raise UserError(f"{run}: test {one.test} gives other bits here: another Drake or another processor made it")
         for topic, kind, seconds, message in messages(one, result, streams, subject):

@@ -97,9 +97,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
         return low - done, likely - done, high - done
     forecast, baseline = state.forecast, state.baseline
-    if forecast is None or baseline is None:
-        return None
-    if _is_overdue(state):
+    if forecast is None or baseline is None or _is_overdue(state):
         return None
     done = state.tests_done - forecast.tests_done
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
