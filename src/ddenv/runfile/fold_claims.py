@@ -103,7 +103,7 @@ def isolation_checked(state: RunState, event: e.IsolationChecked, _: float) -> C
     return {"removals": removals, "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
 
 
-def isolation_finished(state: RunState, event: e.IsolationFinished) -> Changes:
+def isolation_found(state: RunState, event: e.IsolationFinished) -> Changes:
     last = _open(state)
     removal = None if event.environment is None else with_removal(state, event.environment)[1]
     if removal is not None and (not last.checks or last.checks[-1].removal != removal):

@@ -8,10 +8,9 @@ from typing import Any
 
 from ddenv.runfile.events import Created
 from ddenv.runfile.store import RunFile, create
-from ddenv.runs.clusters import check_cluster
 from ddenv.runs.folder import run_path
 from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts, scenario_named
-from ddenv.runs.trust import check_named, trust_cluster
+from ddenv.runs.trust import check_cluster, check_named, trust_cluster
 from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario

@@ -11,7 +11,7 @@ from typing import Any
 from distributed import Client, Security, SSHCluster
 
 from ddenv.errors import UserError
-from ddenv.runs.clusters import hosts_of
+from ddenv.runs.trust import hosts_of
 from ddenv.world.access import is_file
 
 # The time between two looks at who is there, and between two attempts to connect, s.
