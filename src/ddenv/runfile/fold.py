@@ -18,9 +18,9 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Node, PastRound, Point, narrowed
+from ddenv.runfile.progress import Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
-from ddenv.runfile.store import Recorded, RunFile
+from ddenv.runfile.store import Recorded
 from ddenv.text import count
 
 # Verdicts that tests led to, not the user.
@@ -54,19 +54,6 @@ def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator
     for recorded in events:
         before, after = after, apply(after, recorded)
         yield recorded, before, after
-
-
-class Follower:
-    """Follows a run file as it grows. `state` is the one after the last event that was read and is valid."""
-
-    def __init__(self, file: RunFile, state: RunState | None = None) -> None:
-        self._file, self.state = file, state or RunState()
-
-    def new(self, most: int = -1) -> Iterator[tuple[Recorded, RunState, RunState]]:
-        """The events since then as `steps`, at most `most` unless that is negative. Raises UserError."""
-        for recorded, before, after in steps(self._file.read(self.state.revision, most), self.state):
-            self.state = after
-            yield recorded, before, after
 
 
 def recorded_scenario(scenario: dict[str, Any]) -> dict[str, Any]:
@@ -269,14 +256,10 @@ def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, 
         raise ValueError("candidates")
 
 
-def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
-    """A search is foretold anew in each round: each forecast narrows the one before."""
+def forecast(_: RunState, event: e.Forecast, __: float) -> Changes:
     if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
-    if state.forecast is None:
-        return {"forecast": event}
-    low, likely, high = (each - event.tests_done + state.forecast.tests_done for each in state.forecast.tests)
-    return {"forecast": replace(event, tests=narrowed((low, likely, high), event.tests))}
+    return {"forecast": event}
 
 
 def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:

@@ -279,22 +279,8 @@ class Physics:
 
     def compared(self, same: bool) -> Physics:
         """After a test was made again, with the same bits or not."""
-        mixed = self.mixed if same else (*self.mixed, f"first {self.before}, then {self.after}")
+        mixed = self.mixed if same else (*self.mixed, f"first {self.proven}, then {self.now}")
         return replace(self, proven=self.now, mixed=mixed)
-
-    @property
-    def before(self) -> str:
-        """What of `proven` is different now."""
-        return _lacking(self.proven, self.now)
-
-    @property
-    def after(self) -> str:
-        """What is different from `proven`."""
-        return _lacking(self.now, self.proven)
-
-
-def _lacking(these: str, those: str) -> str:
-    return ", ".join(each for each in these.split(", ") if each not in those.split(", ")) or "something unknown"
 
 
 def narrowed(before: tuple[int, int, int], now: tuple[int, int, int]) -> tuple[int, int, int]:
