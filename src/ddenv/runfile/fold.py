@@ -401,5 +401,5 @@ def _as_it_was(state: RunState, at: float) -> Changes:
     """After an isolation, or a search for margins, the reduction is as it was before."""
     if state.isolating is None:
         margins = fold_claims.open_margins(state)
-        return _ended(state, margins.status, margins.before, at)
+        return _ended(state, margins.asked.status, margins.asked.before, at)
     return _ended(state, "finished", state.isolating.asked.before, at)
