@@ -34,8 +34,7 @@ CHANGED = "a decision of the user, or a slice that was wrong, ended the isolatio
 def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, before: str) -> None:
     """Finds the nearest world that passes, or goes on with that; the run is finished then as it was, because of `before`.
 
-    The end has `at_least` fresh runs, `FEWEST_RUNS` by default; another number than the open search has begins a new one, which
-    finds its tests again. Raises as `Bench.work`.
+    The end has `at_least` fresh runs; another number than the open search has begins a new one. Raises as `Bench.work`.
     """
     now = journal.state.isolating
     if now is None or at_least not in (None, now.asked.at_least):
@@ -85,10 +84,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
 
 
 def _suspects(world: World, journal: Journal, reduction: Reduction) -> tuple[tuple[int, ...], int]:
-    """One model of each stack that may go, the likeliest first; and how many of them the reduction has left.
-
-    These come first, and then the nearest to where f ended.
-    """
+    """One model of each stack that may go: first those that the reduction has left (returns how many), then the nearest to f."""
     state, f = journal.state, known_failure(journal.state).failure_test
     sight = Sight(world, state.elements, reduction.delta, reduction.seed)
     distance = distances_to_failure(state.elements, sight.evidence(journal, f)).tolist()
@@ -173,15 +169,10 @@ class _Isolator:
     def _check(self, check: Checked) -> None:
         journal, now = self._journal, _open(self._journal)
         first = now.asked.run + len(now.checks) * now.asked.block
-        rests_on = {
-            test
-            for claim in check.claims
-            for environment, run in claim.claim.rests_on
-            for test in journal.tests(environment, (first + run,), full=True)
-        }
+        rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)
         claims = tuple(self._made(claim, first) for claim in check.claims)
         environment = journal.number(self._whole - check.removed)
-        journal.record(events.IsolationChecked(environment, claims, tuple(sorted(rests_on))))
+        journal.record(events.IsolationChecked(environment, claims, rests_on))
 
     def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
         shown = [self.shown(named.environment, run) for run in named.exact or [first + run for run in named.runs]]

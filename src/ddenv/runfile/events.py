@@ -319,7 +319,7 @@ class RoundStarted(Event):
 
 
 class Forecast(Event):
-    """How many tests of candidates the engine expected to be left, low, likely and high, when `tests_done` were finished.
+    """How many more tests of candidates a search of so many models takes, low, likely and high, when `tests_done` were finished.
 
     In one case of ten fewer than the low number are left, in one of ten more than the high one.
     """

@@ -99,7 +99,6 @@ class Player:
             for name, rows in one.moving.items()
             if (key := scenery.keys.get(name)) is not None
         }
-        sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
         return {
             "test": test,
             "title": shot.title,
@@ -108,9 +107,8 @@ class Player:
             "wheels": scenery.wheels.data(),
             "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
             "moving": moving,
-            "there": {
-                kind: [key for name in sorted(names) if (key := scenery.keys.get(name))] for kind, names in sets.items()
-            },
+            "there": [key for name in sorted(shot.models) if (key := scenery.keys.get(name))],
+            "gone": [key for name in sorted(shot.left_out | shot.removed) if (key := scenery.keys.get(name))],
             "lacks": " ".join(one.lacks),
         }
 

@@ -140,7 +140,6 @@ def _stayed(pinned: int) -> str:
 
 
 def environment_named(node: int) -> str:
-    """An environment by its number in the history."""
     return "the whole world" if node == 0 else f"the environment of step {node}"
 
 
@@ -309,7 +308,6 @@ def instead(state: RunState, certificate: Certificate, claim: Claim) -> str:
 
 
 def short(claim: Claim) -> str:
-    """The verdict of a claim in a word or two."""
     return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
 
 

@@ -49,7 +49,6 @@ class Engine:
 
     @property
     def trouble(self) -> str:
-        """The error that ended it, or ""."""
         code = None if self._process is None else self._process.poll()
         if code in (None, *GOOD_ENDS):
             return ""
@@ -86,7 +85,6 @@ class Scene:
             self.trouble = f"the scene cannot be started: {error.strerror}"
 
     def show(self, wanted: Wanted) -> None:
-        """What it shows from now on, once it is on."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._ask()
@@ -112,7 +110,6 @@ class Scene:
             self.trouble = f"the scene did not start: {last_line(log) or f'see {log}'}"
 
     def stop(self) -> None:
-        """Ends the program; nothing else depends on it."""
         process, self._process, self.url = self._process, None, ""
         if process is None:
             return
@@ -135,7 +132,6 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def last_line(log: Path) -> str:
-    """The last line of a log that is not empty."""
     try:
         lines = log.read_text(errors="replace").splitlines()
     except OSError:

@@ -47,7 +47,6 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """All sentences, to be copied."""
         return " ".join(part for part in (self.sentence, *self.more) if part)
 
 
@@ -55,25 +54,11 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
     found = reasons(file, state) if current(state) is not None else ()
     listed = found[:LISTED]
-    letters, listed = _lettered(state, listed)
-    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed), letters)
-    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in zip(letters, listed, strict=True))
-    return (*models, *_nearest(file, state)), len(found) - len(listed)
-
-
-def _lettered(state: RunState, listed: Sequence[Reason]) -> tuple[tuple[int, ...], tuple[Reason, ...]]:
-    """The models in the order of their letters: those of the map of the run, if each is a part of its last round."""
-    of_run = {} if state.round is None else state.round.split.letter_of
-    letters = tuple(of_run.get(each.without, -1) for each in listed)
-    if len({*letters, -1}) <= len(letters):
-        return tuple(range(len(listed))), tuple(listed)
-    order = sorted(range(len(listed)), key=letters.__getitem__)
-    return tuple(letters[place] for place in order), tuple(listed[place] for place in order)
-
-
-def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
+    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
+    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
     passing = nearest(file, state)
-    return () if passing is None else (_of_nearest(state, passing),)
+    last = () if passing is None else (_of_nearest(state, passing),)
+    return (*models, *last), len(found) - len(listed)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
@@ -101,7 +86,6 @@ def _of_nearest(state: RunState, one: Nearest) -> Entry:
 
 
 def head(width: int) -> Text:
-    """What the columns of `row` are."""
     return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
 
 
@@ -130,10 +114,7 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
 
 
 def head_of(state: RunState, works: bool) -> str:
-    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left.
-
-    The first comes first: a narrow screen has no room for both.
-    """
+    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left."""
     certificate = current(state)
     title = "Why it fails" if state.isolating is None else isolating(state) + ("" if works else " (stopped)")
     return title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"
