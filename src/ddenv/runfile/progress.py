@@ -287,9 +287,3 @@ class Physics:
         """After a test was made again, with the same bits or not."""
         mixed = self.mixed if same else (*self.mixed, f"first {self.proven}, then {self.now}")
         return replace(self, proven=self.now, mixed=mixed)
-
-
-def narrowed(before: tuple[int, int, int], now: tuple[int, int, int]) -> tuple[int, int, int]:
-    """What two estimates, as (low, likely, high), have in common; `now` where they contradict each other."""
-    low, high = max(before[0], now[0]), min(before[2], now[2])
-    return (low, min(max(low, now[1]), high), high) if low <= high else now

@@ -302,11 +302,6 @@ class Round:
     def partitions(self) -> tuple[tuple[str, ...], ...]:
         return self.split.partitions
 
-    @property
-    def untried(self) -> tuple[Candidate, ...]:
-        """The candidates that have no verdict, while the round goes on."""
-        return () if self.done or self.winner is not None else tuple(one for one in self.candidates if not one.verdict)
-
 
 @dataclass(frozen=True, slots=True)
 class Split:
