@@ -225,21 +225,6 @@ def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
     assert left(run) is None
 
 
-def test_each_forecast_narrows_the_one_before_unless_they_contradict_each_other(run):
-    fake_moments.mid_round(run)
-    run.go_back(0)
-    run.write("leg_started", round=3, n_partitions=None, rate=0.0)
-    for done, tests, narrower in (
-        (10, (40, 60, 90), (40, 60, 90)),
-        (15, (20, 60, 100), (35, 60, 85)),
-        (20, (40, 50, 60), (40, 50, 60)),
-        # More are left than were foretold.
-        (30, (70, 80, 99), (70, 80, 99)),
-    ):
-        run.write("forecast", round=3, tests=list(tests), tests_done=done)
-        assert state_of(run).forecast.tests == narrower
-
-
 def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(run):
     fake_moments.mid_round(run)
     run.write("forecast", round=2, tests=[0, 1, 2], tests_done=1)
