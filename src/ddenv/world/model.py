@@ -153,7 +153,8 @@ class Model:
     """A model of the world, including the links and joints of its nested models (named `inner::link`).
 
     `name` is unique: the second model of one name is called `name #2`. `spans` are the byte ranges (start, end) of the file
-    that belong to it: its own element first, then its entry in `<state>`. `line` is its first line.
+    that belong to it: its own element first, then its entry in `<state>`. `line` is its first line. `inside` is the model of the
+    file that it is a part of (`ddenv.world.sdf.inside`); "" for a whole model.
     """
 
     name: str
@@ -165,6 +166,7 @@ class Model:
     line: int
     gravity: bool = True
     self_collide: bool = False
+    inside: str = ""
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -203,12 +205,21 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True)
+class Shared:
+    """A byte range (start, end) of a world's text that goes when all of `models` are gone."""
+
+    span: tuple[int, int]
+    models: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
 class World:
     """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 
     `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
     everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
-    `ties` has (model, other) where a model is welded to another and so cannot stay without it.
+    `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
+    that go when several models are gone.
     """
 
     path: Path
@@ -221,6 +232,7 @@ class World:
     anchors: frozenset[str] = frozenset()
     resources: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     ties: tuple[tuple[str, str], ...] = ()
+    shared: tuple[Shared, ...] = ()
 
     def model(self, name: str) -> Model:
         for model in self.models:
@@ -229,8 +241,9 @@ class World:
         raise KeyError(name)
 
     def elements(self, protected: frozenset[str] = frozenset()) -> tuple[str, ...]:
-        """Names of the models that a reduction may remove, in the file's order."""
-        stay, new = protected | self.anchors, protected | self.anchors
+        """Names of the models that a reduction may remove, in the file's order; a `protected` one stays with all its parts."""
+        parts = {model.name for model in self.models if model.inside in protected}
+        stay = new = protected | self.anchors | parts
         while new:
             new = frozenset(other for model, other in self.ties if model in new) - stay
             stay |= new

@@ -50,6 +50,7 @@ def without(world: World, removed: frozenset[str]) -> bytes:
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
     spans = [span for model in world.models if model.name in removed for span in model.spans]
+    spans += [one.span for one in world.shared if one.models <= removed]
     kept, at = [], 0
     for start, end in sorted(spans, key=lambda each: (each[0], -each[1])):
         # One may lie in another, and two models may share one.

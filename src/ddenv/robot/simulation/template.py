@@ -58,7 +58,8 @@ class Template:
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(model.name for model in world.models)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
-        self._always = names & frozenset(scenario.protected) | grounds
+        fixed = set(scenario.protected)
+        self._always = grounds | {model.name for model in world.models if fixed & {model.name, model.inside}}
         self._clock = Clock.of(scenario)
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None

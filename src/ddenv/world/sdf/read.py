@@ -19,6 +19,7 @@ from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.inside import opened
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
 from ddenv.world.sdf.xml import complain, name_of, numbers
@@ -97,7 +98,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     gravity = next(
         (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None
     )
-    return World(
+    whole = World(
         path=path,
         name=world.get("name") or "",
         text=text,
@@ -108,6 +109,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         anchors=frozenset(model.name for model in models if model.name in anchors),
         resources=context.resources.taken,
     )
+    return opened(whole, root) if context.reading.inside else whole
 
 
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
