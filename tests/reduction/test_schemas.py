@@ -21,6 +21,7 @@ from ddenv.reduction.prioritizations import (
 from ddenv.reduction.round import make_round
 from ddenv.schemas import names
 from tests.reduction.worlds import evidence
+from tests.tiers import slow
 
 STILL = np.array([[0.0, 0, 0, 0, 0]])
 
@@ -109,7 +110,7 @@ def test_trajectoryseg_groups_models_by_manoeuvre():
 
 
 @pytest.mark.parametrize("partitioning", names("partitioning"))
-@pytest.mark.parametrize("n", [2, 60, 700, 4999])
+@pytest.mark.parametrize("n", slow(pytest.mark.rates, [2, 60, 700, 4999], but=[60]))
 def test_five_thousand_models_are_split_in_the_end(partitioning, n):
     """Not a timing, but a second more than planning takes in earnest would show here."""
     facts = evidence(5000, 1)

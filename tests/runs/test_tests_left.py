@@ -13,6 +13,7 @@ from ddenv.runs.tests_left import left_said, remaining, rough_run, rough_tests
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
+from tests.tiers import slow
 from tests.workbench import fake_moments
 
 # Mean tests of random worlds (docs/benchmarks.md): models, with a failure that always shows, and with one in 80 % of the runs.
@@ -71,8 +72,8 @@ def runs_of(rate, of_end, certify_rate, left, at_least, random):
 
 
 @pytest.mark.parametrize("certify_rate", [0.8, 2 / 3])
-@pytest.mark.parametrize("rate", [1.0, 0.95, 0.8, 0.5])
-@pytest.mark.parametrize("left", [1, 3])
+@pytest.mark.parametrize("rate", [1.0, 0.8])
+@pytest.mark.parametrize("left", slow(pytest.mark.rates, [1, 3], but=[3]))
 def test_the_tests_of_a_certificate_are_those_that_the_engine_makes(rate, certify_rate, left):
     random = Random(1)
     made = [certified(rate, certify_rate, left, 10, random) for _ in range(40)]
@@ -193,14 +194,14 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
         run.write("test_started", test=test, **place, run=number, seed=number)
         run.finish(test, "similar", 0.1)
 
-    for made in range(1, 60):
+    for made in range(1, 40):
         make(10_000 + made)
         expected = narrowed((low, likely, high), certificate_tests(0.99, 0.8, 6, 4, 4, Made(made, (made, made))))
         assert left(run, at_work=False).tests == tuple(each - made for each in expected)
         assert expected[2] <= high
     # All of them showed f.
     assert expected[2] < high
-    for made in range(60, 150):
+    for made in range(40, 90):
         make(10_000 + made)
     # After more than were expected, some are left all the same, and the two tests that run are.
     assert left(run).tests[0] == 2

@@ -44,6 +44,7 @@ def test_the_scripts_that_were_used_last_are_held_in_a_bounded_memory(world_of, 
         assert not any(repertoire.find(names, everything) for names in [*map(tuple, "abcd"), heap])
 
 
+@pytest.mark.rates
 @pytest.mark.parametrize("memory", slow(pytest.mark.examples, [0.0, 3e5], but=[3e5]))
 def test_a_small_memory_changes_no_bit(world_of, add, husky, scenario_of, monkeypatch, memory):
     world = add(
