@@ -60,6 +60,7 @@ async def test_enter_writes_all_and_says_where(run, folder):
         assert not isinstance(pilot.app.screen, ExportScreen)
 
 
+@pytest.mark.screens
 async def test_arrows_go_from_tick_to_tick_and_space_replaces_no_name(run, folder):
     async with dialog(run) as pilot:
         await pilot.press("down", "down", "down", "space", "up", "space", "enter")
@@ -147,6 +148,7 @@ async def test_a_bundle_and_a_test_are_written_where_they_are_ticked(run, folder
         assert "crates-1.zip: exists already" in told(pilot)
 
 
+@pytest.mark.screens
 async def test_why_messages_cannot_be_written_is_told(run, folder):
     async with dialog(run) as pilot:
         for kind in ("world", "report", "mcap"):

@@ -79,6 +79,7 @@ def test_a_part_of_the_screen_changes_only_that():
     assert shown(change).keys() == {(0, 5)}
 
 
+@pytest.mark.terminal
 async def test_all_is_sent_again_to_a_terminal_that_was_left_or_resized(monkeypatch):
     app = Workbench()
     async with app.run_test(size=(80, 24)) as pilot:
