@@ -16,7 +16,6 @@ from mcap_ros2.decoder import DecoderFactory
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
-from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
 from ddenv.schemas import names
 from ddenv.words.claims import shown
@@ -305,12 +304,11 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, w
     assert list(home.rglob("*")) == []
 
 
-def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
+@pytest.mark.usefixtures("started")
+def test_options_on_the_reduction_reach_the_run(home):
     from ddenv.cli.command_line import app
     from ddenv.runs.subject import read_parts, with_options
 
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_: None)
-    monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, RunState()))
     options = {
         "pair": "trajectoryseg/timestep",
         "algorithm": "probdd",

@@ -61,15 +61,6 @@ def test_of_two_times_at_one_place_the_first_counts():
     assert nearest_on_path(np.array([[1.0, 1, 0]]), np.arange(3.0), path)[1] == pytest.approx([0.2])
 
 
-def test_many_models_are_measured_as_few():
-    rng = np.random.default_rng(1)
-    places, path, times = rng.normal(size=(700, 3)), rng.normal(size=(30, 3)), np.arange(30.0)
-    whole = nearest_on_path(places, times, path)
-    alone = [nearest_on_path(places[index : index + 1], times, path) for index in range(len(places))]
-    assert whole[0] == pytest.approx(np.concatenate([distance for distance, _ in alone]))
-    assert whole[1] == pytest.approx(np.concatenate([moment for _, moment in alone]))
-
-
 @pytest.mark.parametrize("split", [timeseg, trajectoryseg])
 def test_a_robot_that_never_moved_still_splits(split):
     positions = {"a": (0.0, 0, 0), "b": (1.0, 0, 0)}

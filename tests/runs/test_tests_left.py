@@ -249,12 +249,6 @@ def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(ru
     assert left(run) is None
 
 
-def test_a_run_file_without_forecasts_is_read(run):
-    fake_moments.mid_round(run)
-    events = [event for event in run.file.events() if event.kind != "forecast"]
-    assert remaining(fold(events), True) is None
-
-
 @pytest.mark.parametrize("value", [13, "x", None, float("inf"), float("nan"), -3, 10**30, True])
 def test_a_budget_ends_it_and_one_that_makes_no_sense_does_no_harm(run, value):
     state = state_of(fake_moments.mid_round(run))

@@ -133,14 +133,11 @@ async def updates(run, monkeypatch):
     return [update for update in found if update is not None]
 
 
-async def test_textual_asks_the_app_to_display_updates_of_both_kinds(updates):
+async def test_updates_of_both_kinds_say_where_their_strips_are_and_the_terminal_shows_what_textual_would(updates):
     assert callable(getattr(App, "_display", None)), "App._display is gone: nothing goes through written.py any more"
     assert {type(update) for update in updates} == {LayoutUpdate, ChopsUpdate}
-    assert all(isinstance(update, CompositorUpdate) for update in updates)
-
-
-async def test_updates_say_where_their_strips_are(updates):
     for update in updates:
+        assert isinstance(update, CompositorUpdate)
         if type(update) is LayoutUpdate:
             assert isinstance(update.region, Region)
             # More than once: what cannot be read is drawn by Textual after that.
@@ -152,9 +149,6 @@ async def test_updates_say_where_their_strips_are(updates):
             assert 0 <= left <= right
             assert len(update.chops[y]) == len(update.chop_ends[y])
             assert all(strip is None or isinstance(strip, Strip) for strip in update.chops[y].values())
-
-
-async def test_the_terminal_shows_what_textual_itself_would_show(updates):
     written = Written()
     ours, theirs = {}, {}
     for number, update in enumerate(updates):
