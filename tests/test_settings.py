@@ -37,7 +37,11 @@ def test_it_is_in_the_scenario_and_its_schema(one):
     found = definitions[section]["properties"][one.name]
     assert found["default"] == one.default
     assert found["description"] == one.summary
-    assert read(scenario().model_dump(mode="json"), one) == one.default or one.name in ("timeout", "epsilon")
+    assert read(scenario().model_dump(mode="json"), one) == one.default or one.name in (
+        "timeout",
+        "epsilon",
+        "time_step",
+    )
 
 
 @EVERY
