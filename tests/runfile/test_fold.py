@@ -196,7 +196,7 @@ def test_the_tests_of_the_last_certificate_are_found_whenever_they_were_made(ste
 
 
 def test_an_outcome_that_nobody_knows_is_told():
-    with pytest.raises(UserError, match=r"outcome: expected one of similar, .*, found 'splendid'"):
+    with pytest.raises(UserError, match=r"outcome: should be 'similar', .*, found 'splendid'"):
         read_back((started()[0], started()[1] | {"environment": 0}), finished(outcome="splendid"))
 
 

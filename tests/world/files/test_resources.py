@@ -59,7 +59,7 @@ def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
     def forbidden(*arguments, **options):
         raise AssertionError("reads a file")
 
-    for name in ("find", "read", "read_parts", "build", "size_of", "is_folder", "model_file"):
+    for name in ("find", "read", "read_parts", "build", "is_folder", "model_file"):
         monkeypatch.setattr(resources, name, forbidden)
     monkeypatch.setattr("os.stat", forbidden)
     monkeypatch.setattr("builtins.open", forbidden)
@@ -71,14 +71,38 @@ def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
             ask()
 
 
-def test_tells_before_something_slow(world):
-    told = []
-    (world / "big.obj").write_text(CUBE + "\n#" + "x" * 3_500_000)
-    disk = on_disk(world, announce=told.append)
+def test_the_same_request_gives_the_same_object_without_another_look(world, monkeypatch):
+    disk = on_disk(world)
     disk.mesh("cube.obj", world, convex=True)
-    disk.mesh("big.obj", world, convex=True)
-    disk.mesh("big.obj", world, convex=False)
-    assert told == ["reading mesh big.obj (4 MB)"]
+    for source in (disk, Resources(disk.taken)):
+        first = source.mesh("cube.obj", world, convex=True)
+        with monkeypatch.context() as patch:
+            for once in ("find", "read_parts", "build", "unpack"):
+                patch.setattr(resources, once, None)
+            assert source.mesh("cube.obj", world, convex=True) is first
+
+
+def test_refusals_are_kept_but_not_taken(world, monkeypatch):
+    disk = on_disk(world)
+    asks = {
+        "bad": (lambda: disk.mesh("bad.obj", world, convex=True), Unusable),
+        "none": (lambda: disk.sdf("model://none", world), Missing),
+        "folder": (lambda: disk.mesh("model://box", world, convex=True), Unusable),
+    }
+    for ask, kind in asks.values():
+        with pytest.raises(kind):
+            ask()
+    monkeypatch.setattr(resources, "find", None)
+    for ask, kind in asks.values():
+        with pytest.raises(kind):
+            ask()
+    assert disk.taken == {}
+
+
+def test_limits(world, monkeypatch):
+    monkeypatch.setattr(resources, "SDF_LIMIT", 3)
+    with pytest.raises(Unusable, match="the maximum is"):
+        on_disk(world).sdf("model://box", world)
 
 
 def damaged(packed: bytes):
