@@ -85,29 +85,6 @@ def test_without_colours_the_cells_still_differ(run):
     assert {"█", "▓", "▒", " "} <= signs
 
 
-def test_only_changed_rows_are_drawn_again():
-    before = Canvas(4, 10, (0, 0, 0))
-    after = before.copy()
-    after.put((2, 3), "A")
-    assert after.changed_rows(before) == [2]
-    assert after.changed_rows(None) == [0, 1, 2, 3]
-    assert strip(after, 2).text == "   A      "
-    # Text ends at the edge of the map.
-    after.put((3, 9), "AB")
-    assert strip(after, 3).text == "         A"
-
-
-def test_recent_runs_say_how_they_stand(runs):
-    fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
-    fake_moments.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
-    (runs / "c.ddenv").write_text("no run")
-    told = {run.path.stem: run for run in RunsFolder(runs).look()}
-    assert (told["a"].brief, told["a"].state_words) == ("2/11", "minimal")
-    assert (told["b"].brief, told["b"].state_words) == ("6/11", "engine is gone")
-    assert told["c"].trouble
-    assert RunsFolder(runs / "nowhere").look() == []
-
-
 def test_the_last_line_of_a_log(tmp_path):
     log = tmp_path / "log"
     assert last_line(log) == ""

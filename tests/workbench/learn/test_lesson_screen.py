@@ -217,6 +217,7 @@ async def test_the_setup_screen_leads_to_the_lessons():
         assert not isinstance(pilot.app.screen, LessonsScreen)
 
 
+@pytest.mark.screens
 async def test_the_algorithm_is_shown_from_the_step_that_speaks_of_it_on():
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
         await pilot.pause()
