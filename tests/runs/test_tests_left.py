@@ -245,3 +245,12 @@ def test_a_budget_ends_it_and_one_that_makes_no_sense_does_no_harm(run, value):
         low, likely, high = remaining(state.changed(scenario=each), True).tests
         assert low <= likely <= high
         assert value != 13 or high <= 3
+
+
+def test_each_forecast_narrows_the_one_before_unless_they_contradict_each_other(run):
+    done = fake_moments.mid_round(run).state.tests_done
+    seen = []
+    for tests in ((10, 20, 40), (5, 30, 60), (20, 50, 90), (50, 60, 70)):
+        run.write("forecast", round=1, tests=tests, tests_done=done)
+        seen.append(run.state.forecast.tests)
+    assert seen == [(10, 20, 40), (10, 30, 40), (20, 40, 40), (50, 60, 70)]

@@ -256,10 +256,17 @@ def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, 
         raise ValueError("candidates")
 
 
-def forecast(_: RunState, event: e.Forecast, __: float) -> Changes:
+def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
+    """A search is foretold anew in each round: each forecast narrows the one before, unless they contradict each other."""
     if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
-    return {"forecast": event}
+    if state.forecast is None:
+        return {"forecast": event}
+    done = event.tests_done - state.forecast.tests_done
+    low, high = max(event.tests[0], state.forecast.tests[0] - done), min(event.tests[2], state.forecast.tests[2] - done)
+    if low > high:
+        return {"forecast": event}
+    return {"forecast": replace(event, tests=(low, min(max(low, event.tests[1]), high), high))}
 
 
 def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
