@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from ddenv.scene.mesh import Surface, edges_of, lines, merge, outline, paint, pl
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels
-from ddenv.world.model import Model, Plane, World, is_ground
+from ddenv.world.model import Model, Plane, World, is_ground, jointed_links
 from ddenv.world.pose import Pose, Vector
 
 # With more elements than this, those that never move are drawn together. A browser takes some 10 ms for each object of its own.
@@ -71,8 +72,9 @@ class Scenery:
         """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
         self._first = {model.name: model.links[0].pose for model in world.models}
-        # What the browser calls the elements that are drawn one by one.
+        # What the browser calls the elements that are drawn one by one, and all that can be moved: these, and links at joints.
         self.keys: dict[str, str] = {}
+        self.movers: dict[str, str] = {}
         self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
@@ -134,12 +136,12 @@ class Scenery:
             self._stage.move((*ROBOT, wheel.key), wheel.pose(turned), newest_only=True)
 
     def place_models(self, poses: Mapping[str, Pose]) -> None:
-        """Puts the first links of these elements at their poses, and all others where they start."""
+        """Puts the first links of these elements, and links at joints, at their poses, and all others where they start."""
         for name in self._placed - set(poses):
-            self._stage.move((*MODELS, self.keys[name]), Pose())
-        self._placed = frozenset(name for name in poses if name in self.keys)
+            self._stage.move((*MODELS, self.movers[name]), Pose())
+        self._placed = frozenset(name for name in poses if name in self.movers)
         for name in sorted(self._placed):
-            self._stage.move((*MODELS, self.keys[name]), self.moved(name, poses[name]), newest_only=True)
+            self._stage.move((*MODELS, self.movers[name]), self.moved(name, poses[name]), newest_only=True)
 
     def moved(self, name: str, pose: Pose) -> Pose:
         """How far a moving model is from its start once its first link is at `pose`."""
@@ -203,10 +205,16 @@ class Scenery:
             self._painted[model.name] = painted
             return shape
         key = safe_name(number, model.name)
-        for part, item in enumerate(painted):
-            self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
+        links = jointed_links(model)
+        pieces = {} if links else {key: painted}
+        for count, (name, link) in enumerate(links.items()):
+            self._first[name], self.movers[name] = link.pose, f"{key}/link {count}"
+            pieces[self.movers[name]] = paint(replace(model, links=(link,)))
+        for place, items in pieces.items():
+            for part, item in enumerate(items):
+                self._stage.draw((*MODELS, place, str(part)), item.thing(), shadow=item.alpha == 1)
         if element:
-            self.keys[model.name] = key
+            self.keys[model.name] = self.movers[model.name] = key
         if model.name in self._edges and not self._is_large:
             for group, color in ((LEFT_OUT, colors.LEFT_OUT), (REMOVED, colors.REMOVED)):
                 self._stage.draw((*group, key), lines(self._edges[model.name], color), shadow=False)

@@ -98,7 +98,7 @@ class Player:
         moving = {
             key: [_row(row[0], scenery.moved(name, pose_of(row[1:]))) for row in rows]
             for name, rows in one.moving.items()
-            if (key := scenery.keys.get(name)) is not None
+            if (key := scenery.movers.get(name)) is not None
         }
         sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
         return {
