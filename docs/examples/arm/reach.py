@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import DefaultProximityProperties, SceneGraphConfig
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import RigidBody
@@ -56,7 +56,9 @@ def with_hand(plant: MultibodyPlant) -> RigidBody:
     """Finishes `plant` with the gripper on the arm's flange, and returns its hand."""
     Parser(plant).AddModels(str(HERE / "gripper.urdf"))
     hand = plant.GetBodyByName("hand")
-    plant.WeldFrames(plant.GetFrameByName("flange"), hand.body_frame(), RigidTransform([0, 0, 0.022]))
+    # The flange's z axis is the hand's x axis.
+    mount = RigidTransform(RollPitchYaw(0, -math.pi / 2, 0), [0, 0, 0.022])
+    plant.WeldFrames(plant.GetFrameByName("flange"), hand.body_frame(), mount)
     plant.Finalize()
     return hand
 
