@@ -41,11 +41,11 @@ def safe_name(number: int, name: str) -> str:
     return f"{number:03d} {kept}"
 
 
-def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
-    """Points (N, 3) below a robot at rows (t, x, y, z, qw, qx, qy, qz) whose lowest point has z = `lowest` in its frame."""
+def path_on_ground(samples: np.ndarray, height: float) -> np.ndarray:
+    """Points (N, 3) of a robot at rows (t, x, y, z, qw, qx, qy, qz) that have z = `height` in its frame."""
     w, x, y, z = samples[:, 4:8].T
     up = np.column_stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-    return samples[:, 1:4] + (lowest + ABOVE) * up
+    return samples[:, 1:4] + height * up
 
 
 class Letter(NamedTuple):
@@ -71,6 +71,7 @@ class Scenery:
     def __init__(self, stage: Stage, world: World, wheels: Wheels, elements: Iterable[str]) -> None:
         """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
+        self.scale = 1.0  # of lines, see `scale_of`
         self._first = {model.name: model.links[0].pose for model in world.models}
         # What the browser calls the elements that are drawn one by one, and all that can be moved: these, and links at joints.
         self.keys: dict[str, str] = {}
@@ -150,7 +151,7 @@ class Scenery:
     def way(self, samples: np.ndarray, ghost: bool) -> bytes:
         """The message that draws the robot's path in a whole run, for one browser."""
         path, color = (GHOST_TRAIL, colors.GHOST_TRAIL) if ghost else (TRAIL, colors.TRAIL)
-        return self._stage.drawn(path, _tube(path_on_ground(samples, self._lowest), color))
+        return self._stage.drawn(path, self._tube(self._points(samples), color))
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
@@ -181,20 +182,28 @@ class Scenery:
 
     def evidence(self, samples: np.ndarray | None) -> None:
         """Draws the robot's path in the run that shows f."""
-        tube = None if samples is None else _tube(path_on_ground(samples, self._lowest), colors.EVIDENCE)
+        tube = None if samples is None else self._tube(self._points(samples), colors.EVIDENCE)
         self._stage.draw(EVIDENCE, tube, shadow=False)
 
     def trail(self, samples: np.ndarray) -> None:
         """Draws the robot's path so far; fewer `samples` than before start a new one."""
-        points = path_on_ground(samples, self._lowest)
+        points = self._points(samples)
         pieces = -(-max(0, len(points) - 1) // PIECE)
         if pieces < self._pieces or not pieces:
             self._stage.delete(TRAIL)
             self._pieces = 0
         for piece in range(max(0, self._pieces - 1), pieces):
-            tube = _tube(points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
+            tube = self._tube(points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
             self._stage.draw((*TRAIL, str(piece)), tube, shadow=False)
         self._pieces = pieces
+
+    def _points(self, samples: np.ndarray) -> np.ndarray:
+        return path_on_ground(samples, self._lowest + self.scale * ABOVE)
+
+    def _tube(self, points: np.ndarray, color: Color) -> Object | None:
+        """A drawn trajectory; None for one without length."""
+        tube = mesh.tube(points, self.scale * LINE)
+        return plain(tube, color, glow=0.4) if len(tube.faces) else None
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
@@ -251,12 +260,6 @@ class Scenery:
         return lowest
 
 
-def _tube(points: np.ndarray, color: Color) -> Object | None:
-    """A drawn trajectory; None for one without length."""
-    tube = mesh.tube(points, LINE)
-    return plain(tube, color, glow=0.4) if len(tube.faces) else None
-
-
 def _ground(world: World) -> Pose | None:
     """The pose at the origin of the plane that is highest there, which may slope; None without planes."""
     planes = (
@@ -290,9 +293,16 @@ FLAG = (
 
 
 def mark(
-    stage: Stage, name: str, position: Vector, radius: float, color: Color, inside: tuple[Surface, ...] = ()
+    stage: Stage,
+    name: str,
+    position: Vector,
+    radius: float,
+    color: Color,
+    scale: float = 1.0,
+    inside: tuple[Surface, ...] = (),
 ) -> None:
     """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
     path = (*WORLD, name)
-    stage.draw(path, plain(merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
+    shapes = [mesh.ring(radius, 0.05 * scale), *(replace(one, vertices=scale * one.vertices) for one in inside)]
+    stage.draw(path, plain(merge(shapes), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))
