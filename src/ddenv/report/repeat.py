@@ -13,21 +13,24 @@ from ddenv.text import plain
 from ddenv.world.access import ending_of
 
 LONGEST_VALUE = 120
+# Settings of our own simulation. A simulator of the user's own has its own, and moves the robot in its own way.
+OF_DRAKE = ("time_step", "contact")
 
 
 def settings(record: Record) -> Section:
     """The section with the settings."""
     scenario, jobs = record.state.scenario, record.state.jobs
+    oracle = section(scenario, "oracle")
     rows = [
         (one.label, _read(scenario, record.asked, one), one.meaning)
         for one in SETTINGS.values()
-        if one.name in section(scenario, one.section) or not one.stored
+        if (one.name in section(scenario, one.section) or not one.stored) and not (oracle and one.name in OF_DRAKE)
     ]
-    rows += [("driver", value_words(section(scenario, "controller").get("use")), "who drives the robot")]
+    driver = "" if oracle else value_words(section(scenario, "controller").get("use"))
+    rows += [("driver", driver, "who drives the robot")]
     rows += [("start", _place(section(scenario, "robot").get("spawn")), "where the robot starts")]
     rows += [("goal", _place(scenario.get("goal")), "where it has to go")]
     rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
-    oracle = section(scenario, "oracle")
     program = oracle.get("command") or oracle.get("use")
     rows += [("simulator", value_words(program), "what runs the robot in place of Drake")]
     table = Table(

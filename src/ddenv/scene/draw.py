@@ -41,11 +41,11 @@ def safe_name(number: int, name: str) -> str:
     return f"{number:03d} {kept}"
 
 
-def path_on_ground(samples: np.ndarray, height: float) -> np.ndarray:
-    """Points (N, 3) of a robot at rows (t, x, y, z, qw, qx, qy, qz) that have z = `height` in its frame."""
+def path_on_ground(samples: np.ndarray, lowest: float, above: float = ABOVE) -> np.ndarray:
+    """Points (N, 3) below a robot at rows (t, x, y, z, qw, qx, qy, qz) whose lowest point has z = `lowest` in its frame."""
     w, x, y, z = samples[:, 4:8].T
     up = np.column_stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-    return samples[:, 1:4] + height * up
+    return samples[:, 1:4] + (lowest + above) * up
 
 
 class Letter(NamedTuple):
@@ -198,7 +198,7 @@ class Scenery:
         self._pieces = pieces
 
     def _points(self, samples: np.ndarray) -> np.ndarray:
-        return path_on_ground(samples, self._lowest + self.scale * ABOVE)
+        return path_on_ground(samples, self._lowest, self.scale * ABOVE)
 
     def _tube(self, points: np.ndarray, color: Color) -> Object | None:
         """A drawn trajectory; None for one without length."""
