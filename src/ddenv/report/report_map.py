@@ -48,7 +48,7 @@ WORDS = {
 WIDTH, HIGHEST, CLOSE_HIGH, LEAST_HIGH = 880.0, 620.0, 420.0, 180.0
 LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
 # The minimum drawn along each axis: of the world and of a close-up, m; and the minimum magnification of a close-up.
-LEAST, CLOSE, CLOSER = 4.0, 2.0, 3.0
+LEAST, CLOSE, CLOSER = 2.0, 2.0, 3.0
 # The maximum number of labels, and how many of the models drawn last they must not hide.
 MOST_LABELS, MOST_AVOIDED = 24, 1000
 # The maximum number of points on a path.
