@@ -13,12 +13,11 @@ from ddenv.text import plain
 from ddenv.world.access import ending_of
 
 LONGEST_VALUE = 120
-# Settings of our own simulation. A simulator of the user's own has its own, and moves the robot in its own way.
+# Settings of our own simulation; a simulator of the user's own has others.
 OF_DRAKE = ("time_step", "contact")
 
 
 def settings(record: Record) -> Section:
-    """The section with the settings."""
     scenario, jobs = record.state.scenario, record.state.jobs
     oracle = section(scenario, "oracle")
     rows = [
@@ -26,13 +25,7 @@ def settings(record: Record) -> Section:
         for one in SETTINGS.values()
         if (one.name in section(scenario, one.section) or not one.stored) and not (oracle and one.name in OF_DRAKE)
     ]
-    driver = "" if oracle else value_words(section(scenario, "controller").get("use"))
-    rows += [("driver", driver, "who drives the robot")]
-    rows += [("start", _place(section(scenario, "robot").get("spawn")), "where the robot starts")]
-    rows += [("goal", _place(scenario.get("goal")), "where it has to go")]
     rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
-    program = oracle.get("command") or oracle.get("use")
-    rows += [("simulator", value_words(program), "what runs the robot in place of Drake")]
     table = Table(
         ("setting", "value", "meaning"), tuple((name, Name(value), meaning) for name, value, meaning in rows if value)
     )
@@ -57,18 +50,6 @@ def value_words(value: Any) -> str:
     return plain(f"{value:g}" if isinstance(value, float) else value)[:LONGEST_VALUE]
 
 
-def _place(values: Any) -> str:
-    """A place as in the file, such as x 1, y 2."""
-    if not isinstance(values, dict):
-        return ""
-    units = {"yaw": "rad", "tolerance": "m", "x": "m", "y": "m", "z": "m"}
-    return ", ".join(
-        f"{key} {value_words(value)} {units[key]}"
-        for key, value in values.items()
-        if key in units and value_words(value)
-    )
-
-
 def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
     import yaml
 
@@ -80,7 +61,6 @@ def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
 
 
 def repeat(record: Record) -> Section:
-    """The section on what to type."""
     state, run = record.state, shlex.quote(plain(record.path))
     blocks: list[Block] = []
     if state.baseline is not None:
