@@ -146,17 +146,17 @@ class Reduction:
     )
     budget: int | None = setting(
         None,
-        "maximum number of simulated tests, with the baseline",
+        "maximum number of simulated tests, including the baseline",
         least=1,
         most=10_000_000,
         shown="basic",
         may_change=True,
         none="none",
-        more="The run stops there with what is left then, and can go on with a larger budget.",
+        more="The run then stops with what is left, and can continue with a larger budget.",
     )
     seed: int = setting(
         0,
-        "number that the seeds of all runs follow from; run i has the same seed in each candidate",
+        "number from which all seeds are derived; run i has the same seed in every candidate",
         least=0,
         most=2**31 - 1,
         shown="basic",
@@ -166,7 +166,7 @@ class Reduction:
     seeds: Literal["hashed", "consecutive"] = setting(
         "hashed",
         "the seed of run i: a hash of the seed and i (hashed), or seed + i (consecutive)",
-        more="Consecutive is for simulators whose seeds are an index; poor generators draw much the same for seeds in a row.",
+        more="Consecutive is for simulators that use the seed as an index; poor generators draw similar numbers from them.",
     )
     baseline_runs: int = setting(10, "runs of the whole world before the first round", least=1, most=1000, shown="more")
     failure: int = setting(
@@ -184,42 +184,42 @@ class Reduction:
         shown="more",
         stored=False,
         used_by=("ddenv",),
-        cost="On needs many more tests, for a result that is as minimal.",
+        cost="On needs many more tests for an equally minimal result.",
     )
     accept_rate: Literal["first", "kept", "exact"] = setting(
         "kept",
-        "when a candidate is taken: at its first run with f (first), at a run with f if all its runs fit the rate of f (kept), "
-        "or if a failing run of the baseline, repeated with its seed, still shows f (exact)",
+        "when a candidate is accepted: at its first run with f (first), at a run with f if all its runs fit the rate of f (kept), "
+        "or if a failing run of the baseline, replayed with its seed, still shows f (exact)",
         printed="first",
         shown="more",
         may_change=True,
-        more="The first rule is the paper's. With it and with exact, the end may fail far more rarely than the whole world.",
+        more="The paper's rule is first. With first and exact, what is left may fail far more rarely than the whole world.",
         cost="Where f is rare, kept takes thousands of tests and exact about a hundred.",
     )
     exact_seeds: int = setting(
         4,
-        "how many failing runs of the baseline 'accept_rate: exact' repeats; a candidate is taken if one of them shows f",
+        "how many failing runs of the baseline 'accept_rate: exact' replays; a candidate is accepted if one of them shows f",
         least=1,
         most=1000,
         shown="option",
         may_change=True,
-        cost="More lose fewer candidates by chance, and run each candidate without f more often.",
+        cost="With more, fewer candidates are lost by chance, but each candidate without f takes more tests.",
     )
     keep_rate: float = setting(
         0.8,
-        "part of the whole world's failure rate that the search keeps",
+        "share of the whole world's failure rate that the search keeps",
         above=0,
         most=0.95,
         shown="more",
-        cost="Lower removes more, and leaves a rarer failure.",
+        cost="A lower share removes more and leaves a rarer failure.",
     )
     certify_rate: float = setting(
         2 / 3,
-        "part of the whole world's failure rate that the certificate has to show",
+        "share of the whole world's failure rate that the certificate has to show",
         above=0,
         most=0.95,
         shown="more",
-        more="Fresh runs are made until they show that the end keeps this part; 'ddenv certify' can go on to a higher one.",
+        more="Fresh runs are made until they show that what is left keeps this share; 'ddenv certify' can raise it.",
         cost="0.8 takes about twice as many fresh runs.",
     )
     keep_supports: bool = setting(
@@ -230,32 +230,32 @@ class Reduction:
     )
     early_stop: bool = setting(
         True,
-        "end a test when the robot seems to be stuck for good; the runs of the certificate are full ones",
+        "end a test when the robot seems to be stuck for good; certificate runs never end early",
         printed=False,
         shown="option",
-        cost="On saves the rest of a test that is stuck.",
+        cost="On saves the rest of each stuck test.",
     )
     slice: bool = setting(
         True,
-        "leave out what took no part in a run without a test, and make no test whose result follows from another one",
+        "remove without testing what cannot have affected a run, and skip tests whose result follows from another one",
         printed=False,
         shown="option",
         cost="On saves most tests; off simulates all of them.",
     )
     audit: int = setting(
         20,
-        "one in so many tests whose result follows from another one is simulated all the same, and compared bit for bit",
+        "one in this many tests whose result follows from another one is simulated anyway and compared bit for bit",
         least=1,
         most=1_000_000,
         shown="option",
-        cost="Lower is surer, and simulates more.",
+        cost="Lower is safer but simulates more.",
     )
     cluster: str = setting(
         "here",
-        "where the tests are made: here, or by the workers of a Dask cluster",
+        "where the tests run: here, or on the workers of a Dask cluster",
         shown="more",
         more="tcp://HOST:PORT or tls://HOST:PORT of a scheduler, the path of its file, or ssh:HOST1,HOST2 to start one.",
-        cost="Costs no tests: the results are those of this machine.",
+        cost="Costs no tests: the results are the same as on this machine.",
     )
     growth: Literal["paper", "steady"] = setting(
         "steady",
@@ -277,21 +277,21 @@ class Reduction:
     )
     complement_order: Literal["paper", "far-first"] = setting(
         "paper",
-        "each complement after its part (paper), or first those that leave out what is farthest away (far-first)",
+        "each complement after its part (paper), or first those without the models farthest away (far-first)",
         printed="paper",
         used_by=("ddenv",),
     )
     n_partitions: int = setting(2, "partitions in the first round", least=2, most=100_000, used_by=("ddenv",))
     delta: float = setting(
         0.5,
-        "change of the angular velocity where trajectoryseg cuts",
+        "change of angular velocity at which trajectoryseg cuts",
         unit="rad/s",
         above=0,
         most=1000,
         used_by=("trajectoryseg",),
     )
     prior: Literal["spatial", "uniform"] = setting(
-        "spatial", "where probdd and splitting begin", used_by=("probdd", "splitting")
+        "spatial", "initial probabilities of probdd and splitting", used_by=("probdd", "splitting")
     )
 
 
@@ -325,7 +325,7 @@ class Simulation:
     contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
     wall_timeout: float | None = setting(
         None,
-        "maximum real time of one test without its preparation; unless given, 1800 in the baseline, then by its speed",
+        "maximum real time of one test without its preparation; by default 1800 in the baseline, then set by its speed",
         unit="s",
         least=0.01,
         most=1_000_000,
@@ -333,7 +333,7 @@ class Simulation:
     )
     memory_limit: float | None = setting(
         None,
-        "maximum memory of one worker; unless given, its share of 90 % of the memory that the machine or the container allows",
+        "maximum memory of one worker; by default its share of 90 % of the memory that the machine or container allows",
         unit="GB",
         least=0.01,
         most=1_000_000,

@@ -18,10 +18,10 @@ from ddenv.runs.folder import find_run
 @options.run_argument
 @options.json_option
 def why_command(run: str, as_json: bool) -> int:
-    """Says why the robot fails in what RUN (a name or a file) has left: what it does without each model, and where the ways part.
+    """Says why the robot fails in what is left of RUN (a name or a file): what it does without each model, and where
+    the paths diverge. It uses the fresh runs of the certificate and makes no new test.
 
-    The fresh runs of the certificate show it; no new test is made. After 'ddenv isolate RUN' it also says what the nearest world
-    that passes lacks.
+    After 'ddenv isolate RUN' it also says what the nearest world that passes lacks.
     """
     from ddenv.evidence.claims import current
     from ddenv.runfile.fold import fold
@@ -51,10 +51,10 @@ def why_command(run: str, as_json: bool) -> int:
     "--runs",
     type=options.whole(1),
     metavar="N",
-    help="Run the world that passes at least so often with fresh seeds; at least 20 times if not given.",
+    help="Minimum number of fresh runs of the world that passes; 20 by default.",
 )
-@click.option("--again", is_flag=True, help="Search again, although the nearest world that passes is known.")
-@click.option("--give-up", is_flag=True, help="End a search that was interrupted; the run is as it was before.")
+@click.option("--again", is_flag=True, help="Search again even if the nearest world that passes is known.")
+@click.option("--give-up", is_flag=True, help="End an interrupted search; the run is left as it was before.")
 @options.engine_options
 def isolate_command(
     run: str, runs: int | None, again: bool, give_up: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
@@ -73,7 +73,7 @@ def isolate_command(
     path, state = idle_run(run, trust, cluster)
     if give_up:
         if state.isolating is None:
-            raise UserError(f"{path}: no search for the nearest world that passes is open, so there is none to give up")
+            raise UserError(f"{path}: no search for the nearest world that passes is open: nothing to give up")
         follow(path, start_engine(path, 1, give_up="yes"), as_json)
         return 0
     if why := Isolate(again=True).refusal(Situation(state, "absent")):
@@ -90,7 +90,7 @@ def isolate_command(
         found = nearest(file, state)
     if found is None:
         # The engine was stopped from elsewhere.
-        raise UserError(f"{path}: the search for a world that passes was stopped; go on with: ddenv isolate {path}")
+        raise UserError(f"{path}: the search for a world that passes was stopped; continue with: ddenv isolate {path}")
     if as_json:
         print(json.dumps({"nearest": asdict(found)}))
     else:

@@ -74,7 +74,7 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
                 stop_engines([(file, engine)])
         except BrokenPipeError:
             announce(
-                f"the engine goes on with {path}: 'ddenv open {path}' attaches to it, 'kill {engine.pid}' stops it"
+                f"the engine keeps working on {path}: 'ddenv open {path}' attaches to it, 'kill {engine.pid}' stops it"
             )
             raise
         state = _show(file, state, out)

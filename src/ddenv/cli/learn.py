@@ -15,11 +15,11 @@ from ddenv.runs.folder import find_run
 @click.command("learn")
 @click.argument("lesson", metavar="[LESSON_OR_RUN]", required=False)
 @click.argument("runs", metavar="[RUN]...", nargs=-1)
-@click.option("--list", "listed", is_flag=True, help="Print the lessons, with how far you are.")
-@click.option("--check", type=Path, metavar="FILE", help="Check a lesson of your own; prints what is wrong with it.")
+@click.option("--list", "listed", is_flag=True, help="List the lessons and your progress.")
+@click.option("--check", type=Path, metavar="FILE", help="Check a lesson of your own and print its mistakes.")
 @click.option("--new", type=Path, metavar="FILE", help="Write a lesson to start from; --run is the run it shows.")
 @click.option("--run", type=str, metavar="RUN", help="The run for --new: it is copied beside the lesson.")
-@click.option("--race", is_flag=True, help="Two to four runs of one world side by side, test by test.")
+@click.option("--race", is_flag=True, help="Compare two to four runs of one world side by side, test by test.")
 @click.option("--page", type=Path, metavar="FILE", help="Write the lesson's summary as one HTML page to hand out.")
 def learn_command(
     lesson: str | None, runs: tuple[str, ...], check: Path | None, new: Path | None, run: str | None, **given: Any

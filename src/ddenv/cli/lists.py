@@ -80,7 +80,7 @@ def config_command(example: bool) -> int:
 @click.command("doctor")
 @click.argument("run", required=False, shell_complete=runs)
 @click.option(
-    "--repair", type=Path, metavar="COPY", help="Write all that is whole of RUN to a new run file; RUN stays as it is."
+    "--repair", type=Path, metavar="COPY", help="Write the readable part of a damaged RUN to COPY; RUN stays unchanged."
 )
 @json_option
 def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:

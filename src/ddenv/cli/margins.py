@@ -22,11 +22,11 @@ BUDGET = 300
     "globs",
     multiple=True,
     metavar="GLOB",
-    help="Only numbers with such a name, such as green_patch_01.friction, '*.y' or controller.speed; may be given again. "
-    "Without it those that promise most come first.",
+    help="Only numbers whose names match, such as green_patch_01.friction, '*.y' or controller.speed; may be repeated. "
+    "Without it the most promising ones come first.",
 )
-@click.option("--budget", type=options.whole(1), metavar="N", help="Runs at most; 300 if not given.")
-@click.option("--list", "listed", is_flag=True, help="Only list the numbers, with how far each is tried.")
+@click.option("--budget", type=options.whole(1), metavar="N", help="Maximum number of runs; 300 by default.")
+@click.option("--list", "listed", is_flag=True, help="Only list the numbers and the range in which each is tried.")
 @options.engine_options
 def margins_command(
     run: str,
@@ -38,9 +38,9 @@ def margins_command(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Says how far each number of what RUN (a name or a file) has left may change before f goes, and from where the robot reaches
-    its goal: places, sizes and frictions of models, the start, the goal, the speed, the sensors. It changes nothing else.
-    A search that was interrupted goes on.
+    """Says how far each number in what is left of RUN (a name or a file) can change before f is gone, and from where the robot
+    reaches its goal: places, sizes and frictions of models, the start, the goal, the speed, the sensors. It changes nothing
+    else, and continues an interrupted search.
     """
     from ddenv.cli.follow import Interrupted, follow
     from ddenv.engine.margins import numbers_left, refusal
@@ -66,14 +66,14 @@ def margins_command(
         follow(path, start_engine(path, jobs, cluster=cluster, **asked), as_json)
     except Interrupted as interrupted:
         if interrupted.state.margining is not None:
-            announce(f"interrupted, and all runs are kept; go on with: ddenv margins {path}")
+            announce(f"interrupted; all runs are kept; continue with: ddenv margins {path}")
             return 130
     with RunFile(path) as file:
         margins = fold(file.events()).margins
     if margins is None or margins.broken_off:
         raise UserError(last_words(path))
     if not margins.ended:
-        raise UserError(f"{path}: the search for margins was stopped; go on with: ddenv margins {path}")
+        raise UserError(f"{path}: the search for margins was stopped; continue with: ddenv margins {path}")
     if as_json:
         found = [asdict(one.margin) | {"words": one.sentence} for one in rows(margins)]
         fixes = [asdict(one) for one in fixes_of(margins)]

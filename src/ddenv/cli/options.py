@@ -62,7 +62,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
         except ValueError:
             numbers = ()
         if any(not abs(number) <= FARTHEST for number in numbers):
-            self.fail(f"no number may be beyond {FARTHEST:g}; found '{value}'", param, ctx)
+            self.fail(f"no number may exceed {FARTHEST:g} in magnitude; found '{value}'", param, ctx)
         if not self.fewest <= len(numbers) <= self.most:
             self.fail(f"expected {self.name}, such as {','.join(['1.5'] * self.most)}; found '{value}'", param, ctx)
         return numbers
@@ -131,12 +131,12 @@ def jobs_option(what: str = "Tests") -> Option:
 
 # Where the tests of a run that is there are made from now on.
 _CLUSTER = SETTINGS["cluster"]
-cluster_option = click.option(_CLUSTER.option, help=f"{_sentence(_CLUSTER)}; as before if not given.")
+cluster_option = click.option(_CLUSTER.option, help=f"{_sentence(_CLUSTER)}; unchanged by default.")
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 
 trust_option = click.option(
-    "--trust", is_flag=True, help="Start the controller or the simulator that the scenario brings along."
+    "--trust", is_flag=True, help="Start the controller or simulator that comes with the scenario."
 )
 
 # For commands that start an engine on a run that is there.
@@ -148,14 +148,14 @@ scenario_options = together(
         "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
     ),
     click.option("--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."),
-    click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
+    click.option("--world", type=Path, help="An SDF world to use instead of the scenario's."),
     click.option(
         "--no-remembered",
         "remembered",
         is_flag=True,
         default=True,
         flag_value=False,
-        help="Do not use what you chose in the workbench for files that the world lacks.",
+        help="Ignore the stand-ins that you chose in the workbench for missing files.",
     ),
 )
 
@@ -173,13 +173,13 @@ reading_options = together(
         "--ignore",
         multiple=True,
         type=click.Choice(IGNORABLE),
-        help="Skip such elements instead of refusing the file; may be repeated.",
+        help="Skip these elements instead of refusing the file; may be repeated.",
     ),
     click.option(
         "--inside",
         is_flag=True,
         default=None,
-        help="Remove single parts of models that never move, such as the walls of a house, in place of whole models.",
+        help="Remove single parts of models that never move, such as the walls of a house, instead of whole models.",
     ),
 )
 

@@ -75,16 +75,16 @@ def announce_needs(sdf: Path, uris: list[str]) -> None:
 
 @click.command("resume")
 @options.run_argument
-@click.option("--mixed", is_flag=True, help="Go on even if other versions or another processor give other results.")
-@click.option("--anyway", is_flag=True, help="Go on even if the last engines died again and again.")
-@click.option("--again", is_flag=True, help="Make all tests again, in a new run of the same scenario.")
+@click.option("--mixed", is_flag=True, help="Continue even if other versions or another processor change results.")
+@click.option("--anyway", is_flag=True, help="Continue even if the engine has died again and again.")
+@click.option("--again", is_flag=True, help="Repeat all tests in a new run of the same scenario.")
 @options.engine_options
 def resume_command(
     run: str, jobs: int, cluster: str | None, mixed: bool, anyway: bool, again: bool, trust: bool, as_json: bool
 ) -> int:
-    """Continues RUN (a name or a file) without a screen; no finished test is made again.
+    """Continues RUN (a name or a file) without a screen; no finished test is repeated.
 
-    If Drake, Python or the processor is another one than before, the first run of the whole world is made again and compared.
+    If Drake, Python or the processor has changed, the first run of the whole world is repeated and compared.
     """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.fold import fold
@@ -110,7 +110,7 @@ def resume_command(
     if again:
         new = run_path(scenario.name, None, path.parent)
         create_like(path, scenario, new)
-        announce(f"makes the tests of {path} again in {new}")
+        announce(f"repeating the tests of {path} in {new}")
         path, how = new, {}
     return follow_to_summary(path, start_engine(path, jobs, cluster=cluster, **how), as_json)[0]
 
@@ -121,19 +121,19 @@ def resume_command(
     "--runs",
     type=options.whole(1),
     metavar="N",
-    help="Run what is left at least so often; as often as the baseline's whole world if not given.",
+    help="Minimum number of runs of what is left; by default as many as the baseline has.",
 )
 @click.option(
     "--certify-rate",
     type=options.Number(SETTINGS["certify_rate"]),
     metavar="PART",
-    help="Go on with the last certificate, and keep all of its runs, until it shows that this part of the rate is kept.",
+    help="Continue the last certificate, with all of its runs, until it shows that this share of the rate is kept.",
 )
 @options.engine_options
 def certify_command(
     run: str, runs: int | None, certify_rate: float | None, jobs: int, cluster: str | None, trust: bool, as_json: bool
 ) -> int:
-    """Makes one more certificate of what RUN (a name or a file) has left, with fresh seeds; it changes nothing else."""
+    """Certifies what is left of RUN (a name or a file) once more, with fresh seeds; it changes nothing else."""
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.run_settings import settings
     from ddenv.runs.programs import start_engine
@@ -144,7 +144,7 @@ def certify_command(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
         )
     if state.status != "finished" and not (state.confirming and state.ended):
-        raise UserError(f"{path}: its search is not over; let it end first: ddenv resume {path}")
+        raise UserError(f"{path}: its search has not finished; finish it first: ddenv resume {path}")
     at_least = runs or settings(state).baseline_runs
     engine = start_engine(path, jobs, certify=at_least, certify_rate=certify_rate, cluster=cluster)
     return follow_to_summary(path, engine, as_json)[0]

@@ -27,7 +27,7 @@ FAILS, PASSES, CANNOT_SAY = 1, 0, 125
     "file",
     type=Path,
     metavar="FILE",
-    help="A .html page, or a .md file with its pictures beside it; has to be given.",
+    help="A .html page, or a .md file with its pictures beside it; required.",
 )
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 def report_command(run: str, file: Path | None, force: bool) -> int:
@@ -56,7 +56,7 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
 @click.option(
     "--passes",
     is_flag=True,
-    help="With --sdf: write the nearest world that passes, in place of what is left ('ddenv isolate RUN' finds it).",
+    help="With --sdf: write the nearest world that passes, instead of what is left ('ddenv isolate RUN' finds it).",
 )
 @click.option(
     "--margin",
@@ -69,13 +69,13 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
     "--bundle",
     type=Path,
     metavar="FOLDER_OR_ZIP",
-    help="Write all that reproduces the failure on another machine: run, world, scenario, report, an issue's text, a program.",
+    help="Write everything needed to reproduce the failure on another machine: run, world, scenario, report, issue text, program.",
 )
 @click.option(
     "--mcap",
     type=Path,
     metavar="FILE",
-    help="Write what the robot sensed and did, for Foxglove, Rerun and ros2 bag; its runs are made again from their seeds.",
+    help="Write what the robot sensed and did, for Foxglove, Rerun and ros2 bag; its runs are repeated from their seeds.",
 )
 @click.option(
     "--pytest",
@@ -109,7 +109,7 @@ def export_command(
         if given and sdf is None:
             raise UserError(f"{option}: needs --sdf FILE")
     if passes and margin is not None:
-        raise UserError("--passes and --margin: give one of them; margins are of what is left")
+        raise UserError("--passes and --margin: give one of them; margins apply to what is left")
     if bundle is not None:
         say_written(write_bundle(path, bundle))
     if test is not None:
@@ -132,24 +132,24 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
     check_drake()
     with RunFile(run) as opened:
         trusted_scenario(opened, asking(trust))
-    announce(f"making runs of {run.stem} again ...")
+    announce(f"repeating runs of {run.stem} ...")
     lines = write_mcap(run, file)
     print("\n".join([f"wrote {file}", *(f"  {line}" for line in lines)]))
 
 
 @click.command("reproduce")
 @options.run_argument
-@click.option("--most", type=click.IntRange(1, 10_000), default=60, show_default=True, help="Runs at most.")
+@click.option("--most", type=click.IntRange(1, 10_000), default=60, show_default=True, help="Maximum number of runs.")
 @click.option(
     "--folder",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
-    help="Where the controller or the simulator of your own lies; the folder of the run's scenario if not given.",
+    help="Folder of your own controller or simulator; by default that of the run's scenario.",
 )
 @options.jobs_option("Runs")
 @options.trust_option
 @options.json_option
 def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool) -> int:
-    """Runs what RUN (a name or a file) has left until it is known whether it still fails at the rate of its certificate.
+    """Runs what is left of RUN (a name or a file) until it is clear whether it still fails at the rate of its certificate.
 
     Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 it cannot be
     said: the runs do not decide, or something is wrong.

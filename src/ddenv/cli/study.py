@@ -33,7 +33,7 @@ from ddenv.cli.terminal import asking
     metavar="NAMES",
     help="Algorithms separated by commas, or 'all'.",
 )
-@click.option("--seeds", type=whole(1, 1000), default=1, show_default=True, help="Reductions of each.")
+@click.option("--seeds", type=whole(1, 1000), default=1, show_default=True, help="Seeds per scenario and method.")
 @jobs_option()
 @click.option(
     "-o",

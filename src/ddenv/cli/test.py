@@ -32,12 +32,12 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
 @click.option(
-    "--test", type=options.whole(1), metavar="NUMBER", help="The models and the seed of this test of the run."
+    "--test", type=options.whole(1), metavar="NUMBER", help="Use the models and the seed of this test of the run."
 )
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
-@click.option("--seed", type=options.whole(0, 2**31), help="Seed of the first run; the next ones count up.")
-@click.option("--repeat", type=options.whole(1, 100_000), default=1, show_default=True, help="Runs of each.")
+@click.option("--seed", type=options.whole(0, 2**31), help="Seed of the first run; the next ones count up from it.")
+@click.option("--repeat", type=options.whole(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
 @click.option(
     "--simulator", type=Path, metavar="FILE", help="Run in this simulator: a YAML file with its name and its command."
 )
@@ -47,7 +47,7 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 def test_command(
     subject: str, keep: str | None, simulator: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
 ) -> int:
-    """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and in the end how often it fails."""
+    """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
     from ddenv.engine.single_test import plan, run_trials
 
     planned = {name: given.pop(name) for name in PLANNED}

@@ -18,7 +18,7 @@ PORT = 8000
 @click.argument("run", metavar="RUN_OR_FILE", type=click.Path(), shell_complete=runs_and_scenarios)
 @reading_options
 @click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
-@click.option("--lines", is_flag=True, help="Plain lines that are never drawn again, for screen readers: type help.")
+@click.option("--lines", is_flag=True, help="Plain lines that are never redrawn, for screen readers: type help.")
 def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF world.
 
@@ -54,7 +54,7 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:
     if value is not None:
         raise UserError(
-            "--host: the workbench is only served on 127.0.0.1, since anybody who can open it acts as you; "
+            "--host: the workbench is only served on 127.0.0.1, since anyone who can open it acts as you; "
             "from another machine use ssh -L"
         )
 
@@ -63,7 +63,7 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 @click.argument("run", required=False, shell_complete=runs)
 @click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
 @click.option(
-    "--font-size", type=whole(6, 72), default=16, show_default=True, help="Of the text, in pixels; 28 for a projector."
+    "--font-size", type=whole(6, 72), default=16, show_default=True, help="Text size in pixels; 28 for a projector."
 )
 @click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
 def serve_command(run: str | None, port: int, font_size: int) -> int:

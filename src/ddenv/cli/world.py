@@ -195,9 +195,9 @@ def _totals(world: World) -> str:
     said = [f"{kinds[kind]} {kind}" for kind in ("replaced", "ignored") if kinds[kind]]
     stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
-    why = f"; {they} since others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
+    why = f"; {they} because others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
     welds = [f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}" for one, other in world.ties]
-    why += f"; welded, so they go together: {first_of(welds, MOST_NAMES)}" if welds else ""
+    why += f"; welded, so they are removed together: {first_of(welds, MOST_NAMES)}" if welds else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
     return f"{models}; {', '.join(said) or 'nothing was replaced or ignored'}"
 
@@ -210,7 +210,7 @@ def _totals(world: World) -> str:
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
-@click.option("--took-part", is_flag=True, help="FILE is a run: show what took part in its runs of the whole world.")
+@click.option("--took-part", is_flag=True, help="FILE is a run: show what may have affected runs of the whole world.")
 @click.option("--passes", is_flag=True, help="FILE is a run: show the nearest world that passes, and what it lacks.")
 def show(
     file: Path,
@@ -228,7 +228,7 @@ def show(
     if took_part or passes:
         if spawn is not None or goal is not None or svg is not None or (took_part and passes):
             option = "--took-part" if took_part else "--passes"
-            raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run do not go with it")
+            raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run cannot be combined with it")
         world, dim, below = _of_run(str(file), passes)
         print("\n".join([_map(world, dim=dim), *below]))
         return 0
@@ -269,8 +269,8 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
         return world, frozenset(gone), [head, *(f"  {printable(model)}" for model in gone)]
     times, runs = in_whole_world(state)
     if not times or state.baseline is None:
-        raise UserError(f"{path}: it is not recorded what took part in its runs of the whole world; make a new run")
-    head = f"{count(len(times), 'model')} of {len(state.elements)} took part in the runs of the whole world:"
+        raise UserError(f"{path}: does not record which models affected its runs of the whole world; make a new run")
+    head = f"{count(len(times), 'model')} of {len(state.elements)} may have affected the runs of the whole world:"
     lines = [f"  {printable(model)}: {number} of {count(runs, 'run')}" for model, number in times.most_common()]
     return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
 

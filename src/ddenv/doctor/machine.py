@@ -49,11 +49,11 @@ def _version(name: str) -> str:
 
 def terminal() -> Iterator[Finding]:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        yield Finding("terminal", "terminal", "none: input or output is no terminal; 'ddenv run' works without one")
+        yield Finding("terminal", "terminal", "none: input or output is not a terminal; 'ddenv run' works without one")
     else:
         columns, lines = shutil.get_terminal_size()
         small = columns < SMALLEST[0] or lines < SMALLEST[1]
-        advice = f"the workbench is made for {SMALLEST[0]} by {SMALLEST[1]} and more" if small else ""
+        advice = f"the workbench is designed for {SMALLEST[0]} by {SMALLEST[1]} or more" if small else ""
         yield Finding("terminal", "size", f"{columns} columns, {lines} lines", "note" if small else "ok", advice)
 
 
@@ -71,7 +71,7 @@ def _memory() -> Finding:
     says = f"{usable / 1e9:.1f} GB may be used, {free / 1e9:.1f} GB are free"
     if free >= LITTLE_MEMORY:
         return Finding("machine", "memory", says)
-    return Finding("machine", "memory", says, "note", "fewer tests at the same time: --jobs 1")
+    return Finding("machine", "memory", says, "note", "run fewer tests at the same time: --jobs 1")
 
 
 def runs() -> Iterator[Finding]:
@@ -89,8 +89,8 @@ def _space(what: str, folder: Path, group: str) -> Finding:
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(b"room")
     except OSError as error:
-        says, advice = f"{folder} cannot be written: {error.strerror}", "another folder, in DDENV_HOME or TMPDIR"
+        says, advice = f"{folder} cannot be written: {error.strerror}", "set another one in DDENV_HOME or TMPDIR"
         return Finding(group, what, says, "wrong", advice)
     if free < LITTLE_SPACE:
-        return Finding(group, what, says, "note", "a run needs up to some hundred MB")
+        return Finding(group, what, says, "note", "a run needs up to a few hundred MB")
     return Finding(group, what, says)

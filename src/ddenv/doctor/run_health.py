@@ -43,9 +43,9 @@ def repair(path: Path, copy: Path) -> list[Finding]:
         found = rescue(file, copy)
     words = _how_much(found)
     if not found.trouble:
-        return [Finding("copy", "copy", f"{copy}: whole, {words}")]
-    again = f"ddenv resume {copy} makes the rest again"
-    return [Finding("copy", "copy", f"{copy}: {words}; what came after them is lost: {found.trouble}", "note", again)]
+        return [Finding("copy", "copy", f"{copy}: complete, {words}")]
+    again = f"ddenv resume {copy} repeats the rest"
+    return [Finding("copy", "copy", f"{copy}: {words}; everything after them is lost: {found.trouble}", "note", again)]
 
 
 @contextmanager
@@ -80,7 +80,7 @@ def _most(path: Path) -> Iterator[RunFile]:
             if not path.is_file():
                 raise
     if not any(counts.values()):
-        raise UserError(f"{path}: nothing can be repaired: neither with its log nor without it is an event whole")
+        raise UserError(f"{path}: nothing can be repaired: no event can be read, with or without its log")
     with _opened(path, max(counts, key=lambda each: counts[each])) as file:
         yield file
 
@@ -117,7 +117,7 @@ def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
     read = whole(file)
     words = _how_much(read)
     if read.trouble:
-        yield _finding("events", f"{words} are whole; then: {read.trouble}", "wrong", _repair(path))
+        yield _finding("events", f"{words} can be read; then: {read.trouble}", "wrong", _repair(path))
     else:
         yield _finding("events", words)
     trouble = _parts(file)
@@ -150,15 +150,15 @@ def _how_much(read: Whole) -> str:
 def _engine(read: Whole, path: Path, alive: bool) -> Finding:
     state = read.state
     if alive and state.needs_room:
-        return _finding("engine", "waits for room on the disk", "note")
+        return _finding("engine", "waiting for disk space", "note")
     if alive:
-        return _finding("engine", "at work")
+        return _finding("engine", "running")
     if state.ended:
         return _finding("engine", f"{state.status}: {state.reason}")
     if state.status == "created":
-        return _finding("engine", "none has worked on it yet")
+        return _finding("engine", "not started yet")
     says = _without(last_words(path)).partition("; go on with")[0]
-    return _finding("engine", f"none is at work: {says}", "note", f"ddenv resume {path}")
+    return _finding("engine", f"not running: {says}", "note", f"ddenv resume {path}")
 
 
 def _repair(path: Path) -> str:

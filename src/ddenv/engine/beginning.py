@@ -71,10 +71,10 @@ def _comparable(state: RunState) -> Test | None:
 
 def _differs(journal: Journal, result: RunResult | Broken) -> str:
     run, physics = journal.file.path, journal.state.physics
-    how = f"broke ({result.failure})" if isinstance(result, Broken) else "gives another trajectory"
+    how = f"broke ({result.failure})" if isinstance(result, Broken) else "gives a different trajectory"
     return (
-        f"{run}: made again, the first run of the whole world {how}: the tests were made with {physics.proven}, and this is "
-        f"{physics.now}; 'ddenv resume {run} --mixed' goes on all the same, 'ddenv resume {run} --again' makes all tests again "
+        f"{run}: repeated, the first run of the whole world {how}: the tests were made with {physics.proven}, and this is "
+        f"{physics.now}; 'ddenv resume {run} --mixed' continues anyway, 'ddenv resume {run} --again' repeats all tests "
         "in a new run"
     )
 

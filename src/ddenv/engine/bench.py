@@ -251,8 +251,8 @@ class Bench:
         self._broken = self._broken + 1 if result.outcome in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(
-                f"{self._broken} tests in a row broke, the last one: {result.failure}; "
-                f"fix this and continue with 'ddenv resume {self._journal.file.path}' (these tests are then made again)"
+                f"{self._broken} tests in a row broke; the last one: {result.failure}; "
+                f"fix this and continue with 'ddenv resume {self._journal.file.path}' (it repeats these tests)"
             )
 
     def _show_live(self) -> None:

@@ -42,7 +42,7 @@ from ddenv.world.scenario import Reduction, Scenario
 
 # Another failure competes to be f if it shows at least once where f shows so often. Rarer ones hardly ever win by luck.
 COMPETES = 4
-CHANGED = "a decision of the user ended the certificate; resume the run to go on from there"
+CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
 class Driver:
@@ -159,8 +159,8 @@ class Driver:
         test = journal.test(journal.whole, exact[0])
         if test is not None and test.phase == "baseline" and self._bench.made_again(test) is not None:
             raise UserError(
-                f"reduction.accept_rate: exact needs runs that repeat, and run {test.run + 1} of the whole world, made again "
-                f"with seed {test.seed}, is another one; keep its rate: --accept-rate kept"
+                f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of the whole world, replayed "
+                f"with seed {test.seed}, differs; keep its rate: --accept-rate kept"
             )
 
     def _leg_of(self, leg: Leg, environment: tuple[str, ...]) -> steps.Leg:
@@ -454,7 +454,7 @@ class Driver:
         reason = verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
-            reason += "; to leave it out was vetoed or rejected"
+            reason += "; leaving it out was vetoed or rejected"
         if together:
             reason += f"; stacks were kept together ({count(len(stacks), 'stack')})"
         self._end(is_minimal(certificate), reason)

@@ -28,7 +28,7 @@ FIRST_RUN = 100_000_000
 # So many fresh runs of the world that passes, at least: their interval has to say something.
 FEWEST_RUNS = 20
 VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
-CHANGED = "a decision of the user, or a slice that was wrong, ended the isolation; resume the run to go on from there"
+CHANGED = "a decision of the user or a wrong slice ended the isolation; resume the run to continue from there"
 
 
 def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, before: str) -> None:

@@ -189,7 +189,7 @@ def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str
 def _no_failure(tests: Sequence[Test]) -> str:
     broken = [test for test in tests if test.outcome in BROKEN]
     if len(broken) == len(tests):
-        return f"no baseline run came to its end: {broken[0].failure}"
+        return f"no baseline run finished: {broken[0].failure}"
     reached = len(tests) - len(broken)
     also = f" ({len(broken)} more broke: {broken[0].failure})" if broken else ""
     return f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce"

@@ -36,7 +36,7 @@ KNOWN_AFTER = 10.0
 RARE = 0.7
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
-HELPS = "what helps: fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
+HELPS = "try fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
 
 
 def wall_limit(state: RunState) -> float:
@@ -83,8 +83,8 @@ def note_rare(journal: Journal) -> None:
     note(
         journal,
         "rare",
-        f"f shows in {base.failures} of {count(base.runs, 'run')}: to keep its rate takes about {kept} tests; to reduce the "
-        f"failing runs themselves, exactly, about {exact}: accept_rate exact (--exact)",
+        f"f shows in {base.failures} of {count(base.runs, 'run')}: keeping its rate takes about {kept} tests; reducing the "
+        f"failing runs themselves takes about {exact} (accept_rate exact, --exact)",
     )
 
 
@@ -98,7 +98,7 @@ def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
         if real >= KNOWN_AFTER and live.time < SLOW * real:
             # The first tenth of a second may not be over.
             rate = max(live.time, 0.1) / real
-            words = f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
+            words = f"this world is slow: {rate:.2g} s simulated per second; at this rate a {timeout:g} s test takes "
             note(journal, "slow", f"{words}{duration(timeout / rate)}; {HELPS}, more --jobs")
 
 

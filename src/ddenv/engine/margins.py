@@ -48,11 +48,11 @@ def refusal(state: RunState, where: object) -> str:
     if state.baseline is None:
         return f"f is not known yet, so there are no margins; run it first: ddenv resume {where}"
     if state.margining is None and (state.status not in ("finished", "stopped") or state.isolating is not None):
-        return f"its search is not over; let it end first: ddenv resume {where}"
+        return f"its search has not finished; finish it first: ddenv resume {where}"
     if (
         state.baseline.rate if certificate is None else certificate.claims[0].shown / certificate.claims[0].runs
     ) < known.RAREST:
-        return "f shows too rarely in what is left to say where it is gone; reduce a failure that shows more often (--failure)"
+        return "f shows too rarely in what is left to say where it disappears; reduce a failure that shows more often (--failure)"
     return "" if state.environment else "nothing is left, so there is no model with a margin"
 
 
@@ -193,4 +193,4 @@ class _Search:
         self._journal.record(events.MarginRan(*one, seed, **kept))
         self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
         if self._broken >= MOST_BROKEN:
-            raise UserError(f"{self._broken} runs in a row broke, the last one: {data['failure']}")
+            raise UserError(f"{self._broken} runs in a row broke; the last one: {data['failure']}")

@@ -155,7 +155,7 @@ def write_mcap(run: Path, target: Path) -> list[str]:
         streams = Streams()
         result = template.run(one.models, one.seed, None, one.full, streams)
         if not np.array_equal(result.trajectory, stored[one.test]):
-            raise UserError(f"{run}: test {one.test} gives other bits here: another Drake or another processor made it")
+            raise UserError(f"{run}: test {one.test} gives different bits here: another Drake or processor made it")
         for topic, kind, seconds, message in messages(one, result, streams, subject):
             whole = topic if topic.startswith("/") else f"/{one.name}/{topic}"
             writer.write_message(whole, schemas[kind], message, nanoseconds(seconds))

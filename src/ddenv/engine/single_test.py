@@ -146,7 +146,7 @@ class Reproduction:
     broken: int
 
     def __str__(self) -> str:
-        said = {True: "it fails as it did", False: "it does not fail as it did", None: "the runs do not say"}[
+        said = {True: "it fails as it did", False: "it does not fail as it did", None: "the runs do not decide"}[
             self.fails
         ]
         return f"{said}: f in {self.shown} of {count(self.runs, 'run')}"

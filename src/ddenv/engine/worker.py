@@ -332,7 +332,7 @@ class WorkerProcess:
 def _words(code: int, said: list[str]) -> str:
     how = f"exit code {code}" if code >= 0 else signal_name(-code)
     # Nobody else kills workers.
-    perhaps = ", perhaps for lack of memory" if code == -signal.SIGKILL else ""
+    perhaps = ", perhaps out of memory" if code == -signal.SIGKILL else ""
     return f"{how}{perhaps}{': ' if said else ''}{' | '.join(said)}"
 
 

@@ -25,7 +25,7 @@ DOUBT = 0.25
 def ddenv(elements: Partition, guide: Guide) -> Search:
     """The paper's algorithm. Each round splits the environment into n partitions and tries them in the order of the prioritization,
     each followed by its complement. The first candidate that shows the failure becomes the environment. n grows with the rounds.
-    The search ends when a round of single models and their complements shows nothing: no single model can be removed.
+    The search ends when no candidate in a round of single models and their complements shows it: no single model can be removed.
 
     Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and would end one granularity early.)
     The last model is tested, too: f may need no model at all. With the guide's `growth` "steady", n grows only after rounds that
@@ -107,7 +107,7 @@ def _without_implied(round: Round, missed: list[Environment], proves: bool) -> R
 
 
 def ddmin(elements: Partition, guide: Guide) -> Search:
-    """Classic delta debugging. It cuts the environment into n chunks in the order of the world file, and tries first each chunk
+    """Classic delta debugging. It cuts the environment into n chunks in the order of the world file, and first tries each chunk
     alone, then each complement. A chunk that shows the failure is split in two; a complement keeps its n - 1 chunks; when nothing
     shows the failure, n doubles. It uses neither positions nor the place of the failure, so it is the baseline that shows what
     space and time are worth.
@@ -182,10 +182,10 @@ def _raise_chances(group: Partition, chance: dict[int, float]) -> None:
 
 def splitting(elements: Partition, guide: Guide) -> Search:
     """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves out a group from the far end, of
-    the size that tells most: the failure shows about as often as not. If it does not show, smaller groups are left out, until the
+    the most informative size: the failure shows about as often as not. If it does not show, smaller groups are left out, until the
     farthest needed model is found. Where the failure does not show in every run, one run is made without a group, and a miss only
     makes it likelier that the group is needed. At the end each remaining model is left out once more, in as many runs as any
-    candidate has. It takes close to the minimum number of tests.
+    other candidate. It takes close to the minimum number of tests.
 
     Noisy binary search (Burnashev and Zigangirov, 1974) for the farthest needed model, with the guide's probabilities as prior.
     """

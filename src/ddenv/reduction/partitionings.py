@@ -20,8 +20,8 @@ MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
 
 def model2model(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
     """Models that are near each other form a partition: k-means clusters their positions into n groups. If a cluster stays empty,
-    because models share a position, each model is its own partition in this round. Good if models that cause a failure stand close
-    together.
+    because models share a position, each model is its own partition in this round. Good if the models that cause a failure
+    stand close together.
 
     Paper, Algorithm 2.
     """
@@ -51,8 +51,9 @@ def timeseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[N
 
 def trajectoryseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
     """The trajectory of the last similar run is cut where the robot's angular velocity changes by more than delta (rad/s, the
-    scenario's key `reduction.delta`). A model belongs to the span whose path is nearest to it. Of too many cuts the n - 1 sharpest
-    are kept; with too few, the longest spans are halved. Good if the robot's turns show where something happened.
+    scenario's key `reduction.delta`). A model belongs to the span whose path is nearest to it. If there are too many
+    cuts, the n - 1 sharpest are kept; if too few, the longest spans are halved. Good if the robot's turns show where something
+    happened.
     """
     trajectory = evidence.need("trajectory")
     return by_span(environment, cuts(trajectory, evidence.delta, n_partitions), evidence)

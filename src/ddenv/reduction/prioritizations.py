@@ -31,8 +31,8 @@ def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
 
 
 def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions whose centroid the robot came nearest to, at any time of its last similar run, are tried first. What the robot
-    only passed counts as much as what it failed at.
+    """Partitions whose centroid the robot came nearest to, at any time of its last similar run, are tried first. Models that
+    it only passed count as much as those it failed at.
 
     The scores are distances in m, to the segments of the path.
     """
@@ -52,8 +52,8 @@ def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
 
 
 def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions are tried in the order in which their first models appear in the world file. It knows nothing about the failure: a
-    yardstick for the schemas that do, and right if the order of the file means something.
+    """Partitions are tried in the order in which their first models appear in the world file. It ignores the failure: a
+    yardstick for the schemas that do not, and a good choice if the order of the file means something.
 
     The scores are places in the file.
     """

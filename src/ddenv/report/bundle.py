@@ -42,7 +42,7 @@ def write_bundle(run: Path, target: Path) -> list[Path]:
     if target.exists():
         raise UserError(f"{target}: exists already; choose another name")
     if not target.absolute().parent.is_dir():
-        raise UserError(f"{target}: there is no folder {target.absolute().parent}; make it first")
+        raise UserError(f"{target}: there is no folder {target.absolute().parent}; create it first")
     record = _certified(run)
     # Complete or not there at all.
     with tempfile.TemporaryDirectory(prefix=".ddenv-bundle-", dir=target.absolute().parent) as temporary:
@@ -72,7 +72,7 @@ def write_test(run: Path, folder: Path) -> list[Path]:
         if path.exists():
             raise UserError(f"{path}: exists already; choose another folder")
     if not folder.is_dir():
-        raise UserError(f"{folder}: is not a folder; make it first")
+        raise UserError(f"{folder}: is not a folder; create it first")
     with tempfile.TemporaryDirectory(prefix=".ddenv-test-", dir=folder) as temporary:
         made = Path(temporary) / copy.name
         _copy_run(run, made, record)
@@ -140,7 +140,7 @@ def _issue(record: Record, needs: list[str]) -> bytes:
     if record.nearest is not None:
         reasons += ["", printable(record.nearest.sentences)]
     if state.margins is not None and rows(state.margins):
-        reasons += ["", "How far numbers may change:", "", *(f"- {printable(words)}" for words in said(state.margins))]
+        reasons += ["", "How far numbers can change:", "", *(f"- {printable(words)}" for words in said(state.margins))]
     names = ", ".join(f"`{_code(uri)}`" for uri in needs[:MOST_NAMES])
     return _filled(
         ISSUE,

@@ -35,8 +35,8 @@ MEANING = {
     "other": "another failure",
     "pass": "the goal was reached",
     "error": "the simulation broke",
-    "timeout": "the test took too long on the clock",
-    "failed": "failed, before f was fixed",
+    "timeout": "the test took too long in real time",
+    "failed": "failed before f was known",
 }
 PHASES = (
     ("baseline", "whole world"),
@@ -59,7 +59,7 @@ def sureness(record: Record) -> Section | None:
         say(Strong("Mixed tests."), f" They were made with {plain(one)}, which do not give the same bits.", notice=True)
         for one in state.physics.mixed
     )
-    return Section("How sure it is", (*_baseline(state), *_tests(state), *mixed))
+    return Section("How certain it is", (*_baseline(state), *_tests(state), *mixed))
 
 
 def _baseline(state: RunState) -> list[Block]:
@@ -71,7 +71,7 @@ def _baseline(state: RunState) -> list[Block]:
         f"{percent(base.rate)}, 95 % interval (Wilson) {percent(base.low)} to {percent(base.high)}."
     )
     if base.broken:
-        words += f" {count(base.broken, 'more run')} broke, and {'says' if base.broken == 1 else 'say'} nothing."
+        words += f" {count(base.broken, 'more run')} broke, and {'is' if base.broken == 1 else 'are'} not counted."
     blocks: list[Block] = [say(words)]
     if base.rate < 1:
         blocks.append(say(as_sentence(missed(state))))
@@ -97,14 +97,14 @@ def _tests(state: RunState) -> list[Block]:
         for outcome, number in state.outcomes().items()
         if number
     )
-    head = ("outcome", "tests", "share", *(words for _, words in phases), "which means")
+    head = ("outcome", "tests", "share", *(words for _, words in phases), "meaning")
     table = Table(head, rows, range(1, 3 + len(phases)))
     # Before the end of the run, anything may still come to be needed.
     slices, ahead = _slices(state), state.ahead if state.status == "finished" else 0
     words = (
-        f"Of the tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, "
-        f"{thousands(state.cut_tests)} were ended early, when the robot was stuck for good, and {thousands(ahead)} were made "
-        "ahead of time by idle workers and not needed."
+        f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, "
+        f"{thousands(state.cut_tests)} ended early because the robot was stuck for good, and {thousands(ahead)} were started "
+        "early by idle workers and not needed."
     )
     return [table, say(words), *slices]
 
@@ -113,7 +113,7 @@ def _slices(state: RunState) -> list[Block]:
     """What was known, and what went, without a test."""
     blocks: list[Block] = []
     if state.implied:
-        audits = f"; {thousands(state.audits)} more were simulated all the same, to be compared" if state.audits else ""
+        audits = f"; {thousands(state.audits)} more were simulated anyway, for comparison" if state.audits else ""
         known = f"{thousands(state.implied)} of the tests were not simulated: finished runs imply them{audits}."
         blocks.append(say(f"{known} {TEACHING}"))
     for node in state.nodes:
@@ -150,7 +150,7 @@ def others_met(record: Record) -> Section | None:
     table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), {1, 2})
     more = len(found) - MOST
     rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []
-    return Section("Other failures met", (lead, table, *rest))
+    return Section("Other failures seen", (lead, table, *rest))
 
 
 def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
@@ -168,13 +168,13 @@ def worth(record: Record) -> Section | None:
         return None
     found = current(state)
     blocks = _without(state) if found is None else _with(state, found)
-    return Section("What it is worth", tuple(blocks))
+    return Section("What the result is worth", tuple(blocks))
 
 
 def _without(state: RunState) -> list[Block]:
     so_far, words = drift(state), missing(state)
     rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
-    claimed = "what its runs have shown by now holds all the same" if rows else "nothing is claimed of what is left"
+    claimed = "what its runs have shown so far still holds" if rows else "nothing is claimed about what is left"
     first = as_sentence(f"{words}: {claimed}")
     block = say(first, f" From all runs so far: {so_far[0]}." if so_far else "")
     shown = ((_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows)
@@ -184,10 +184,10 @@ def _without(state: RunState) -> list[Block]:
 
 def _with(state: RunState, found: Certificate) -> list[Block]:
     rows = fresh_runs(state)
-    head = ("environment", "runs", "ended", "f shown", "95 % interval", "which means")
+    head = ("environment", "runs", "ended", "f shown", "95 % interval", "meaning")
     table = Table(head, tuple(_fresh_row(state, each, found) for each in rows[:MOST_ROWS]), {1, 3, 4}, {0})
     words = (
-        "These runs have seeds that the search did not use, and none of them ended early. Rates leave broken runs out."
+        "These runs have seeds that the search did not use, and none of them ended early. Rates exclude broken runs."
     )
     if found.seeds:
         words = (
@@ -214,7 +214,7 @@ def _name(each: FreshRuns) -> Cell:
     if each.is_left:
         return "what is left"
     world = "the whole world" if each.node == 0 else f"environment {each.node}"
-    return f"{world}, where what is left missed f" if each.is_chosen else world
+    return f"{world}, with seeds that did not show f in what is left" if each.is_chosen else world
 
 
 def rate_of_left(state: RunState) -> tuple[str, str]:

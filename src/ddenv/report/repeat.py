@@ -38,7 +38,7 @@ def settings(record: Record) -> Section:
 def _read(scenario: dict[str, Any], asked: dict[str, Any], one: Setting) -> str:
     """The value of a setting, with the first value if it was changed during the run."""
     now, first = (value_words(read(each, one)) or one.none for each in (scenario, asked))
-    return now if first == now else f"{now} (changed during the run; at first {first})"
+    return now if first == now else f"{now} (changed during the run; initially {first})"
 
 
 def value_words(value: Any) -> str:
@@ -67,7 +67,7 @@ def repeat(record: Record) -> Section:
         kept = "minimal world" if state.certified else "world that is left"
         world = f"minimal{ending_of(Path(str(state.scenario.get('world', ''))))}"
         blocks += [
-            say(f"See the failure in the {kept}, and that it needs each of its models:"),
+            say(f"Show the failure in the {kept}, and that each of its models is needed:"),
             Code((f"ddenv test {run} --minimal --leave-each-out",)),
             say("Run it more often with fresh seeds, for a narrower interval:"),
             Code((f"ddenv certify {run} --runs 100",)),
@@ -75,7 +75,7 @@ def repeat(record: Record) -> Section:
             Code((f"ddenv export {run} --sdf {world} --scenario minimal.yaml",)),
         ]
     again = "Reduce it again from the beginning"
-    again += " (without what was decided by hand):" if state.decisions else ":"
+    again += " (without the decisions made by hand):" if state.decisions else ":"
     if not (bundled := _is_bundled(record)):
         again = f"{again[:-1]}, with the scenario's own file:"
     return Section("Repeat it", (*blocks, say(again), Code((_command(record, bundled),))))

@@ -63,7 +63,7 @@ def _verdict(state: RunState) -> str:
         return f"None of the {count(all_of_them, 'model')} is needed to make the robot fail"
     enough = "is" if left == 1 else "are"
     if left == all_of_them:
-        return f"The robot fails among all {count(left, 'model')}; none is removed yet"
+        return f"The robot fails with all {count(left, 'model')}; none has been removed yet"
     words = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
     return words if state.certified else f"{words} so far"
 
@@ -87,11 +87,11 @@ def _standing(record: Record) -> Paragraph:
     title, words = {
         "finished": ("Not shown to be minimal:", f" {why or 'no reason is known'}."),
         "stopped": ("Stopped", f"{reason}. This report shows what was known then."),
-        "failed": ("The engine could not go on", f"{reason}."),
+        "failed": ("The engine could not continue", f"{reason}."),
         "created": ("Not started yet:", " no test has been made."),
     }.get(state.status, ("This run has not ended.", f" This report shows what was known{at}."))
     if not (state.ended or state.status == "created" or record.alive):
-        words = f" The engine is gone; its last message came{at}." if at else " The engine is gone."
+        words = f" The engine is not running; its last message came{at}." if at else " The engine is not running."
     return say(Strong(title), words, notice=True)
 
 
@@ -103,7 +103,7 @@ def _failure(state: RunState) -> list[Paragraph]:
         said.append(say(f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m."))
     elif state.tests_done:
         seen = count(state.tests_done, "run")
-        said.append(say(f"The whole world is run first to fix the failure: {seen} ended so far."))
+        said.append(say(f"The whole world is run first to determine the failure: {seen} ended so far."))
     notes = (plain(each) for _, each in state.notes)
     return [*said, *(say(as_sentence(words), notice=True) for words in notes)]
 
@@ -121,7 +121,7 @@ def _figures(record: Record) -> tuple[tuple[str, str], ...]:
         *figures,
         (thousands(state.tests_done), "test" if state.tests_done == 1 else "tests"),
         *(((thousands(rounds), "round" if rounds == 1 else "rounds"),) if rounds else ()),
-        (duration(spent(state, state.updated_at)), "of computing"),
+        (duration(spent(state, state.updated_at)), "computing time"),
     )
 
 
@@ -187,7 +187,7 @@ def in_short(record: Record) -> list[Paragraph]:
         return []
     sure = "Fresh runs have not checked that yet." if found is None else f"{for_everyone(found)}."
     runs = "1 simulated run" if state.made == 1 else f"{thousands(state.made)} simulated runs"
-    cost = f"This took {runs} and {duration(spent(state, state.updated_at))} of computing."
+    cost = f"This took {runs} and {duration(spent(state, state.updated_at))} of computing time."
     what = f" The robot {deed(state.failure)} before it reached its goal. "
     return [say(Strong("In short:"), what, *_enough(state), f" {sure} {cost}")]
 
@@ -195,13 +195,13 @@ def in_short(record: Record) -> list[Paragraph]:
 def _enough(state: RunState) -> Iterator[Part]:
     left, whole = state.environment, count(len(state.elements), "model")
     if not left:
-        yield f"Without any of the {whole} of its world it fails, too: look at the robot, its goal and what always stays."
+        yield f"It also fails with all {whole} of its world removed: look at the robot, its goal and what always stays."
         return
     if len(left) == len(state.elements):
-        yield f"Each of the {whole} of its world may have to do with it."
+        yield f"Any of the {whole} in its world may be involved."
         return
     these = "1 is" if len(left) == 1 else f"{len(left)} are"
-    yield f"Of the {whole} of its world, {these} enough to make it fail like that: "
+    yield f"Of the {whole} in its world, {these} enough to make it fail this way: "
     for number, name in enumerate(left[:MOST_NAMES]):
         yield "" if not number else " and " if number == len(left) - 1 else ", "
         yield Name(plain(name))

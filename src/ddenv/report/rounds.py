@@ -47,7 +47,7 @@ def _rounds(record: Record) -> list[Block]:
         own = sum(tests[each.number] for each in some)
         rows.append(_summed(some, own) if number is None else _row(state, some[0], own, number in undone))
     head = ("round", "parts n", "tried", "first similar", "models left", "tests")
-    explained = "A round tries one set of models after the other; the first one that shows f becomes the environment."
+    explained = "A round tries one set of models after another; the first one that shows f becomes the environment."
     if any(_tried(each) and not tests[each.number] for each in rounds):
         explained += " Sets judged before are not tested again."
     return [say(explained), Table(head, tuple(rows), {0, 1, 2, 4, 5})]

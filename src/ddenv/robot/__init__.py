@@ -12,5 +12,5 @@ def check_drake() -> None:
     if find_spec("pydrake") is None:
         raise UserError(
             "the robot runs on Drake, which is not installed here: pip install drake (Linux and macOS); "
-            "lessons, runs and their reports can be looked at without it"
+            "lessons, runs and their reports can be viewed without it"
         )

@@ -49,8 +49,8 @@ def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:
         farthest = max(ways, key=lambda name: ways[name])
         yield (
             "unrest",
-            f"the world is not at rest at the start: {_do(len(ways), 'moves', 'move')} before the robot comes, "
-            f"{farthest} by {ways[farthest]:.2f} m; 'ddenv world settle' writes where all of them come to rest",
+            f"the world is not at rest at the start: {_do(len(ways), 'moves', 'move')} before the robot arrives, "
+            f"{farthest} by {ways[farthest]:.2f} m; 'ddenv world settle' writes the world at rest",
         )
     for about, names, does, do, why in (
         ("restless", settled.restless, "does", "do", f"not come to rest within {settled.seconds:.1f} s"),

@@ -30,8 +30,8 @@ def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
     """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another engine holds it."""
     taken = taken or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
     refused, instead = (
-        f"{run}: no engine can work here",
-        "copy the run to a folder of this machine that you can write to",
+        f"{run}: cannot run an engine here",
+        "copy the run to a folder on this machine that you can write to",
     )
     with held(_lock_path(run), taken, refused, instead, mode_beside(run)):
         yield
@@ -67,7 +67,7 @@ def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) ->
                 time.sleep(0.02)
         except OSError as error:
             raise UserError(
-                f"{refused}: its folder has no file locks ({error.strerror}), as some network folders; {instead}"
+                f"{refused}: its folder has no file locks ({error.strerror}), like some network folders; {instead}"
             ) from None
         yield
     finally:

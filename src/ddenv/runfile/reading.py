@@ -77,7 +77,7 @@ def read(kind: Any, text: str) -> Any:
 
 _PLAINLY = {
     "missing": "is missing",
-    "unexpected_keyword_argument": "is no field of it",
+    "unexpected_keyword_argument": "is not one of its fields",
     "value_error": "should be hexadecimal digits",
 }
 

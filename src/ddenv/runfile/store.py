@@ -135,7 +135,7 @@ def _forget(path: Path) -> None:
     logs = [log for ending in LOGS if (log := path.with_name(f"{path.name}{ending}")).exists()]
     if not logs or path.exists():
         return
-    with engine_lock(path, f"{path}: an engine still works on a deleted run of this name; choose another name"):
+    with engine_lock(path, f"{path}: an engine is still working on a deleted run of this name; choose another name"):
         for log in logs:
             log.unlink(missing_ok=True)
 
@@ -389,7 +389,7 @@ def _object(id: Any, data: Any) -> dict[str, Any]:
     try:
         content = json.loads(data)
     except (ValueError, TypeError, RecursionError):
-        raise UserError(f"damaged run file: entry {id} is no JSON") from None
+        raise UserError(f"damaged run file: entry {id} is not JSON") from None
     if not isinstance(content, dict):
         raise UserError(f"damaged run file: entry {id} is not a JSON object")
     return content
@@ -398,7 +398,7 @@ def _object(id: Any, data: Any) -> dict[str, Any]:
 def _moment(value: Any) -> float:
     """A Unix time, s, that a calendar can show."""
     if type(value) not in (int, float) or not 0 <= value < LATEST:
-        raise UserError("damaged run file: the time of an entry is no date")
+        raise UserError("damaged run file: the time of an entry is not a date")
     return float(value)
 
 
@@ -434,5 +434,5 @@ def _floats(samples: object, path: Path) -> array[float]:
     values.frombytes(samples)
     # What is no number at all is passed over where it is drawn.
     if any(abs(value) > LARGEST for value in values):
-        raise UserError(f"{path}: damaged run file: a trajectory leads too far")
+        raise UserError(f"{path}: damaged run file: a trajectory goes too far")
     return values

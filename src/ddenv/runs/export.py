@@ -55,7 +55,7 @@ def export_world(
         number, value = _margin(state, numbers_of(scenario, world, machine, state.environment), margin, run)
         if scenario_file is None and number in OF_SCENARIO:
             raise UserError(
-                f"--margin: {number} is a number of the scenario, not of the world: give --scenario FILE, too"
+                f"--margin: {number} is a number of the scenario, not of the world: also give --scenario FILE"
             )
         try:
             scenario, world = changed(scenario, world, {number: value})

@@ -19,7 +19,7 @@ FRAME = 0.1
 # No test lasts longer, s, and nothing goes farther in one, m.
 LONGEST, FARTHEST = 1e6, 1e6
 
-ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's way is stored, and models stay where they start."
+ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's path is stored; models stay where they start."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         raise UserError(f"{file.path}: there is no test {number}")
     test = tests[number - 1]
     if not test.is_finished:
-        why = "still runs" if test.outcome == "running" else "was lost"
+        why = "is still running" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
     lacks = [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
     try:

@@ -48,7 +48,7 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes
     try:
         log = _log(log_of(run), run)
     except OSError as error:
-        raise UserError(f"{run}: no engine can work here: its log cannot be written: {error.strerror}") from None
+        raise UserError(f"{run}: cannot run an engine here: its log cannot be written: {error.strerror}") from None
     with log:
         return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
 
@@ -73,7 +73,7 @@ def export_mcap(run: Path, file: Path, stopped: Callable[[], bool]) -> None:
                 _, said = program.communicate(timeout=LOOK)
             if said is None and stopped():
                 program.kill()
-                raise UserError(f"{file}: stopped, nothing is written")
+                raise UserError(f"{file}: stopped; nothing was written")
     if program.returncode:
         raise UserError((said.strip().splitlines() or ["the program ended"])[-1].removeprefix("ddenv: "))
 

@@ -104,7 +104,7 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
 def no_reasons(certificate: Certificate) -> str:
     """Why a finished certificate left out no model, in a sentence."""
     if certificate.claims[0].verdict == "kept":
-        return "Nothing is left that could be left out: there is no model to look at."
+        return "No model is left to leave out, so there is nothing to compare."
     return f"What the robot does without each model is not known, because none was left out: {verdict_on(certificate)}."
 
 
@@ -176,7 +176,7 @@ def sentence(reason: Reason) -> str:
     without = f"Without {reason.without}{others}"
     kind = "chosen run" if reason.exact else "fresh run"
     if not reason.ends:
-        return f"{without}: no {kind} came to an end."
+        return f"{without}: no {kind} ended."
     most, *rarer = reason.ends
     low, high = anytime_interval(most.number, reason.runs)
     interval = "" if reason.exact else f", {percent(low)} to {percent(high)}"
@@ -210,7 +210,7 @@ def parting_sentence(reason: Reason) -> str:
 def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> str:
     """Where two ways part, or why that is not known; then a sentence that begins with `met`, if the robot met `it`."""
     if one is None:
-        return f"Where the ways part is not known: {lacks}." if lacks else ""
+        return f"Where the paths diverge is not known: {lacks}." if lacks else ""
     if one.met is None:
         return _where_they_part(one)
     did = "touches" if one.touched else "senses"
@@ -251,7 +251,7 @@ class Nearest:
     def sentences(self) -> str:
         """All of it in a few sentences."""
         said = f"{self.words[:1].upper()}{self.words[1:]}."
-        met = f"Of what has to go, {first_of((self.first,), 1)} takes part first:"
+        met = f"Of the removed models, {first_of((self.first,), 1)} is the first that can affect the run:"
         return f"{said} {parting_words(self.parting, self.lacks, met)}".rstrip()
 
 

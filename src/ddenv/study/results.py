@@ -143,7 +143,7 @@ def _read(file: RunFile, cell: Cell) -> Result:
         if isinstance(event, BaselineFinished | Reduced | RateLost | LeftOut | Finished):
             sizes.append((len(search), len(state.environment)))
     if not all(0 < number <= len(state.tests) for number in (*search, *fresh)):
-        raise UserError(f"{file.path}: damaged run file: a verdict rests on tests that are not there")
+        raise UserError(f"{file.path}: damaged run file: a verdict relies on tests that are missing")
     tests, fresh_tests = ([state.tests[number - 1] for number in numbers] for numbers in (search, fresh))
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)

@@ -87,7 +87,7 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
     yield say(
         "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
         "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, and "
-        "stops when no single model can be left out. Runs with fresh seeds then show what that is worth: it is certified if "
+        "stops when no single model can be left out. Runs with fresh seeds then check the result: it is certified if "
         f"it keeps at least {' or '.join(map(percent, shares))} of the whole world's failure rate, and less without any one "
         "of its models."
     )
@@ -98,7 +98,7 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         hours = sum(paper.minutes for _, paper in beside) / 60
         ours, more = (duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES)
         yield say(
-            f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
+            f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, no more "
             f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, and the certificates {more}. "
             "The worlds and the simulator differ from the paper's: compare the methods with each other."
         )
@@ -236,5 +236,5 @@ def _computed(results: Sequence[Result]) -> Iterator[Block]:
     if taken:
         yield say(
             f"{thousands(taken)} tests were reused from another cell with the same models and the same seed: the simulation is "
-            "deterministic to the last bit. They count in each cell, with their time."
+            "deterministic to the last bit. They count in each cell, including their time."
         )

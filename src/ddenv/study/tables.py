@@ -106,7 +106,7 @@ def worlds(folder: Path, rows: Sequence[Row], file: str) -> Iterator[Block]:
         yield say(f"{what} (the paper's Figure 3){of_them}: ", *these, ".")
         yield _map(folder, results[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
     if len(ranked) > MOST_WORLDS:
-        yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')}, which fewer cells found.")
+        yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')} that fewer cells found.")
 
 
 def _map(folder: Path, result: Result, name: str) -> Block:
@@ -193,7 +193,7 @@ def _behind(row: Row) -> Iterator[tuple[str, Cell]]:
     yield "f in what is left", _rate(left)
     yield "f without one of them", f"at most {_rate([(without.shown, without.runs)])}" if without else "–"
     yield "steps back", spread([result.steps_back for result in row.over], _whole)
-    yield "least tests", "–" if row.bound is None else f"{row.bound:g}"
+    yield "fewest tests", "–" if row.bound is None else f"{row.bound:g}"
 
 
 def _rate(parts: Sequence[tuple[int, int]]) -> str:

@@ -70,7 +70,7 @@ class Drive:
         if isinstance(command, WheelSpeeds):
             unknown = set(command.speeds) - set(self.joints)
             if unknown:
-                raise ValueError(f"'{min(unknown)}' is no wheel; wheels are {', '.join(self.joints)}")
+                raise ValueError(f"'{min(unknown)}' is not a wheel; wheels are {', '.join(self.joints)}")
             return np.asarray(np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs)
         difference = command.turn_rate / skid * self.track / 2
         left, right = (command.speed - difference) / self.radius, (command.speed + difference) / self.radius
@@ -92,7 +92,7 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
         where = f"robot '{robot.name}': joint '{joint.name}'"
         if abs(part) < ACROSS:
             hint = "; name the driven wheels in robot.wheels" if wheels is None else ""
-            raise UserError(f"{where} is no wheel: its axis is not across the robot{hint}")
+            raise UserError(f"{where} is not a wheel: its axis does not run across the robot{hint}")
         if joint.effort == 0.0:
             raise UserError(f"{where} is a wheel with an effort limit of 0; set one in N m")
     left = [_side(robot, joint) for joint in joints if sides[joint.name]]

@@ -91,11 +91,11 @@ class Lidar(Section):
     straight ahead.
     """
 
-    rate: Positive = Field(default=10.0, description="scans a second, Hz")
+    rate: Positive = Field(default=10.0, description="scan rate, Hz")
     beams: int = Field(default=541, ge=2, le=10_000)
     angle: Positive = Field(default=math.radians(270), le=math.tau, description="field of view, rad")
-    range: Positive = Field(default=20.0, description="nothing beyond is measured, m")
-    nearest: NotNegative = Field(default=0.05, description="nothing nearer is measured, m")
+    range: Positive = Field(default=20.0, description="maximum range, m")
+    nearest: NotNegative = Field(default=0.05, description="minimum range, m")
     noise: NotNegative = Field(default=0.01, description="standard deviation of a range, m")
     x: Coordinate = 0.30
     y: Coordinate = 0.0
@@ -121,9 +121,9 @@ class Sensors(Section):
         default=0.0, description="how far the robot sees models, m; 0: it only feels what it touches"
     )
     view_angle: Positive = Field(default=math.tau, le=math.tau, description="field of view about its heading, rad")
-    compass_rate: Positive = Field(default=10.0, description="readings a second, Hz")
-    imu_rate: Positive = Field(default=20.0, description="readings a second, Hz")
-    odometry_rate: Positive = Field(default=20.0, description="readings a second, Hz")
+    compass_rate: Positive = Field(default=10.0, description="reading rate, Hz")
+    imu_rate: Positive = Field(default=20.0, description="reading rate, Hz")
+    odometry_rate: Positive = Field(default=20.0, description="reading rate, Hz")
     lidar: Lidar | None = Field(default=None, description="a robot without one is blind")
 
 
@@ -131,16 +131,14 @@ class Planner(Section):
     """How the controller `costmap` finds its way, as move_base does: a map of what the lidar sees rolls along with the robot."""
 
     size: float = Field(default=12.0, ge=4, le=100, description="length and width of the map, m")
-    resolution: float = Field(default=0.1, ge=0.02, le=0.5, description="of the map, m")
-    padding: NotNegative = Field(default=0.05, description="kept free around the robot, m")
-    inflation: NotNegative = Field(default=0.6, description="how far from obstacles they still cost, m")
-    look_ahead: Positive = Field(default=0.8, description="how far ahead on its plan the robot aims, m")
-    replan: Positive = Field(default=2.0, description="longest time between two plans, s")
+    resolution: float = Field(default=0.1, ge=0.02, le=0.5, description="cell size of the map, m")
+    padding: NotNegative = Field(default=0.05, description="clearance kept around the robot, m")
+    inflation: NotNegative = Field(default=0.6, description="distance within which obstacles add cost, m")
+    look_ahead: Positive = Field(default=0.8, description="look-ahead distance on the plan, m")
+    replan: Positive = Field(default=2.0, description="maximum time between two plans, s")
     patience: Positive = Field(default=4.0, description="time without progress before the robot tries to recover, s")
     recoveries: int = Field(default=6, ge=0, description="attempts to recover in a row before the robot gives up")
-    lowest: Coordinate = Field(
-        default=0.1, description="what is seen lower than this above where the robot stands is no obstacle, m"
-    )
+    lowest: Coordinate = Field(default=0.1, description="minimum height of an obstacle above where the robot stands, m")
 
 
 class Controller(Section):
@@ -153,16 +151,16 @@ class Controller(Section):
     use: str = Field(default="straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
     options: dict[str, Any] = {}
     period: Positive = Field(default=0.05, description="time between two commands, s; a whole number of time steps")
-    speed: Positive = Field(default=1.0, description="greatest forward speed, m/s")
-    acceleration: Positive = Field(default=1.0, description="greatest growth of the forward speed, m/s^2")
-    turn_rate: Positive = Field(default=1.0, description="greatest commanded turn rate, rad/s")
-    heading_gain: Positive = Field(default=1.5, description="turn rate for an error of the heading, 1/s")
+    speed: Positive = Field(default=1.0, description="maximum forward speed, m/s")
+    acceleration: Positive = Field(default=1.0, description="maximum forward acceleration, m/s^2")
+    turn_rate: Positive = Field(default=1.0, description="maximum commanded turn rate, rad/s")
+    heading_gain: Positive = Field(default=1.5, description="turn rate per heading error, 1/s")
     skid: Positive = Field(
-        default=0.48, le=1, description="part of a commanded turn that is carried out; 1 without skidding"
+        default=0.48, le=1, description="share of a commanded turn that is carried out; 1 without skidding"
     )
-    motor_gain: Positive = Field(default=30.0, description="wheel torque for an error of its speed, N m s/rad")
+    motor_gain: Positive = Field(default=30.0, description="wheel torque per wheel speed error, N m s/rad")
     planner: Planner = Planner()
-    answer_within: Positive = Field(default=1.0, description="real time that an own controller has for a command, s")
+    answer_within: Positive = Field(default=1.0, description="real time that your own controller has for a command, s")
 
 
 def _with_as_printed(schema: dict[str, Any]) -> None:
@@ -253,7 +251,7 @@ class Oracle(Section):
 
     command: str | None = Field(default=None, min_length=1)
     use: str | None = Field(default=None, pattern=r"^[\w.]+:\w+$")
-    name: str = Field(default="", max_length=40, description="what results call it")
+    name: str = Field(default="", max_length=40, description="its name in results")
     folder: Path | None = Field(
         default=None, description="where the command starts or the module lies, if not in the scenario's folder"
     )
@@ -297,9 +295,9 @@ class Scenario(Section):
     goal: Goal
     sensors: Sensors = Sensors()
     controller: Controller = Controller()
-    oracle: Oracle | None = Field(default=None, description="another simulator than Drake")
+    oracle: Oracle | None = Field(default=None, description="a simulator other than Drake")
     failure: FailureSpec = FailureSpec()
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()
     protected: tuple[str, ...] = Field(default=(), description="models that always stay")
-    whole: Whole | None = Field(default=None, description="of the world that this one is a part of")
+    whole: Whole | None = Field(default=None, description="the world that this one is a part of")

@@ -166,7 +166,7 @@ class ClusterPool:
         for address in list(self._workers):
             self._gone(address)
         self._news.append(
-            f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. To go on without it, stop the run, "
+            f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. To continue without it, stop the run "
             "and resume it with --cluster here"
         )
 
@@ -174,7 +174,7 @@ class ClusterPool:
         gone = [address for address in self._workers if address not in threads]
         lost = sum(self._gone(address) for address in gone)
         if gone:
-            again = f"; {count(lost, 'test')} made again elsewhere" if lost else ""
+            again = f"; {count(lost, 'test')} repeated elsewhere" if lost else ""
             self._news.append(f"{count(len(gone), 'worker')} left the cluster{again}")
         new = [_Worker(address, threads[address]) for address in threads if address not in self._workers]
         for worker in new:
@@ -182,11 +182,11 @@ class ClusterPool:
             self._ask(worker)
         if new:
             first = (
-                ": first the whole world once, as it is made here, to compare the bits"
+                ": each first runs the whole world once, to compare the bits with ours"
                 if self._home is not None
                 else ""
             )
-            self._news.append(f"{count(len(new), 'worker')} came to the cluster{first}")
+            self._news.append(f"{count(len(new), 'worker')} joined the cluster{first}")
 
     def _gone(self, address: str) -> int:
         """Forgets a worker; returns how many of its tests have to be made again."""
@@ -262,7 +262,7 @@ class ClusterPool:
         if isinstance(answer, CancelledError | KilledWorker):
             return
         if isinstance(answer, BaseException):
-            self._leave_out(worker, f"it cannot make tests: {reason_of(answer)}")
+            self._leave_out(worker, f"it cannot run tests: {reason_of(answer)}")
             return
         worker.hello, run = answer
         self._greeted.append((worker, run))
@@ -281,14 +281,14 @@ class ClusterPool:
         self._greeted.clear()
 
     def _leave_out(self, worker: _Worker, why: str) -> None:
-        self._news.append(f"worker {worker.name} is left out: {why}")
+        self._news.append(f"worker {worker.name} is not used: {why}")
 
     def _say(self) -> None:
         """Tells what has changed."""
         if self._room != self._said:
             workers = sum(worker.accepted for worker in self._workers.values())
             tests = count(self._room, "test")
-            self._news.append(f"{count(workers, 'worker')} of the cluster can make {tests} at the same time")
+            self._news.append(f"{count(workers, 'worker')} of the cluster can run {tests} at the same time")
         if self._news:
             self._said = self._room
             self._tell(self._room, "; ".join(self._news))
@@ -340,14 +340,14 @@ def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | No
     Without a run `here` to compare with, only the version of ddenv counts.
     """
     if hello.version != __version__:
-        return f"it has ddenv {hello.version}, here is ddenv {__version__}"
+        return f"it has ddenv {hello.version}; this machine has ddenv {__version__}"
     if here is None:
         return ""
     if isinstance(there, Broken):
         return f"its first run of the whole world broke: {there.failure}"
     if there is None or not _same_bits(there, here):
         theirs, ours = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
-        return f"its first run of the whole world has other bits than here; it has {theirs}; here is {ours}"
+        return f"its first run of the whole world differs from ours; it has {theirs}; this machine has {ours}"
     return ""
 
 

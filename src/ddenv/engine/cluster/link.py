@@ -46,7 +46,7 @@ class Link:
         except Exception as error:
             self._end()
             raise UserError(
-                f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, or make the tests on this "
+                f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, or run the tests on this "
                 "machine with --cluster here"
             ) from None
         self._thread = threading.Thread(target=self._follow, daemon=True)

@@ -253,7 +253,7 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
         return spatial_inertia(link.inertia, link.pose)
     together = held_with(model, link.name)
     if not any(one.inertia is not None for one in model.links if one.name in together):
-        why = "has no <inertial>, nor has any that is fixed to it"
+        why = "has no <inertial>, and neither has any link fixed to it"
         raise ValueError(f"link '{link.name}' of the moving model '{model.name}' {why}")
     return SpatialInertia.Zero()
 

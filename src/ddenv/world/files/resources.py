@@ -252,7 +252,7 @@ def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
     """`rest` is HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE]: a model that was downloaded from Fuel before."""
     words = rest.split("/")
     if words[0].lower() not in HOSTS or len(words) < 5 or words[3] != "models" or not (words[2] and words[4]):
-        raise Missing("is not downloaded; name a file or folder of this machine instead")
+        raise Missing("is not downloaded; name a file or folder on this machine instead")
     if any(word in (".", "..") for word in words):
         raise Unusable(CLIMBS if ".." in words else "names no file")
     owner, name, tail = words[2], words[4], words[5:]

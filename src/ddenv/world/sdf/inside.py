@@ -46,7 +46,7 @@ def _closed(model: Model, element: Element) -> str:
     if not model.static:
         return "it can move"
     if element.tag == "include" or element.find(".//include") is not None:
-        return "other files have parts of it; 'ddenv world convert' writes them out"
+        return "parts of it are in other files; 'ddenv world convert' writes them into one"
     return ""
 
 

@@ -126,9 +126,7 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in numbers):
             near = nearest(glob, list(numbers))
-            raise UserError(
-                f"--number: there is no number '{glob}'{near}; one is such as {', '.join(list(numbers)[:3])}"
-            )
+            raise UserError(f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}")
     return [one for name, one in numbers.items() if not globs or any(fnmatchcase(name, glob) for glob in globs)]
 
 
@@ -242,7 +240,7 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
         raise NotPossible(str(error)) from None
     found = _of_model(after, after.model(owner), what)
     if found is None or not math.isclose(found, value, rel_tol=1e-6, abs_tol=1e-6):
-        raise NotPossible(f"the world's text does not say the {what} of {owner} in a way that can be changed")
+        raise NotPossible(f"the world file does not give the {what} of {owner} in a form that can be changed")
     return after
 
 
