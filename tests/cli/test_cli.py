@@ -256,7 +256,7 @@ MISTAKES = {
     "nearly an option": (["run", WALL, "--sped", "1"], "Did you mean '--seed'?; see"),
     "unlike any option": (["world", "check", WALL, "--spawn", "1"], "No such option '--spawn'; see"),
     "endless": (["run", WALL, "--timeout", "1e300"], "--timeout: expected 0.01 to 100000, found 1e+300"),
-    "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "no number may be beyond"),
+    "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "no number may exceed"),
     "unknown command": (["certfy"], "no command, run, scenario or world 'certfy' (did you mean certify?)"),
     "missing world": (["depot.world"], "ddenv: depot.world: no such file"),
     "missing world to open": (["open", "depot.world"], "ddenv: depot.world: no such file"),

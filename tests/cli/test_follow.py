@@ -23,5 +23,5 @@ def test_where_nobody_reads_any_more_it_says_that_the_engine_goes_on_and_how_to_
     engine = SimpleNamespace(pid=77, poll=lambda: run.write("paused"))
     with pytest.raises(BrokenPipeError):
         follow(run.path, engine, as_json=False)
-    assert f"the engine goes on with {run.path}" in (said := capsys.readouterr().err)
+    assert f"the engine keeps working on {run.path}" in (said := capsys.readouterr().err)
     assert "'kill 77' stops it" in said

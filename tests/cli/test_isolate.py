@@ -32,7 +32,7 @@ def test_one_that_was_stopped_goes_on(run, started, monkeypatch, capsys):
     done = in_process(monkeypatch, capsys, "isolate", run.path, "--jobs", 1)
     assert started == [(run.path, 1, {"isolate": 0, "cluster": None})]
     # No engine works here.
-    stopped = f"the search for a world that passes was stopped; go on with: ddenv isolate {run.path}"
+    stopped = f"the search for a world that passes was stopped; continue with: ddenv isolate {run.path}"
     assert (done.returncode, done.stderr) == (2, f"ddenv: {run.path}: {stopped}\n")
 
 

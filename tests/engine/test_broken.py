@@ -136,8 +136,8 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
     done = _resume(run)
     assert done.returncode == 2
     assert done.stderr == (
-        f"ddenv: {MOST_BROKEN} tests in a row broke, the last one: the command's exit code is 2, neither 0 nor 1: no display; "
-        f"fix this and continue with 'ddenv resume {run}' (these tests are then made again)\n"
+        f"ddenv: {MOST_BROKEN} tests in a row broke; the last one: the command's exit code is 2, neither 0 nor 1: no display; "
+        f"fix this and continue with 'ddenv resume {run}' (it repeats these tests)\n"
     )
     state = state_of(run)
     assert state.status == "failed"
@@ -166,4 +166,4 @@ def test_where_all_of_the_baseline_breaks_there_is_nothing_to_reduce(tmp_path):
     create_trusted(own_scenario(tmp_path, "import sys; print('no licence', file=sys.stderr); sys.exit(7)"), run)
     done = _resume(run)
     assert done.returncode == 1
-    assert "no baseline run came to its end: the command's exit code is 7, neither 0 nor 1: no licence" in done.stdout
+    assert "no baseline run finished: the command's exit code is 7, neither 0 nor 1: no licence" in done.stdout

@@ -104,7 +104,7 @@ def test_a_simulator_that_does_not_repeat_is_refused(tmp_path):
     pool = FakePool(lambda keep, seed: "similar", 2)
     # Each run ends a hair to the side of the last one: within epsilon of f, but not the same.
     pool.aside = lambda keep, seed: 1e-9 * len(pool.made)
-    with pytest.raises(UserError, match=r"accept_rate: exact needs runs that repeat, and run 1 of the whole world"):
+    with pytest.raises(UserError, match=r"accept_rate: exact needs runs that repeat, but run 1 of the whole world"):
         drive(exact_run(tmp_path), pool)
 
 
@@ -139,5 +139,5 @@ def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_pat
 
     assert "rare" not in notes(7)
     words = notes(5)["rare"]
-    assert words.startswith("f shows in 5 of 10 runs: to keep its rate takes about ")
+    assert words.startswith("f shows in 5 of 10 runs: keeping its rate takes about ")
     assert words.endswith("accept_rate exact (--exact)")

@@ -69,7 +69,7 @@ def test_workers_that_die_before_they_run_a_test_end_the_engine_with_the_reason(
     pool = Pool(*parts(), 1, dies_at_once)
     try:
         pool.submit(1, Run(EVERYTHING, 0))
-        with pytest.raises(UserError, match=r"die before they run a test: .*SIGKILL, perhaps for lack of memory"):
+        with pytest.raises(UserError, match=r"die before they run a test: .*SIGKILL, perhaps out of memory"):
             result(pool)
     finally:
         pool.close()
@@ -158,8 +158,8 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     before, after = (fold(written[: kinds.index("noted") + more]) for more in (0, 1))
     said = news("noted", before, after)
     assert said.startswith(
-        "this world is slow: 0.25 s simulated in each second; at this rate a test of 5 s takes 20 s; "
-        "what helps: fewer models that can move"
+        "this world is slow: 0.25 s simulated per second; at this rate a test of 5 s takes 20 s; "
+        "try fewer models that can move"
     )
     # The report keeps it.
     assert said[1:] in str(content(read_run(path)).lead)

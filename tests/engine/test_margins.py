@@ -156,7 +156,7 @@ def test_what_is_wrong_is_said_in_one_line(path):
     broken = fake()
     broken.changed = lambda *_: "error"
     before = state_of(path)
-    with pytest.raises(UserError, match="25 runs in a row broke, the last one: it broke"):
+    with pytest.raises(UserError, match="25 runs in a row broke; the last one: it broke"):
         work(path, broken)
     with RunFile(path) as file:
         file.own()

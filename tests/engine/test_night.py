@@ -227,7 +227,7 @@ def test_a_folder_in_which_no_engine_can_work_is_told_in_one_line(tmp_path, monk
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(f"ddenv.runfile.lock.{call}", refuse)
-    with pytest.raises(UserError, match=f"no engine can work here: {words}"), engine_lock(path):
+    with pytest.raises(UserError, match=f"cannot run an engine here: {words}"), engine_lock(path):
         pass
     assert not engine_is_alive(path)
 

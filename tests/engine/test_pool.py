@@ -107,7 +107,7 @@ def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(p
     pool.submit(1, Run(EVERYTHING, 0))
     wait_until(lambda: pool.finished(0.0) or pool.live())
     os.kill(next(slot.worker.pid for slot in pool._slots if slot.job), signal.SIGKILL)
-    died = "the simulator's process died (SIGKILL, perhaps for lack of memory)"
+    died = "the simulator's process died (SIGKILL, perhaps out of memory)"
     assert result(pool) == (1, Broken("error", died))
     pool.submit(2, Run(EVERYTHING, 0))
     test, after = result(pool)

@@ -57,7 +57,7 @@ def test_a_worker_keeps_its_object_until_a_test_breaks_and_leaves_no_file(pool, 
     assert broken == {
         1: Broken("error", "simulator Mine: run raised ValueError: no more (mine.py:15)"),
         2: Broken("timeout", "took longer than 1 s of wall clock"),
-        3: Broken("error", "the simulator's process died (SIGKILL, perhaps for lack of memory)"),
+        3: Broken("error", "the simulator's process died (SIGKILL, perhaps out of memory)"),
     }
     places = [one.end_pose[:2] for seed, one in made.items() if seed not in broken]
     assert [runs for _, runs in places] == [1, 2, 1, 1, 1]

@@ -79,7 +79,7 @@ def test_with_other_bits_no_test_is_made_until_the_user_has_chosen(begun, monkey
     # A second engine does not trust the first one, which was refused.
     for _ in range(2):
         with pytest.raises(
-            UserError, match=r"gives another trajectory: the tests were made with ddenv .*drake"
+            UserError, match=r"gives a different trajectory: the tests were made with ddenv .*drake"
         ) as refused:
             resumed(begun)
         assert f"'ddenv resume {begun} --mixed'" in str(refused.value) and "\n" not in str(refused.value)

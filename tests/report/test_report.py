@@ -95,7 +95,7 @@ def rows_of(run, title):
 def test_a_certificate_that_was_stopped_says_what_it_has_shown(run):
     fake_moments.certifying(run).write("engine_stopped", reason="stopped by the user")
     text = markdown(content(read_run(run.path)), "a")
-    assert "Its certificate is not finished: what its runs have shown by now holds all the same." in text
+    assert "Its certificate is not finished: what its runs have shown so far still holds." in text
     assert "| what is left | 12 | 11 | keeps at least 49 % of the rate |" in text
 
 
@@ -109,13 +109,13 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
     report = content(read_run(run.path))
     # How long it took to write its events depends on the machine.
     assert re.sub(r"\d+ s of", "0 s of", "".join(map(words, report.lead[0].parts))) == (
-        "In short: The robot got stuck before it reached its goal. Of the 11 models of its world, 2 are enough to make it "
-        "fail like that: crate_00 and crate_01. It failed so in 23 of 23 new runs with nothing else there (80 % to 100 % of "
+        "In short: The robot got stuck before it reached its goal. Of the 11 models in its world, 2 are enough to make it "
+        "fail this way: crate_00 and crate_01. It failed so in 23 of 23 new runs with nothing else there (80 % to 100 % of "
         "all runs, with 95 % confidence); without any one of them in at most 1 of 12 (at most 48 %). This took 83 simulated "
-        "runs and 0 s of computing."
+        "runs and 0 s of computing time."
     )
     titles = [section.title for section in report.sections]
-    first = ["The minimal environment", "What it is worth", "Why it fails", "How it got there"]
+    first = ["The minimal environment", "What the result is worth", "Why it fails", "How it got there"]
     assert [title for title in titles if title in first] == first
     rows = rows_of(run, "model")
     assert rows[0] == ("crate_00", "static", "-4.50, 0.00, 0.15", "1.20 × 0.80 × 0.30")
@@ -174,7 +174,7 @@ def test_other_failures_have_names_numbers_and_the_smallest_environment(run):
         ("fell at (3.00, 1.40)", "1.41", "2", "11 models (test 4)"),
         ("tipped over at (2.00, 0.40)", "0.00", "2", "6 models (test 7)"),
     ]
-    seen = next(block for block in sections["How sure it is"] if isinstance(block, Table))
+    seen = next(block for block in sections["How certain it is"] if isinstance(block, Table))
     assert seen.rows == (("1", "stuck at (2.00, 0.40)", "3"), ("2", "fell at (3.00, 1.40)", "2"))
     assert seen.strong == {0}
 
@@ -182,12 +182,12 @@ def test_other_failures_have_names_numbers_and_the_smallest_environment(run):
 def test_settings_that_were_changed_on_the_way(run):
     run.created().baseline().write("changed", settings={"iterations": 7})
     rows = {row[0]: row[1] for row in rows_of(run, "setting")}
-    assert rows["iterations"] == "7 (changed during the run; at first 3)"
+    assert rows["iterations"] == "7 (changed during the run; initially 3)"
 
 
 STATES = {
     "Not started yet": lambda run: run,
-    "The engine is gone": lambda run: run.created(),
+    "The engine is not running": lambda run: run.created(),
     "Stopped: as you asked.": lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
     "The engine could not go on: no disk.": lambda run: run.created().write("engine_failed", reason="no disk"),
     "No failure is known yet": lambda run: run.created().write("finished", minimal=False, reason="no run failed"),

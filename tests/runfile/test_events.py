@@ -79,7 +79,7 @@ def test_a_field_that_is_missing_is_named(written):
 def test_a_field_that_nobody_knows_is_named(written):
     for kind, event in written.items():
         wrong = complaint(kind, plain(event) | {"nob\x1bdy": 1})
-        assert wrong == f"damaged run file: event 7 ({kind}): 'nob\\x1bdy': is no field of it"
+        assert wrong == f"damaged run file: event 7 ({kind}): 'nob\\x1bdy': is not one of its fields"
 
 
 def test_a_number_that_cannot_be_is_named(written):
@@ -139,10 +139,10 @@ def test_all_before_a_damaged_event_is_read(tmp_path):
     raw(run.file, "paused", {"x": 1})
     run.write("resumed")
     state = RunState()
-    with pytest.raises(UserError, match=r"\(paused\): x: is no field of it"):
+    with pytest.raises(UserError, match=r"\(paused\): x: is not one of its fields"):
         for one in run.file.read():
             state = apply(state, one)
     assert state == before
-    with pytest.raises(UserError, match="is no field of it"):
+    with pytest.raises(UserError, match="is not one of its fields"):
         run.file.events()
     run.close()

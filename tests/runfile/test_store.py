@@ -100,7 +100,7 @@ def test_a_new_run_has_nothing_of_a_deleted_one_that_was_killed(path):
 
 def test_a_deleted_run_is_not_replaced_while_its_engine_works(path):
     logs = _killed(path)
-    with engine_lock(path), pytest.raises(UserError, match="an engine still works on a deleted run of this name"):
+    with engine_lock(path), pytest.raises(UserError, match="an engine is still working on a deleted run of this name"):
         create(path, {}, CREATED)
     assert not path.exists()
     assert all(log.exists() for log in logs)

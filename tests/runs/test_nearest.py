@@ -47,7 +47,7 @@ def test_where_trajectories_are_damaged_the_rest_is_said(run):
     found = read(run.path)[1]
     assert (found.gone, found.shown, found.parting) == (("crate_00",), True, None)
     assert found.sentences.startswith("A nearest world that passes lacks 1 model")
-    assert "Where the ways part is not known: " in found.sentences
+    assert "Where the paths diverge is not known: " in found.sentences
     assert found.lacks in found.sentences
 
 

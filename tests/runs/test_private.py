@@ -53,6 +53,6 @@ def test_without_a_log_no_engine_starts_but_the_scene_is_shown(tmp_path, started
     path = new_run(tmp_path)
     for ending in (".log", ".scene.log"):
         (tmp_path / f"{path.name}{ending}").mkdir()
-    with pytest.raises(UserError, match="no engine can work here: its log cannot be written"):
+    with pytest.raises(UserError, match="cannot run an engine here: its log cannot be written"):
         programs.start_engine(path, 1)
     programs.start_scene(path)

@@ -151,5 +151,5 @@ def test_messages_that_are_being_written_can_be_stopped(tmp_path, monkeypatch):
     slow.chmod(0o755)
     monkeypatch.setattr("sys.executable", str(slow))
     looks = iter([False, False, True])
-    with pytest.raises(UserError, match="stopped, nothing is written"):
+    with pytest.raises(UserError, match="stopped; nothing was written"):
         export_mcap(tmp_path / "a.ddenv", tmp_path / "a.mcap", lambda: next(looks))

@@ -118,7 +118,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     if state.status == "finished" and not state.certified:
         found = current(state)
         helps = () if found is None else helping(found)
-        what = f"environment, {f'minimal except for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
+        what = f"environment, {f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""

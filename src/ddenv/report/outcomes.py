@@ -150,7 +150,7 @@ def others_met(record: Record) -> Section | None:
     table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), {1, 2})
     more = len(found) - MOST
     rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []
-    return Section("Other failures seen", (lead, table, *rest))
+    return Section("Other failures met", (lead, table, *rest))
 
 
 def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:

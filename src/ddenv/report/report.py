@@ -87,7 +87,7 @@ def _standing(record: Record) -> Paragraph:
     title, words = {
         "finished": ("Not shown to be minimal:", f" {why or 'no reason is known'}."),
         "stopped": ("Stopped", f"{reason}. This report shows what was known then."),
-        "failed": ("The engine could not continue", f"{reason}."),
+        "failed": ("The engine could not go on", f"{reason}."),
         "created": ("Not started yet:", " no test has been made."),
     }.get(state.status, ("This run has not ended.", f" This report shows what was known{at}."))
     if not (state.ended or state.status == "created" or record.alive):

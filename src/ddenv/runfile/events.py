@@ -130,7 +130,7 @@ class EngineStopped(Event):
 
 
 class EngineFailed(Event):
-    """The engine could not continue."""
+    """The engine could not go on."""
 
     reason: str
 

@@ -73,7 +73,7 @@ def test_two_workers_come_to_the_end_of_one_here(cluster, home):
     cluster.start_worker(), cluster.start_worker()
     run = home / "there.ddenv"
     ended(start(DATA / "wall.yaml", run, "--cluster", cluster.address))
-    until_said(run, "2 workers of the cluster can make 2 tests")
+    until_said(run, "2 workers of the cluster can run 2 tests")
     check_same(run, here(DATA / "wall.yaml", home / "here.ddenv"))
 
 
@@ -86,7 +86,7 @@ def test_a_test_whose_worker_is_killed_is_made_elsewhere(cluster, held, home):
     program = start(held.file, run, "--cluster", cluster.address)
     wait_until(lambda: len(held.begun()) >= 2, lambda: said(run))
     cluster.kill(workers[0])
-    until_said(run, "1 test made again elsewhere")
+    until_said(run, "1 test repeated elsewhere")
     held.let_go()
     ended(program)
     check_same(run, here(held.file, home / "here.ddenv"))
@@ -140,7 +140,7 @@ def test_a_worker_with_other_bits_is_left_out_by_name(cluster, home, tmp_path):
     assert not state_of(run).tests
     cluster.start_worker()
     ended(program)
-    assert "1 worker of the cluster can make 1 test" in said(run)
+    assert "1 worker of the cluster can run 1 test" in said(run)
     check_same(run, here(DATA / "wall.yaml", home / "here.ddenv"))
 
 

@@ -30,7 +30,7 @@ def test_what_falls_and_what_rests_is_told_apart(world_of, add, template):
     assert (settled.restless, settled.broken) == ((), ())
     words = dict(notes_on(world, settled))
     assert words["unrest"].startswith(
-        "the world is not at rest at the start: 1 model moves before the robot comes, falls by 1.0"
+        "the world is not at rest at the start: 1 model moves before the robot arrives, falls by 1.0"
     )
 
 

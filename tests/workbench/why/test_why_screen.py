@@ -123,7 +123,7 @@ async def test_damaged_trajectories_are_told_and_the_rest_is_shown(run):
         screen = await opened(session)
         said = words(screen, "#why-said")
         assert "Without crate_00 the robot reaches its goal" in said
-        assert "Where the ways part is not known" in said and "has no trajectory" in said
+        assert "Where the paths diverge is not known" in said and "has no trajectory" in said
         await session.press("enter")
         assert isinstance(session.app.screen, WhyScreen)
 

@@ -282,7 +282,7 @@ REFUSED = {
     '- add_weld: {parent: world, child: "a\\nb\\e[2J"}': "2: there is no frame 'a",
     "- add_model: {name: [a": "not valid YAML",
     "- " * 2000 + "x": "nested too deeply",
-    "- add_model: {name: a, name: b, file: x}": "2: not valid YAML: a key stands twice",
+    "- add_model: {name: a, name: b, file: x}": "2: not valid YAML: a key occurs twice",
     "- add_model: {name: a, file: package://things/room.dmd.yaml}": "not well-formed XML",
 }
 
