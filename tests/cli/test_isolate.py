@@ -43,7 +43,7 @@ def test_one_that_was_interrupted_can_be_given_up(run, started, monkeypatch, cap
     run.write("isolation_given_up")
     assert (run.state.status, run.state.certified) == ("finished", True)
     again = in_process(monkeypatch, capsys, "isolate", run.path, "--give-up")
-    is_one_line(again, "none to give up")
+    is_one_line(again, "nothing to give up")
     assert len(started) == 1
 
 

@@ -71,7 +71,7 @@ def test_what_cannot_be_is_refused_in_one_line(run, started, monkeypatch, capsys
         (["--sdf", "a.sdf", "--margin", "crate_01.y"], "no value of crate_01.y is known"),
         (["--sdf", "a.sdf", "--margin", "crate_01.y=far"], "expected NAME=NUMBER"),
         (["--sdf", "a.sdf", "--margin", "crate_00.friction=-1"], "friction must not be negative"),
-        (["--sdf", "a.sdf", "--margin", "spawn.x=1"], "give --scenario FILE, too"),
+        (["--sdf", "a.sdf", "--margin", "spawn.x=1"], "also give --scenario FILE"),
         (["--sdf", "a.sdf", "--margin", "crate_01.y=1", "--passes"], "give one of them"),
     ):
         is_one_line(in_process(monkeypatch, capsys, "export", run.path, *words), why)
@@ -109,7 +109,7 @@ def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, capsys):
     monkeypatch.setattr("ddenv.cli.follow.follow", interrupted)
     done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_00.y", "--budget", 50)
     assert done.returncode == 130
-    assert f"go on with: ddenv margins {run.path}\n" in done.stderr
+    assert f"continue with: ddenv margins {run.path}\n" in done.stderr
     asked = []
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **more: asked.append(more))
     in_process(monkeypatch, capsys, "margins", run.path)

@@ -142,7 +142,7 @@ def test_a_run_at_work_is_checked_and_copied_whole(run):
         file.own()
         file.append(AcceptModeChanged("ask"))
         found = {finding.what: finding for finding in run_health(run)}
-        assert found["engine"].says == "at work" and found["log"].state == "ok"
+        assert found["engine"].says == "running" and found["log"].state == "ok"
         repair(run, run.parent / "copy.ddenv")
         events = file.events()
     with RunFile(run.parent / "copy.ddenv") as copy:

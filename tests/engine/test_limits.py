@@ -158,7 +158,7 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     before, after = (fold(written[: kinds.index("noted") + more]) for more in (0, 1))
     said = news("noted", before, after)
     assert said.startswith(
-        "this world is slow: 0.25 s simulated per second; at this rate a test of 5 s takes 20 s; "
+        "this world is slow: 0.25 s simulated per second; at this rate a 5 s test takes 20 s; "
         "try fewer models that can move"
     )
     # The report keeps it.
@@ -182,7 +182,7 @@ def test_a_world_whose_runs_all_take_too_long_is_given_up_soon(tmp_path):
 
     path, pool = new_run(tmp_path, baseline_runs=10), Late(needs("wall"), 1)
     with pytest.raises(
-        UserError, match=r"3 runs of the whole world took longer than 1800 s .*, and none has ended; what helps"
+        UserError, match=r"3 runs of the whole world took longer than 1800 s .*, and none has ended; try fewer"
     ):
         drive(path, pool)
     assert len(pool.made) == MOST_LATE

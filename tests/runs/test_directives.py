@@ -91,7 +91,10 @@ def test_what_is_left_is_directives_again_and_the_run_file_needs_no_other_file(h
 def test_directives_are_worlds_on_the_command_line(hall, monkeypatch, capsys):
     assert named_file(str(hall)) == ("world", hall)
     said = in_process(monkeypatch, capsys, "world", "check", hall)
-    assert (said.returncode, "3 can be removed; welded, so they are removed together: lamp to table;" in said.stdout) == (
+    assert (
+        said.returncode,
+        "3 can be removed; welded, so they are removed together: lamp to table;" in said.stdout,
+    ) == (
         0,
         True,
     )

@@ -90,7 +90,7 @@ def test_a_run_without_trajectories_says_so(run):
 def test_of_another_simulator_only_the_robot_moves_and_it_says_so(tmp_path):
     data = fake_run.scenario() | {"oracle": {"command": "true"}}
     run = fake_moments.finished(fake_run.FakeRun(tmp_path / "one.ddenv", data))
-    assert "only the robot's way is stored" in played(run.file, at_end(run), 1).lacks[0]
+    assert "only the robot's path is stored" in played(run.file, at_end(run), 1).lacks[0]
     run.close()
 
 
@@ -103,6 +103,6 @@ def test_there_is_no_such_test(run, number):
 def test_a_test_that_runs_is_not_stored_yet(tmp_path):
     run = fake_moments.mid_round(fake_run.FakeRun(tmp_path / "one.ddenv"))
     last = run.tests
-    with pytest.raises(UserError, match=f"test {last} still runs"):
+    with pytest.raises(UserError, match=f"test {last} is still running"):
         played(run.file, at_end(run), last)
     run.close()

@@ -118,7 +118,7 @@ def test_the_headline_counts_tests_that_ended_and_that_run():
 
 def test_why_tests_broke_is_told_at_the_end():
     state = states(started(1), ended(1, "error", "the controller Follow raised ValueError: no"))[-1]
-    assert broken(state) == ["1 test broke, the last one: the controller Follow raised ValueError: no"]
+    assert broken(state) == ["1 test broke; the last one: the controller Follow raised ValueError: no"]
     assert broken(states(started(1), ended(1, "pass"))[-1]) == []
 
 

@@ -135,7 +135,7 @@ def test_a_worker_with_other_bits_is_left_out_by_name(cluster, home, tmp_path):
     cluster.start_worker(PYTHONPATH=f"{tmp_path}:{os.environ.get('PYTHONPATH', 'src')}")
     run = home / "there.ddenv"
     program = start(DATA / "wall.yaml", run, "--cluster", cluster.address)
-    until_said(run, "is left out: its first run of the whole world has other bits than here")
+    until_said(run, "is not used: its first run of the whole world has different bits")
     # Nobody made a test so far.
     assert not state_of(run).tests
     cluster.start_worker()

@@ -34,13 +34,13 @@ def test_the_same_bits_are_taken_in_whatever_the_versions():
         (
             SAME,
             nudged(),
-            f"other bits than here; it has {simulator()}, {machine()}; here is {simulator()}, {machine()}",
+            f"different bits; it has {simulator()}, {machine()}; this machine has {simulator()}, {machine()}",
         ),
         (replace(SAME, simulator="drake 0.1"), nudged(), "it has drake 0.1, "),
-        (SAME, replace(HERE, took_part=frozenset({"wall"})), "other bits"),
-        (SAME, replace(HERE, motions={"ball": HERE.trajectory}), "other bits"),
+        (SAME, replace(HERE, took_part=frozenset({"wall"})), "different bits"),
+        (SAME, replace(HERE, motions={"ball": HERE.trajectory}), "different bits"),
         (SAME, Broken("error", "no memory"), "broke: no memory"),
-        (SAME, None, "other bits"),
+        (SAME, None, "different bits"),
         (replace(SAME, version="0.0.1"), None, "it has ddenv 0.0.1"),
     ],
 )

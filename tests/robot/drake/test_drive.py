@@ -127,7 +127,7 @@ REFUSED = {
     ),
     "upright": (
         Wheels(left=("turret",), right=FRONT.right),
-        "'husky': joint 'turret' is no wheel: its axis is not across",
+        "'husky': joint 'turret' is not a wheel: its axis does not run across",
     ),
 }
 

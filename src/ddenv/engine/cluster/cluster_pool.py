@@ -347,7 +347,7 @@ def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | No
         return f"its first run of the whole world broke: {there.failure}"
     if there is None or not _same_bits(there, here):
         theirs, ours = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
-        return f"its first run of the whole world differs from ours; it has {theirs}; this machine has {ours}"
+        return f"its first run of the whole world has different bits; it has {theirs}; this machine has {ours}"
     return ""
 
 
