@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from long_run import world_of
 
 from ddenv.engine.__main__ import _begin
 from ddenv.engine.bench import Bench
@@ -32,19 +33,6 @@ from ddenv.runs.subject import read_parts, scenario_for_world
 
 SHORTEST, LONGEST = 20.0, 60.0  # s
 NEEDED = 3
-BOX = """<model name="box_{0}"><static>true</static><pose>{1} {2} 0.5 0 0 0</pose><link name="link">
-<collision name="c"><geometry><box><size>0.4 0.4 1</size></box></geometry></collision></link></model>"""
-GROUND = """<model name="ground_plane"><static>true</static><link name="link"><collision name="c"><geometry><plane>
-<normal>0 0 1</normal><size>500 500</size></plane></geometry></collision></link></model>"""
-
-
-def world(folder: Path, models: int) -> Path:
-    """A field of boxes, none at the start of the robot."""
-    side = round(models**0.5) + 1
-    boxes = (BOX.format(number, 2 * (number % side) + 3, 2 * (number // side) - side) for number in range(models))
-    path = folder / f"boxes-{models}.sdf"
-    path.write_text(f'<sdf version="1.9"><world name="boxes">{GROUND}{"".join(boxes)}</world></sdf>')
-    return path
 
 
 def duration(keep: frozenset[str], seed: int) -> float:
@@ -93,9 +81,11 @@ def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, i
     rests on.
     """
     path = folder / f"{models}-{workers}.ddenv"
-    create_run(scenario_for_world(world(folder, models), (0, 0, 0.2, 0), (100, 0)), path)
+    world = folder / f"crates-{models}.sdf"
+    world.write_text(world_of(models))
+    create_run(scenario_for_world(world, (-2, -2, 0.2, 0.8), (models, models)), path)
     chosen = random.Random(1).sample(range(models), NEEDED)
-    pool, began = Simulated(workers, frozenset(f"box_{number}" for number in chosen)), time.perf_counter()
+    pool, began = Simulated(workers, frozenset(f"crate {number}" for number in chosen)), time.perf_counter()
     with RunFile(path) as file:
         scenario, parsed, _ = read_parts(file)
         file.own()

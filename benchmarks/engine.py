@@ -17,7 +17,6 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -110,30 +109,22 @@ def robot() -> None:
     print(f"| 2 workers of Dask | {dask:.1f} | {dask / two:.2f} times two plain ones |")
 
 
-@dataclass
-class Cost:
-    """CPU time, s, of what the engine does."""
-
-    start: float = 0.0
-    end: float = 0.0
-
-
 def row(folder: Path, seconds: float, models: int, jobs: int, more: dict[str, object]) -> str:
     (folder / "crates.sdf").write_text(world_of(models))
     (folder / "robot.sdf").write_text(ROBOT_SDF)
     (folder / "scenario.yaml").write_text(SCENARIO + json.dumps({"baseline_runs": 4} | more))
     run, log = folder / "run.ddenv", folder / "log"
     create_run(load_scenario(folder / "scenario.yaml"), run)
-    cost = work(run, jobs, partial(Sleeper, log, seconds))
+    spent = work(run, jobs, partial(Sleeper, log, seconds))
     tests = sorted(tuple(map(float, line.split())) for line in log.read_text().splitlines())
     gaps = [1000 * (after[1] - before[2]) for before, after in pairwise(tests) if before[0] == after[0]]
     between = f"{np.percentile(gaps, 50):.1f} / {np.mean(gaps):.1f} / {np.percentile(gaps, 95):.1f}"
-    own = 1000 * (cost.end - cost.start) / len(tests)
+    own = 1000 * spent / len(tests)
     return f"| {seconds:g} s | {models:,} | {jobs} | {len(tests):,} | {between} | {own:.1f} |"
 
 
-def work(run: Path, jobs: int, make: partial[Sleeper]) -> Cost:
-    """Reduces as the engine program does, in this process."""
+def work(run: Path, jobs: int, make: partial[Sleeper]) -> float:
+    """Reduces as the engine program does, in this process. Returns its own CPU time after its start, s."""
     with RunFile(run) as file:
         scenario, world, robot = read_parts(file)
         file.own()
@@ -141,12 +132,12 @@ def work(run: Path, jobs: int, make: partial[Sleeper]) -> Cost:
         journal.record(EngineStarted(os.getpid(), jobs, __version__, "none"))
         control, pool = Control(journal, threading.Event()), Pool(scenario, world, robot, jobs, make)
         driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
-        cost = Cost(time.thread_time())
+        began = time.thread_time()
         with suppress(Stopped):
             driver.reduce()
-        cost.end = time.thread_time()
+        spent = time.thread_time() - began
         pool.close()
-    return cost
+    return spent
 
 
 def resumed(tests: int) -> float:

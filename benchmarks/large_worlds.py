@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from sleeping import SIZE, board
 
 from ddenv.robot.drake.region import WIDTH, Region
 from ddenv.world.extent import model_bounds
@@ -14,6 +13,7 @@ from ddenv.world.model import Plane, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
 
+SIZE, MASS = (0.9, 0.09, 0.04), 2.0  # of a board, m and kg
 GAP = 2.0  # m between the middles of two things
 CRATE, WALL = (0.8, 0.8, 0.8), (1.8, 0.2, 1.2)  # m
 # No thing is nearer to the straight way to the goal than this, and none to a model of the scenario than that, m.
@@ -77,3 +77,15 @@ def still(name: str, size: tuple[float, float, float], x: float, y: float, z: fl
     box = f"<box><size>{size[0]} {size[1]} {size[2]}</size></box>"
     link = f'<link name="link"><collision name="box"><geometry>{box}</geometry></collision></link>'
     return f'<model name="{name}"><static>true</static><pose>{x} {y} {z + size[2] / 2} 0 0 {yaw}</pose>{link}</model>\n'
+
+
+def board(number: int, x: float, y: float, z: float, yaw: float) -> str:
+    """A loose board."""
+    a, b, c = SIZE
+    inertia = [MASS * (b * b + c * c) / 12, MASS * (a * a + c * c) / 12, MASS * (a * a + b * b) / 12]
+    moments = "".join(f"<{name}>{value}</{name}>" for name, value in zip(("ixx", "iyy", "izz"), inertia, strict=True))
+    return (
+        f'<model name="board_{number}"><pose>{x} {y} {z} 0 0 {yaw}</pose><link name="link"><inertial><mass>{MASS}</mass>'
+        f'<inertia>{moments}</inertia></inertial><collision name="c"><geometry><box><size>{a} {b} {c}</size></box></geometry>'
+        "</collision></link></model>"
+    )

@@ -12,8 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sqlite3
-import time
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,7 +37,6 @@ from ddenv.world.sdf.read import parse_world
 
 PARTS = 50
 RUNS = 4
-PACE = 0.3  # between the ends of two tests, s
 ROBOT_SDF = (
     '<sdf version="1.9"><model name="robot"><link name="base"><collision name="body"><geometry>'
     "<box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"
@@ -81,16 +78,6 @@ def write(path: Path, tests: int, models: int) -> None:
             similar = isinstance(event, TestFinished) and event.outcome == "similar"
             file.append(event, {ROBOT: samples} if similar else None)
         file.settle()
-    pace(path)
-
-
-def pace(path: Path) -> None:
-    """Gives the events the times that such a run takes, the last one now."""
-    with sqlite3.connect(path) as db:
-        (count,) = db.execute("SELECT count(*) FROM event WHERE kind = 'test_finished'").fetchone()
-        (last,) = db.execute("SELECT max(id) FROM event").fetchone()
-        step = PACE * count / last
-        db.execute("UPDATE event SET time = ? + (id - ?) * ?", (time.time(), last, step))
 
 
 def world_of(models: int) -> str:

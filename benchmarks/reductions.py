@@ -6,14 +6,12 @@
 An engine reduces each world. *Search* counts the tests that it simulates, the baseline included and the certificate apart; *all*
 the certificate, too. *CPU* is the time of all processes, *memory* the largest sum over them; a page that several share counts once.
 `--search-only` stops where the certificate begins. `--models` puts each scenario among crates, walls and piles of boards
-(`large_worlds.py`), after the scenario's own world. *A test after the slice* is the CPU time of a run with the models of the
-scenario's own first slice, in each of these worlds. Settings are such as `accept_rate=first`.
+(`large_worlds.py`), after the scenario's own world. Settings are such as `accept_rate=first`.
 """
 
 from __future__ import annotations
 
 import argparse
-import gc
 import resource
 import tempfile
 import time
@@ -22,10 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from large_worlds import among_things
-from real_worlds import largest
+from programs import largest
 
 from ddenv.evidence.took_part import simulated
-from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
@@ -37,8 +34,6 @@ from ddenv.study.plan import PAIRS
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.scenario import Scenario
 
-# Runs by which the time of one after the slice is measured.
-RUNS = 4
 # How often a run file is looked at, s.
 LOOK = 0.5
 
@@ -66,19 +61,11 @@ def main() -> None:
     print("| scenario | pair | models | after the slice | left | search | all | CPU s | clock, s | memory, MB |")
     print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as temporary:
-        folder, slices = options.keep or Path(temporary), {}
+        folder = options.keep or Path(temporary)
         for number, scenario in enumerate(scenarios(options, folder)):
             path = folder / f"{number}.ddenv"
             done = reduced(scenario, path, options.jobs, options.search_only)
             print(row(scenario, done), flush=True)
-            slices.setdefault(scenario.name, []).append((scenario, sliced(done.state)))
-        if options.models:
-            print("\n| scenario | models | a test after the slice, CPU s |\n|---|---|---|")
-            for worlds in slices.values():
-                # The same models everywhere: those that the small world's slice has.
-                keep = worlds[0][1]
-                for scenario, _ in worlds:
-                    print(f"| {scenario.name} | {scenario.world.stem} | {cost(scenario, keep):.2f} |", flush=True)
 
 
 def scenarios(options: argparse.Namespace, folder: Path) -> Iterator[Scenario]:
@@ -133,19 +120,6 @@ def row(scenario: Scenario, done: Reduced) -> str:
         f"| {len(state.environment)} {certified} | {simulated(state)} | {every} | {done.cpu:.0f} | {done.clock:.0f} "
         f"| {done.memory / 1e6:.0f} |"
     )
-
-
-def cost(scenario: Scenario, keep: frozenset[str]) -> float:
-    """The mean time of a run of the models `keep`, CPU s."""
-    variants = Variants(*load_parts(scenario), scenario)
-    variants.run(keep, RUNS)
-    began = time.process_time()
-    for seed in range(RUNS):
-        variants.run(keep, seed)
-    spent = time.process_time() - began
-    del variants
-    gc.collect()
-    return spent / RUNS
 
 
 if __name__ == "__main__":

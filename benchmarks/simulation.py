@@ -1,6 +1,7 @@
-"""How fast the robot is simulated: the three scenarios with everything on, beside bare `AdvanceTo` on the same plant.
+"""How fast the robot is simulated: scenarios or a world with everything on, beside bare `AdvanceTo` on the same plant.
 
     python benchmarks/simulation.py [--seeds N] [--scenarios ditch,friction,rubble]
+    python benchmarks/simulation.py --world WORLD --spawn X,Y,Z,YAW --goal X,Y [--seeds N]
 
 Each scenario runs in its whole world, and in one with every second model removed. Everything on means sensors, filter,
 controller, recording, and what the robot notices; where there is a lidar, also that and the map it makes. Bare is
@@ -11,18 +12,18 @@ loose piles settle, is left out.
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from ddenv.robot.simulation.template import Template, Variants
-from ddenv.runs.subject import load_parts
+from ddenv.runs.subject import load_parts, scenario_for_world
 from ddenv.world.load import SCENARIOS, load_scenario
-
-TARGETS = {"ditch": 60, "friction": 80, "rubble": 10}
+from ddenv.world.scenario import Scenario
 
 
 @dataclass
@@ -44,16 +45,28 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--scenarios", default="ditch,friction,rubble")
+    parser.add_argument("--world", type=Path)
+    parser.add_argument("--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file")
+    parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
     arguments = parser.parse_args()
-    print("| scenario | models | simulated s a second | bare AdvanceTo | ratio | target |")
-    print("|---|---|---|---|---|---|")
-    for name in arguments.scenarios.split(","):
-        scenario = load_scenario(SCENARIOS / f"{name}.yaml")
+    print("| scenario | models | simulated s a second | bare AdvanceTo | ratio |")
+    print("|---|---|---|---|---|")
+    for name, scenario in scenarios(arguments):
         world, robot = load_parts(scenario)
         variants = Variants(world, robot, scenario)
         elements = world.elements()
         for kept in (elements, elements[::2]):
             print(row(variants._template(frozenset(kept)), name, frozenset(kept), arguments.seeds), flush=True)
+
+
+def scenarios(arguments: argparse.Namespace) -> Iterator[tuple[str, Scenario]]:
+    if arguments.world is None:
+        for name in arguments.scenarios.split(","):
+            yield name, load_scenario(SCENARIOS / f"{name}.yaml")
+        return
+    x, y, z, yaw = map(float, arguments.spawn.split(","))
+    goal_x, goal_y = map(float, arguments.goal.split(","))
+    yield arguments.world.stem, scenario_for_world(arguments.world, (x, y, z, yaw), (goal_x, goal_y))
 
 
 def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
@@ -67,7 +80,7 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
         simulated, spent = simulated + result.simulated_seconds, spent + seconds
         bare_spent += bare(template, keep, recorder.speeds, result.simulated_seconds)
     speed, bare_speed = simulated / spent, simulated / bare_spent
-    return f"| {name} | {len(keep)} | {speed:.0f} | {bare_speed:.0f} | {speed / bare_speed:.2f} | {TARGETS[name]} |"
+    return f"| {name} | {len(keep)} | {speed:.0f} | {bare_speed:.0f} | {speed / bare_speed:.2f} |"
 
 
 def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:

@@ -7,8 +7,7 @@
 
 Without a name: small random worlds (`small_worlds.py`), N of each kind. Of each world, random parts run, and then random parts of
 these that keep what took part and break no tie. Every bit must be the same. With `--forget` one kind of participant is left out on
-purpose, which the comparison must find. Prints a row for each kind of world; exits with 1 if tests differ. *Recording* is what
-recording who took part adds to the time of a run.
+purpose, which the comparison must find. Prints a row for each kind of world; exits with 1 if tests differ.
 """
 
 from __future__ import annotations
@@ -61,7 +60,6 @@ class Count:
     tests: int = 0
     differ: int = 0
     seconds: float = 0.0
-    recording: float = 0.0
 
 
 def main() -> int:
@@ -78,8 +76,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.forget:
         FORGOTTEN[options.forget]()
-    print("| worlds | how many | runs | implied tests | that differ | CPU s | recording |")
-    print("|---|---|---|---|---|---|---|", flush=True)
+    print("| worlds | how many | runs | implied tests | that differ | CPU s |")
+    print("|---|---|---|---|---|---|", flush=True)
     if options.world is not None:
         return int(row(options.world, [named(options)], options.tests, options.first) > 0)
     husky = read_model(SDF / "robots" / "husky.sdf")
@@ -111,8 +109,7 @@ def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, 
         audit(Variants(world, robot, scenario), frozenset(world.elements()), tests, first, found)
     found.seconds = time.process_time() - began
     print(
-        f"| {kind} | {found.worlds} | {found.runs} | {found.tests} | {found.differ} | {found.seconds:.0f} "
-        f"| {found.recording / max(found.worlds, 1):+.1%} |",
+        f"| {kind} | {found.worlds} | {found.runs} | {found.tests} | {found.differ} | {found.seconds:.0f} |",
         flush=True,
     )
     return found.differ
@@ -125,7 +122,6 @@ def audit(simulator: Variants, everything: frozenset[str], tests: int, first: in
     number = {name: place for place, name in enumerate(elements)}
     ties = Ties.among((number[name], number[other]) for name, other in simulator.ties(everything) or ())
     found.worlds += 1
-    found.recording += cost(simulator, everything)
     for seed in range(first, first + tests // PARTS):
         there = everything if seed % 2 == 0 else part(everything, chance)
         made = simulator.run(there, seed)
@@ -150,24 +146,6 @@ def part(models: frozenset[str], chance: random.Random) -> frozenset[str]:
 def bits(result: RunResult, keep: frozenset[str]) -> tuple[object, ...]:
     motions = {name: rows.tobytes() for name, rows in result.motions.items() if name in keep}
     return result.outcome, result.failure, result.trajectory.tobytes(), motions
-
-
-def cost(simulator: Variants, keep: frozenset[str]) -> float:
-    """What recording adds to the time of a run, as a part of that: the time within `Reached.look`."""
-    spent, look = 0.0, Reached.look
-
-    def timed(*arguments: object) -> None:
-        nonlocal spent
-        began = time.process_time()
-        look(*arguments)  # type: ignore[arg-type]
-        spent += time.process_time() - began
-
-    Reached.look = timed  # type: ignore[method-assign, assignment]
-    began = time.process_time()
-    simulator.run(keep, 0)
-    whole = time.process_time() - began
-    Reached.look = look  # type: ignore[method-assign]
-    return spent / (whole - spent)
 
 
 if __name__ == "__main__":

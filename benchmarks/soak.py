@@ -20,8 +20,7 @@ from pathlib import Path
 
 from engine import SCENARIO, Sleeper, work
 from long_run import ROBOT_SDF, world_of
-from real_worlds import memory_of
-from terminal import Terminal
+from programs import Terminal, memory_of
 
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run

@@ -1,6 +1,6 @@
 """How many tests each algorithm and each pair needs, compared with the bound and with picire's ddmin.
 
-    python benchmarks/tests_needed.py [--worlds N] [--large-worlds N] [--jobs N] [--only algorithms|rates|pairs|planning]
+    python benchmarks/tests_needed.py [--worlds N] [--large-worlds N] [--jobs N] [--only algorithms|pairs]
 
 Random worlds without a robot: n models on 20 x 20 m; the failure needs k of them. The chance to be needed falls with the distance
 to the place of the failure, by a factor of e every 2 m. The oracle is monotone; the flaky one shows the failure in 80 % of the
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -23,16 +22,11 @@ import numpy as np
 import picire
 
 import ddenv
-from ddenv.reduction.evidence import Evidence
-from ddenv.reduction.guide import make_guide
-from ddenv.reduction.round import make_round, one_model_partitions
 from ddenv.schemas import pairs, split_pair
 
 SIZES = ((43, 2), (36, 4), (25, 6), (200, 5), (5000, 5))
 WIDTH, FALLOFF, VIEW = 20.0, 2.0, 3.0  # m
 RATE, RERUNS = 0.8, 3
-# What a run can tell at most about a group if f shows at RATE where none of it is needed: the Z-channel's capacity.
-BITS = 0.618
 PAPER = {"growth": "paper", "skip": "known"}
 ALGORITHMS = {
     "ddenv": {},
@@ -140,12 +134,11 @@ def table(what: str, rows: dict[str, dict | None], worlds: int, large_worlds: in
 
     Deterministic / flaky, and for the flaky oracle how often the result was right.
     """
-    print(f"| {what} | " + " | ".join(f"{n}, {k}" for n, k in SIZES) + " | flaky: right, % | time, s |")
-    print("|---|" + "---|" * (len(SIZES) + 2))
-    print("| bound | " + " | ".join(f"{bound(*size):.1f}" for size in SIZES) + " | | |", flush=True)
+    print(f"| {what} | " + " | ".join(f"{n}, {k}" for n, k in SIZES) + " | flaky: right, % |")
+    print("|---|" + "---|" * (len(SIZES) + 1))
+    print("| bound | " + " | ".join(f"{bound(*size):.1f}" for size in SIZES) + " | |", flush=True)
     with get_context("spawn").Pool(jobs) as pool:
         for name, options in rows.items():
-            started = time.perf_counter()
             counts = [min(worlds, large_worlds) if n > 1000 else worlds for n, _ in SIZES]
             tasks = [
                 (size, options, flaky, count)
@@ -159,62 +152,9 @@ def table(what: str, rows: dict[str, dict | None], worlds: int, large_worlds: in
             ]
             right = np.mean([share for _, share in results[1::2]])
             print(
-                f"| {name} | " + " | ".join(cells) + f" | {right:.1f} | {time.perf_counter() - started:.0f} |",
+                f"| {name} | " + " | ".join(cells) + f" | {right:.1f} |",
                 flush=True,
             )
-
-
-def rate_tests(task: tuple[str, tuple[int, int], int]) -> list[float]:
-    """Of splitting with the flaky oracle: the mean number of tests of search and certificate, and how often it was right, %."""
-    rule, size, worlds = task
-    found = []
-    for seed in range(worlds):
-        world = make_world(*size, seed)
-        options = {"algorithm": "splitting", "iterations": RERUNS, "accept_rate": rule}
-        one = ddenv.reduce(world.elements, oracle(world, True, seed), seed=seed, **options, **world.evidence)
-        found.append([one.search_tests, one.certificate_tests, 100 * (set(one.kept) == world.needed)])
-    return np.mean(found, axis=0).tolist()
-
-
-def rates(worlds: int, large_worlds: int, jobs: int) -> None:
-    """What splitting needs with the flaky oracle, with both rules, beside what a run can tell at most."""
-    print("| splitting, n and k | " + " | ".join(f"{n}, {k}" for n, k in SIZES) + " | right, % |")
-    print("|---|" + "---|" * (len(SIZES) + 1))
-    bits = " | ".join(f"{math.log2(math.comb(*size)) / BITS:.0f}" for size in SIZES)
-    print(f"| log2 C(n, k) / {BITS} | {bits} | |", flush=True)
-    with get_context("spawn").Pool(jobs) as pool:
-        for rule in ("first", "kept"):
-            tasks = [(rule, size, min(worlds, large_worlds) if size[0] > 1000 else worlds) for size in SIZES]
-            search, certificate, right = zip(*pool.map(rate_tests, tasks[::-1], chunksize=1)[::-1], strict=True)
-            print(f"| {rule}: search | " + " | ".join(f"{one:.0f}" for one in search) + f" | {np.mean(right):.1f} |")
-            if any(certificate):
-                print(
-                    f"| {rule}: certificate | " + " | ".join(f"{one:.0f}" for one in certificate) + " | |", flush=True
-                )
-
-
-def planning() -> None:
-    """How long one round of 5,000 models is planned: split, ranked, its candidates listed."""
-    world = make_world(5000, 5, 0)
-    end = tuple(world.evidence["trajectory"][-1, 1:4])
-    known = Evidence(world.elements, failure_position=end, **world.evidence)
-    counts = (2, 10, 100, 1000, 5000)
-    print("| planning a round of 5,000, s | " + " | ".join(f"n = {n}" for n in counts) + " |")
-    print("|---|" + "---|" * len(counts))
-    for pair in pairs():
-        print(f"| {pair} | " + " | ".join(f"{_planned(known, pair, n):.3f}" for n in counts) + " |", flush=True)
-
-
-def _planned(known: Evidence, pair: str, n: int) -> float:
-    guide = make_guide(*split_pair(pair), lambda: known)
-    models = tuple(range(len(known.elements)))
-    guide.split(models[:9], 3)
-    guide.rank([models[:9]])
-    started = time.perf_counter()
-    partitions = one_model_partitions(models) if n == len(models) else guide.split(models, n)
-    ranked = sorted(zip(partitions, guide.rank(partitions), strict=True), key=lambda one: one[1])
-    make_round(n, models, ranked)
-    return time.perf_counter() - started
 
 
 def main() -> None:
@@ -222,17 +162,13 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=200)
     parser.add_argument("--large-worlds", type=int, default=200, help="of 5,000 models")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--only", choices=("algorithms", "rates", "pairs", "planning"))
+    parser.add_argument("--only", choices=("algorithms", "pairs"))
     options = parser.parse_args()
     if options.only in (None, "algorithms"):
         table("tests, n and k", ALGORITHMS, options.worlds, options.large_worlds, options.jobs)
-    if options.only in (None, "rates"):
-        rates(options.worlds, options.large_worlds, options.jobs)
     if options.only in (None, "pairs"):
         asked = {pair: dict(zip(("partitioning", "prioritization"), split_pair(pair), strict=True)) for pair in pairs()}
         table("tests of ddenv, n and k", asked, options.worlds, options.large_worlds, options.jobs)
-    if options.only in (None, "planning"):
-        planning()
 
 
 if __name__ == "__main__":

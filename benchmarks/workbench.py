@@ -1,192 +1,191 @@
-"""How fast the workbench is in a real terminal (a pty of 120x36 with 16 million colours), also while two simulations run.
+"""How fast the workbench answers in a real terminal (`programs.py`), on an idle machine and beside two busy processes.
 
-    python benchmarks/workbench.py [--quick] [--hour SECONDS]
+    python benchmarks/workbench.py [--quick]
 
-The output is read as a terminal shows it. The first paint is there when the screen has words, counted from before the start of
-the program, beside `python -c "import textual.app"`; it is complete when no more comes. A key is answered when as much of the
-screen changed as this key changes; the table also has how often as much changes in 50 ms without a key. Times of keys are p50 /
-p95 / p99.
-
-Two simulations are a reduction of the ditch with two workers, and the screen is attached to it. On the idle machine the same
-events are replayed at the same pace (`replay.py`). The large run (`long_run.py`) has 10,000 tests in a world of 5,000 models and
-goes on while it is watched, with the two simulations beside it. For the hour all events of an hour are replayed in --hour seconds
-(90): all the tests of an hour, but only as many frames as these seconds have; with 3600 also its frames. Memory is RSS. --quick
-measures neither the large run nor the hour and takes less than a minute, all takes seven.
+The first paint is there when the screen has words, counted from before the start of the program, beside
+`python -c "import textual.app"`. Keys are pressed on runs that have ended, where nothing else writes: of the ditch, and of 10,000
+tests in a world of 5,000 models (`long_run.py`). An answer is complete when nothing more comes for 50 ms; its time ends with its
+last write. `down` in a bare Textual table is beside it. Bytes a second are those of a running reduction of the ditch.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import signal
-import sqlite3
+import random
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager
 from pathlib import Path
 
-from watching import BARE_KEY, DDENV, KEYS, answers, attached, by_itself, rate, starts
+from programs import Terminal, memory_of
 
 HERE = Path(__file__).parent
-HEAVY = ("matplotlib", "pydrake", "scipy", "sklearn")
-# Prints the names of all imported modules.
-NAMES = "DDENV_BENCHMARK_NAMES"
-PROBE = (
-    "import atexit, os, pathlib, sys; from ddenv.cli import main;"
-    f"atexit.register(lambda: pathlib.Path(os.environ['{NAMES}']).write_text(' '.join(sys.modules))); main()"
-)
-# A reduction that takes longer than all measurements beside it on any machine: each candidate without f is run 1,001 times.
-SIMULATIONS = ("run", "ditch", "--jobs", "2", "--accept-rate", "first", "--iterations", "1000", "--no-slice")
-LARGE_TESTS = 10_000
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How often the program is started, how often each key is pressed, how long a run is watched, and given to settle, s."""
-
-    starts: int
-    presses: int
-    watch: float
-    settle: float
-
-
-FULL, QUICK = Effort(5, 100, 30.0, 6.0), Effort(2, 10, 3.0, 0.5)
-TARGETS = {
-    "`ddenv`: first paint": "0.4 s",
-    "`ddenv open RUN`: first paint": "0.4 s",
-    **{f"key to paint: {key.name}": "p95 50 ms" for key in KEYS},
-    f"key to paint: {BARE_KEY.name}": "",
-    "as much changed without a key": "few",
-    "bytes a second, on average": "4,000",
-    "bytes in a second, maximum": "",
-    "memory, MB": "",
-}
-Figures = dict[str, str]
+DDENV = [sys.executable, "-c", "from ddenv.cli import main; main()"]
+BARE = [sys.executable, str(HERE / "workbench.py"), "--bare"]
+KEYS = {"down in the table": ("\x1b[B", "\x1b[A"), "+ on the map": ("+", "-"), "tab": ("\t", "\x1b[Z")}
+# So many letters and digits on the screen: it has begun.
+WORDS = 150
+QUIET = 0.05  # s
+# The search of this run outlasts the look at it: each candidate without f is run 1,001 times.
+LONG = ["--jobs", "2", "--accept-rate", "first", "--iterations", "1000", "--no-slice"]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--hour", type=float, default=90.0)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer starts and keys, and a run of 200 tests")
+    parser.add_argument("--bare", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    effort = QUICK if options.quick else FULL
+    if options.bare:
+        bare_table()
+        return
+    starts, presses, tests, models = (2, 10, 200, 500) if options.quick else (5, 100, 10_000, 5_000)
     with tempfile.TemporaryDirectory() as name:
-        folder, environment = Path(name), os.environ | {"DDENV_HOME": name} | installed(name)
-        recorded, large = folder / "recorded.ddenv", {}
-        with simulations(recorded, environment):
-            loaded = figures(recorded, environment, effort)
-            if not options.quick:
-                large = of_large_run(folder, environment, effort)
-        with replayed(recorded, folder / "replayed.ddenv") as run:
-            idle = figures(run, environment, effort)
-        print("| figure | idle | two simulations | and a large run | target |\n|---|---|---|---|---|")
-        for what, target in TARGETS.items():
-            print(f"| {what} | {idle[what]} | {loaded[what]} | {large.get(what, '')} | {target} |")
-        print(f"| imported of {', '.join(HEAVY)} | {heavy(recorded, environment)} | | | none |", flush=True)
-        if not options.quick:
-            memory = hour(recorded, environment, options.hour)
-            print(f"| memory at 10 / 50 / 100 % of an hour, MB | {memory} | | | flat |")
+        folder = Path(name)
+        environment = os.environ | {
+            "DDENV_HOME": name,
+            "PYTHONDONTWRITEBYTECODE": "",
+            "PYTHONPYCACHEPREFIX": f"{name}/pyc",
+        }
+        ditch, large = folder / "ditch.ddenv", folder / "large.ddenv"
+        bytes_a_second = watched(folder / "running.ddenv", environment, 3.0 if options.quick else 20.0)
+        subprocess.run(
+            [*DDENV, "run", "ditch", "--budget", "40", "--output", ditch],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            check=False,  # its exit code says that the budget was used up
+        )
+        subprocess.run(
+            [sys.executable, HERE / "long_run.py", large, "--tests", str(tests), "--models", str(models)], check=True
+        )
+        print("| figure | idle | two busy processes | aim |\n|---|---|---|---|")
+        idle = figures(ditch, large, environment, starts, presses)
+        with busy():
+            loaded = figures(ditch, large, environment, starts, presses)
+        for what, (value, aim) in idle.items():
+            print(f"| {what} | {value} | {loaded[what][0]} | {aim} |")
+        print(f"| bytes a second of a running reduction | {bytes_a_second:,.0f} | | 10,000 |")
 
 
-def installed(folder: str) -> dict[str, str]:
-    """An environment in which a program starts like an installed one: from compiled files."""
-    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": f"{folder}/compiled"}
-
-
-def figures(run: Path, environment: dict[str, str], effort: Effort) -> Figures:
-    """All figures of a run with a working engine."""
-    still = run.with_stem(f"{run.stem}-still")
-    with closing(sqlite3.connect(run)) as source, closing(sqlite3.connect(still)) as target:
-        source.backup(target)
-    measured = {"`ddenv`: first paint": str(starts([], environment, effort.starts))}
-    measured["`ddenv open RUN`: first paint"] = str(starts(["open", str(still)], environment, effort.starts))
-    with attached(["open", str(run)], environment) as terminal:
-        terminal.watch(effort.settle)
-        average, most = rate(terminal, effort.watch)
-        measured |= {"bytes a second, on average": f"{average:,.0f}", "bytes in a second, maximum": f"{most:,}"}
-        alone = [by_itself(terminal, key, effort.presses // 4, 0.05) for key in KEYS]
-        changed, looks = sum(len(each.seconds) for each in alone), sum(each.pressed for each in alone)
-        measured["as much changed without a key"] = f"{changed} of {looks}"
-        for key in KEYS:
-            measured[f"key to paint: {key.name}"] = str(answers(terminal, key, effort.presses))
-        measured["memory, MB"] = f"{terminal.memory():.0f}"
-    with attached([str(HERE / "bare.py")], environment, (sys.executable,)) as terminal:
-        measured[f"key to paint: {BARE_KEY.name}"] = str(answers(terminal, BARE_KEY, effort.presses))
-    return measured
-
-
-def of_large_run(folder: Path, environment: dict[str, str], effort: Effort) -> Figures:
-    made = folder / "made.ddenv"
-    subprocess.run([sys.executable, HERE / "long_run.py", made, "--tests", str(LARGE_TESTS)], check=True)
-    with replayed(made, folder / "large.ddenv", "--until", str(LARGE_TESTS)) as run:
-        return figures(run, environment, effort)
+def figures(
+    ditch: Path, large: Path, environment: dict[str, str], starts: int, presses: int
+) -> dict[str, tuple[str, str]]:
+    """Each figure with its aim."""
+    found = {
+        "`ddenv`: first paint": (first_paint([], environment, starts), "1.8 x"),
+        "`ddenv open RUN`: first paint": (first_paint(["open", str(ditch)], environment, starts), "1.8 x"),
+    }
+    for run, words, aim in ((ditch, "", "p95 30 ms"), (large, ", large run", "p95 50 ms")):
+        with started([*DDENV, "open", str(run)], environment) as terminal:
+            for name, keys in KEYS.items():
+                found[f"{name}{words}"] = (answers(terminal, keys, presses), aim)
+            found[f"memory{words}"] = (f"{memory_of(Path(f'/proc/{terminal.id}')) / 1e6:.0f} MB", "")
+    with started(BARE, environment) as terminal:
+        found["down in a bare table"] = (answers(terminal, KEYS["down in the table"], presses), "")
+    return found
 
 
 @contextmanager
-def simulations(run: Path, environment: dict[str, str]) -> Iterator[None]:
-    """Two workers simulate for this run, whose first round has begun."""
-    words = [*DDENV, *SIMULATIONS, "--output", str(run)]
-    program = subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def started(words: list[str], environment: dict[str, str]) -> Iterator[Terminal]:
+    """A program whose screen is complete."""
+    terminal = Terminal(words, environment)
     try:
-        while not run.exists() or not _count(run, "round_started"):
-            if program.poll() is not None:
-                sys.exit("the simulations ended before a round began")
-            time.sleep(0.2)
-        yield
-        if program.poll() is not None:
-            sys.exit("the simulations ended before all was measured beside them")
+        begun(terminal)
+        terminal.settle(1.0, 20.0)
+        yield terminal
     finally:
-        program.send_signal(signal.SIGINT)
-        program.wait(60)
+        terminal.leave()
+
+
+def begun(terminal: Terminal) -> float:
+    """When the screen had words."""
+    while terminal.letters() < WORDS:
+        if not terminal.look(30.0):
+            raise TimeoutError("nothing is written")
+    return terminal.writes[-1][0]
+
+
+def first_paint(words: list[str], environment: dict[str, str], times: int) -> str:
+    """The median of some starts, each beside the bare import; one start before them compiles the program."""
+    first, bare = [], []
+    for number in range(times + 1):
+        began = time.perf_counter()
+        subprocess.run([sys.executable, "-c", "import textual.app"], check=True, env=environment)
+        imported = time.perf_counter() - began
+        terminal = Terminal([*DDENV, *words], environment)
+        try:
+            painted = begun(terminal) - terminal.started
+        finally:
+            terminal.leave()
+        if number:
+            first.append(painted)
+            bare.append(imported)
+    paint, textual = statistics.median(first), statistics.median(bare)
+    return f"{paint:.2f} s, {paint / textual:.1f} x"
+
+
+def answers(terminal: Terminal, keys: tuple[str, str], times: int) -> str:
+    """Presses a key and the one that undoes it in turn: p50 / p95 from the key to its complete answer."""
+    seconds = []
+    for number in range(times):
+        terminal.watch(random.uniform(0.08, 0.16))
+        at = terminal.press(keys[number % 2])
+        if terminal.look(1.0):
+            terminal.settle(QUIET, 2.0)
+            seconds.append(terminal.writes[-1][0] - at)
+    if len(seconds) < times:
+        return f"{times - len(seconds)} of {times} not answered"
+    hundredths = statistics.quantiles(seconds, n=100, method="inclusive")
+    return f"{1000 * hundredths[49]:.0f} / {1000 * hundredths[94]:.0f} ms"
+
+
+def watched(run: Path, environment: dict[str, str], seconds: float) -> float:
+    """Bytes a second that the workbench writes while a reduction runs and no key is pressed."""
+    words = [*DDENV, "run", "ditch", *LONG, "--output", str(run)]
+    with subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as engine:
+        try:
+            while not run.exists():
+                time.sleep(0.1)
+            with started([*DDENV, "open", str(run)], environment) as terminal:
+                terminal.writes.clear()
+                terminal.watch(seconds)
+                written = sum(len(text) for _, text in terminal.writes)
+        finally:
+            engine.terminate()
+    return written / seconds
 
 
 @contextmanager
-def replayed(source: Path, run: Path, *options: str) -> Iterator[Path]:
-    """A run that goes on as `source` did; `options` are those of replay.py."""
-    words = [sys.executable, HERE / "replay.py", source, run, *options]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as program:
-        try:
-            if program.stdout.readline() != "ready\n":
-                sys.exit("the replay did not begin")
-            yield run
-        finally:
-            program.terminate()
+def busy() -> Iterator[None]:
+    """Two processes that compute as politely as the engine's workers do."""
+    processes = [subprocess.Popen(["nice", sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
 
 
-def hour(source: Path, environment: dict[str, str], seconds: float) -> str:
-    """Memory of a workbench that is attached while an hour of a run's events is replayed."""
-    run = source.with_stem("hour")
-    samples: list[tuple[int, float]] = []
-    speed = str(3600 / seconds)
-    with replayed(source, run, "--speed", speed), attached(["open", str(run)], environment) as terminal:
-        until = time.monotonic() + seconds - 4.0
-        while time.monotonic() < until:
-            terminal.watch(1.0)
-            samples.append((_count(run, "test_finished"), terminal.memory()))
-    tests = samples[-1][0]
-    parts = [next(memory for done, memory in samples if done >= share * tests) for share in (0.1, 0.5, 1.0)]
-    grown = 1000 * (parts[-1] - parts[0]) / (0.9 * tests)
-    return f"{' / '.join(f'{memory:.0f}' for memory in parts)}: {grown:.1f} kB a test, {tests:,} tests"
+def bare_table() -> None:
+    """A bare Textual table: how long any such program takes from a key to its answer."""
+    from textual.app import App, ComposeResult
+    from textual.widgets import DataTable
 
+    class Bare(App[None]):
+        def compose(self) -> ComposeResult:
+            yield DataTable(cursor_type="row")
 
-def heavy(run: Path, environment: dict[str, str]) -> str:
-    """Which of the heavy packages either screen imports."""
-    names = run.with_name("modules")
-    found: set[str] = set()
-    for words in ([], ["open", str(run)]):
-        with attached(words, environment | {NAMES: str(names)}, (sys.executable, "-c", PROBE)):
-            pass
-        found |= set(names.read_text().split()).intersection(HEAVY)
-    return ", ".join(sorted(found)) or "none"
+        def on_mount(self) -> None:
+            table = self.query_one(DataTable)
+            table.add_columns("#", "candidate", "models", "distance", "tests", "verdict")
+            for number in range(30):
+                table.add_row(str(number), f"part {number}", "12", "3.4 m", "4/4", "dissimilar")
 
-
-def _count(run: Path, kind: str) -> int:
-    with closing(sqlite3.connect(run)) as db:
-        return db.execute("SELECT count(*) FROM event WHERE kind = ?", (kind,)).fetchone()[0]
+    Bare().run()
 
 
 if __name__ == "__main__":
