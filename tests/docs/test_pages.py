@@ -25,11 +25,8 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
 def anchors(page):
-    """Those of its titles, and those that keep older links alive."""
-    text = page.read_text()
-    titles = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
-    named = re.findall(r'^<a id="([\w-]+)"></a>$', text, re.MULTILINE)
-    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles} | set(named)
+    titles = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
