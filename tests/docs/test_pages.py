@@ -1,7 +1,9 @@
 """The pages name every key and option there is, with its default, and their links lead somewhere."""
 
 import re
+import shlex
 
+import click
 import pytest
 
 from ddenv.cli.command_line import app
@@ -84,3 +86,17 @@ def test_the_reference_names_every_option(command):
 def test_pages_name_every_schema_and_algorithm(page, kind):
     text = (ROOT / "docs" / page).read_text()
     assert {name for name in names(kind) if f"`{name}`" not in text} == set()
+
+
+COMMAND = re.compile(r"^    (?:\$ )?ddenv\b(.*)$", re.MULTILINE)
+COMMANDS = sorted({line for page in PAGES for line in COMMAND.findall(page.read_text())})
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_the_commands_of_the_pages_exist_with_their_options(line):
+    command, words = app, shlex.split(re.split(r" {2,}", line.strip())[0], comments=True)
+    while isinstance(command, click.Group) and words and words[0] in command.commands:
+        command = command.commands[words.pop(0)]
+    assert command is not app, line
+    options = {option for each in command.params for option in each.opts + each.secondary_opts}
+    assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} - options == set()
