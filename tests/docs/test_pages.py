@@ -42,6 +42,12 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_programs_and_examples_that_pages_name_are_there(page):
+    named = re.findall(r"\b(?:benchmarks|docs)/[\w/.-]*\w", page.read_text())
+    assert [file for file in named if "NAME" not in file and not (ROOT / file).exists()] == []
+
+
 @pytest.mark.parametrize(
     "section",
     [Scenario, Sensors, Lidar, Controller, Planner, FailureSpec, Reduction, Simulation],
