@@ -22,7 +22,7 @@ from pathlib import Path
 from large_worlds import among_things
 from programs import largest
 
-from ddenv.evidence.took_part import simulated
+from ddenv.evidence.slices import simulated
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile

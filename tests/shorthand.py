@@ -34,7 +34,7 @@ def typed(state: RunState, kind: str, data: dict[str, Any]) -> list[Event]:
         return numbers[models]
 
     full = _full(state, kind, dict(data), numbered)
-    return [*new, read(KINDS[kind], json.loads(json.dumps(full)))]
+    return [*new, read(KINDS[kind], json.dumps(full))]
 
 
 def _full(state: RunState, kind: str, data: dict[str, Any], numbered: Numbered) -> dict[str, Any]:

@@ -16,12 +16,11 @@ import numpy as np
 from ddenv.engine.__main__ import _begin
 from ddenv.engine.beginning import check_repeats
 from ddenv.engine.bench import Bench
-from ddenv.engine.control import Control
-from ddenv.engine.disturbances import DiskSpace
+from ddenv.engine.control import Control, DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.shared import Key, Place
-from ddenv.engine.worker import Broken, Changes, Start
+from ddenv.engine.worker import Broken, Run, Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState
@@ -67,7 +66,7 @@ class FakePool:
 
     def __init__(self, oracle: Oracle, jobs: int, seed: int = 0, cut: Cut = lambda *_: "") -> None:
         self.oracle, self.jobs, self.random, self.cut = oracle, jobs, random.Random(seed), cut
-        self.running: list[tuple[int, frozenset[str], int, bool, Changes]] = []
+        self.running: list[tuple[int, Run]] = []
         self.made: list[tuple[frozenset[str], int]] = []
         # What rests on what, and how often the driver asks before it is known.
         self.supports: list[tuple[str, str]] | Broken = []
@@ -95,23 +94,16 @@ class FakePool:
     def busy(self) -> int:
         return len(self.running)
 
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None:
+    def submit(self, test: int, run: Run) -> None:
         assert self.idle
-        self.limits.append(limit)
-        self.running.append((test, keep, seed, full, changes))
+        self.limits.append(run.limit)
+        self.running.append((test, run))
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
         if not self.running:
             return []
-        test, keep, seed, full, changes = self.running.pop(self.random.randrange(len(self.running)))
+        test, run = self.running.pop(self.random.randrange(len(self.running)))
+        keep, seed, full, changes = run.keep, run.seed, run.full, run.changes
         self.made.append((keep, seed))
         cut = "" if full else self.cut(keep, seed)
         shown = cut or (
@@ -182,7 +174,7 @@ def engine(
 def drive(path: Path, pool: FakePool, mixed: bool = False, **options) -> RunState:
     """Works on a run to its end; `options` are those of `engine`."""
     with engine(path, pool, **options) as one:
-        check_repeats(one.journal, pool, one.control, mixed)
+        check_repeats(one.journal, one.bench, mixed)
         one.driver.reduce()
         return one.journal.state
 

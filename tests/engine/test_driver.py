@@ -1,7 +1,6 @@
 """The engine's promises, on a simulator that costs nothing."""
 
 import json
-import math
 import sqlite3
 import tempfile
 from itertools import pairwise
@@ -11,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine import bench
 from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
 from ddenv.errors import UserError
@@ -285,29 +283,9 @@ def test_commands_without_sense_are_marked_and_ignored(tmp_path):
     assert not told(path, "resumed")
 
 
-class SlowPool(FakePool):
-    """Its tests take a while: most looks at it find nothing finished."""
-
-    def finished(self, seconds):
-        self.looks = getattr(self, "looks", 0) + 1
-        return super().finished(seconds) if self.looks % 40 == 0 else []
-
-
-def forecasts(path):
-    return told(path, "forecast")
-
-
-def test_each_round_is_forecast_while_tests_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(bench, "FIRST", math.inf)
-    paths = [new_run(tmp_path) for _ in range(3)]
-    for path, pool in zip(paths, (SlowPool, SlowPool, FakePool), strict=True):
-        state = drive(path, pool(needs("wall", "beam"), 2))
-        assert state.minimal
-    first, second, hasty = map(forecasts, paths)
-    # Rounds without a test of their own have none.
-    assert first
-    assert [each["round"] for each in first] == sorted({each["round"] for each in first})
-    assert all(low <= likely <= high for low, likely, high in (each["tests"] for each in first))
-    assert [each["tests"] for each in second] == [each["tests"] for each in first]
-    # Tests that end at once are not waited for.
-    assert not hasty
+def test_each_round_has_a_forecast_when_it_begins(tmp_path):
+    path = new_run(tmp_path)
+    assert drive(path, FakePool(needs("wall", "beam"), 2)).minimal
+    forecasts = told(path, "forecast")
+    assert [each["round"] for each in forecasts] == [each["round"] for each in told(path, "round_started")]
+    assert all(low <= likely <= high for low, likely, high in (each["tests"] for each in forecasts))

@@ -54,7 +54,7 @@ def removed(state):
 
 def fresh(state, gone):
     """The fresh runs without the models `gone`, counted from 0, and how they ended; by the last check."""
-    first = state.isolated.first_run + (len(state.isolated.checks) - 1) * state.isolated.block
+    first = state.isolated.asked.run + (len(state.isolated.checks) - 1) * state.isolated.asked.block
     for test in state.tests:
         if test.removal is not None and test.run >= first and set(state.removals[test.removal - 1].models) == gone:
             yield test.run - first, test.outcome
@@ -100,7 +100,7 @@ def test_putting_back_any_one_model_makes_the_robot_fail_again(groups, jobs, sal
     for claim in claims:
         made = [outcome for run, outcome in fresh(state, gone - {claim.back}) if run < claim.runs]
         assert (claim.reached, claim.runs) == (made.count("pass"), len(made))
-    assert state.isolated.error <= 0.05
+    assert state.isolated.asked.error <= 0.05
 
 
 @given(after=st.integers(0, 90), jobs=st.integers(1, 3))
@@ -253,7 +253,7 @@ def test_one_that_is_given_up_leaves_the_run_as_it_was(interrupted):
 def test_another_number_of_fresh_runs_is_kept_where_one_was_interrupted(interrupted):
     path, before, oracle = interrupted
     state = work(path, FakePool(oracle, 2), at_least=30)
-    assert [one.at_least for one in state.isolations] == [FEWEST_RUNS, 30]
+    assert [one.asked.at_least for one in state.isolations] == [FEWEST_RUNS, 30]
     assert state.isolations[0].broken_off
     assert state.isolated.checks[-1].claims[0].runs == 30
     assert (state.status, state.reason) == (before.status, before.reason)
@@ -300,8 +300,8 @@ def test_where_chosen_runs_are_reduced_they_pass_and_one_fails_with_any_one_mode
         state = work(path, FakePool(oracle, jobs, salt))
     one, gone = state.isolated, removed(state)
     passing, baseline = frozenset(ELEMENTS) - gone, [test for test in state.tests if test.phase == "baseline"]
-    seeds = [test.seed for test in baseline if test.run in one.chosen]
-    assert len(seeds) == len(one.chosen) <= most
+    seeds = [test.seed for test in baseline if test.run in one.asked.chosen]
+    assert len(seeds) == len(one.asked.chosen) <= most
     assert all(oracle(frozenset(ELEMENTS), seed) == "similar" for seed in seeds)
     assert all(oracle(passing, seed) == "pass" for seed in seeds)
     assert all(any(oracle(passing | {name}, seed) != "pass" for seed in seeds) for name in gone)

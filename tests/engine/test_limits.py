@@ -10,7 +10,7 @@ from ddenv.engine.beginning import MOST_DEATHS, check_crash_loop
 from ddenv.engine.journal import Journal
 from ddenv.engine.limits import FACTOR, GENEROUS, KNOWN_AFTER, LEAST, MOST_LATE, memory_limit
 from ddenv.engine.pool import Pool
-from ddenv.engine.worker import Broken
+from ddenv.engine.worker import Broken, Run
 from ddenv.errors import UserError
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
@@ -47,15 +47,15 @@ HOW = {
 
 @pytest.mark.parametrize("how", slow(pytest.mark.programs, HOW, but=["segfaults"]))
 def test_whatever_a_simulator_does_is_an_error_of_its_test_and_the_next_one_works(hostile, how):
-    hostile.submit(1, frozenset({how}), 0)
+    hostile.submit(1, Run(frozenset({how}), 0))
     assert result(hostile) == (1, Broken("error", HOW[how]))
-    hostile.submit(9, frozenset({"ends"}), 0)
+    hostile.submit(9, Run(frozenset({"ends"}), 0))
     assert result(hostile)[1].outcome == "pass"
 
 
 @pytest.mark.programs
 def test_garbage_on_stdout_does_no_harm_and_does_not_fill_the_log(hostile, capfd):
-    hostile.submit(1, frozenset({"babbles"}), 7)
+    hostile.submit(1, Run(frozenset({"babbles"}), 7))
     test, made = result(hostile)
     assert (test, made.outcome, made.seed) == (1, "pass", 7)
     said = capfd.readouterr()
@@ -68,7 +68,7 @@ def test_garbage_on_stdout_does_no_harm_and_does_not_fill_the_log(hostile, capfd
 def test_workers_that_die_before_they_run_a_test_end_the_engine_with_the_reason():
     pool = Pool(*parts(), 1, dies_at_once)
     try:
-        pool.submit(1, EVERYTHING, 0)
+        pool.submit(1, Run(EVERYTHING, 0))
         with pytest.raises(UserError, match=r"die before they run a test: .*SIGKILL, perhaps for lack of memory"):
             result(pool)
     finally:
@@ -158,10 +158,9 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     before, after = (fold(written[: kinds.index("noted") + more]) for more in (0, 1))
     said = news("noted", before, after)
     assert said.startswith(
-        "this world is slow: 0.25 s simulated in each second; at this rate a test of 5 s takes 20 s, "
+        "this world is slow: 0.25 s simulated in each second; at this rate a test of 5 s takes 20 s; "
+        "what helps: fewer models that can move"
     )
-    assert "the baseline of 3 runs about 40 s" in said
-    assert "what helps: fewer models that can move" in said
     # The report keeps it.
     assert said[1:] in str(content(read_run(path)).lead)
 

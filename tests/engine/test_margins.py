@@ -9,6 +9,7 @@ from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool
+from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.evidence.margins import FIX_RUNS, fixes_of, margins_of
 from ddenv.runfile.events import EngineFailed, EngineStopped
@@ -198,7 +199,7 @@ def test_a_run_with_another_value_has_the_bits_of_the_world_that_is_exported(tmp
 
 def simulated(pool, keep, changes):
     """The robot's trajectory with seed 1."""
-    pool.submit(1, keep, 1, changes=changes)
+    pool.submit(1, Run(keep, 1, changes=changes))
     while not (ended := pool.finished(1.0)):
         pass
     return ended[0][1].trajectory

@@ -11,9 +11,8 @@ from functools import partial
 
 import pytest
 
-from ddenv.engine import disturbances
-from ddenv.engine.control import Control
-from ddenv.engine.disturbances import NEEDED, ClockJumps, DiskSpace
+from ddenv.engine import control
+from ddenv.engine.control import NEEDED, Control, DiskSpace
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile.events import EngineStarted, Paused, TestFinished
@@ -49,8 +48,8 @@ def undisturbed(tmp_path):
 
 
 def disk(monkeypatch, free):
-    monkeypatch.setattr(disturbances, "PERIOD", 0.0)
-    monkeypatch.setattr(disturbances.shutil, "disk_usage", lambda _: Usage(free()))
+    monkeypatch.setattr(control, "PERIOD", 0.0)
+    monkeypatch.setattr(control.shutil, "disk_usage", lambda _: Usage(free()))
 
 
 def lines_and_kinds(path):
@@ -124,17 +123,20 @@ def test_an_engine_that_waits_for_room_can_be_ended(tmp_path, monkeypatch):
         watched(path, terminated)
 
 
-def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path):
+def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path, monkeypatch):
     path = new_run(tmp_path)
     now = [1e9, 50.0]
     with RunFile(path) as file:
         file.own()
         journal = Journal(file)
         journal.record(EngineStarted(1, 1, "1", "x"))
-        jumps = ClockJumps(journal, lambda: now[0] + now[1], lambda: now[1])
+        monkeypatch.setattr(time, "time", lambda: now[0] + now[1])
+        monkeypatch.setattr(time, "monotonic", lambda: now[1])
+        engine = Control(journal, threading.Event())
         for jump, passed in ((0.1, 0.1), (-1.0, 600.0), (8 * 3600.0, 0.1), (0.0, 0.1), (-3 * 86400.0, 0.1)):
             now[0], now[1] = now[0] + jump, now[1] + passed
-            jumps.look()
+            engine.poll()
+        monkeypatch.undo()
     assert [data["seconds"] for data in told(path, "clock_jumped")] == pytest.approx([8 * 3600.0, -3 * 86400.0])
     assert "the machine slept, or its clock was set: that time does not count" in lines_and_kinds(path)[0]
 

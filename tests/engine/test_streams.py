@@ -125,7 +125,7 @@ def test_stamps_are_right_to_the_nanosecond(seconds):
 def test_the_run_that_passes_is_one_in_the_nearest_world_that_does(tmp_path):
     for moment, removal in ((fake_moments.finished, None), (fake_moments.isolated, 2)):
         run = moment(fake_run.FakeRun(tmp_path / f"{moment.__name__}.ddenv"))
-        chosen = dict(_chosen(run.file))
+        chosen = dict(_chosen(run.file, run.state))
         assert list(chosen) == ["whole", "left", "passing"]
         test = run.state.tests[chosen["passing"] - 1]
         assert (test.outcome, test.removal) == ("pass", removal)

@@ -51,8 +51,6 @@ def test_a_verdict_is_what_the_robot_does_in_every_part(moves):
     assert sum(name in attempt.verdict for name in can_go) == min(3, len(can_go))
     if not can_go:
         assert ("not the smallest" in attempt.verdict) == (len(held) > smallest)
-        untested = any(held - {name} not in [frozenset(each.kept) for each in attempt.tried] for name in held)
-        assert ("Your own tests" in attempt.verdict) == untested
     assert len({frozenset(each.kept) for each in attempt.tried}) == len(attempt.tried) <= attempt.budget
 
 
@@ -126,7 +124,4 @@ def test_the_first_search_that_ends_counts_and_the_end_says_it():
     walk.keep(searched("bench"))
     assert walk.score.right == 1 and len(walk.score.answered) == 1
     assert walk.go_on() and walk.back() and not walk.due, "a finished search is not asked for again"
-    end = course(0, Score(step=walk.last, moves=walk.score.moves))
-    words = " ".join(part for block in end.page.text for part, _ in block.spans)
-    assert "Your own search: After 1 test you stopped at 7 models" in words
     assert "questions right" in summary(opened(0).asked, walk.score)[0]

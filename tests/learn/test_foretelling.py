@@ -110,16 +110,10 @@ def test_every_answer_fits_what_the_run_did(run):
 
 
 @pytest.mark.parametrize("number", range(7))
-def test_a_lesson_asks_for_each_reason_once_and_then_tells_it(number):
+def test_a_lesson_asks_for_each_reason_once(number):
     lesson = opened(number)
     asked = [each for each in lesson.foretold if each is not None and each.reason is not None]
     assert len({each.kind for each in asked}) == len(asked)
-    for each in lesson.foretold:
-        if each is not None and each.kind and each.reason is None:
-            first = next(one for one in asked if one.kind == each.kind)
-            assert first.reason is not None
-            why = each.question.answers[each.question.right].why
-            assert len(why) > 60, "what happened, and the reason"
     assert lesson.asked == len(asked) + sum(
         bool(step.question or step.foretell or step.budget or step.race) for step in lesson.lesson.steps
     )

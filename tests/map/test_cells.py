@@ -37,7 +37,7 @@ def test_of_thousands_of_letters_some_are_left_and_one_of_each_part():
     grid = np.repeat(np.arange(3000).reshape(30, 100), 2, axis=0)
     texts = ["A" if index != 1717 else "B" for index in range(3000)]
     placed = place_signs(grid, centers_of(grid), signs_of(texts, sure=[5, 6]))
-    assert 50 < len(placed) <= 3000 / ROOM
+    assert 50 < len(placed) <= 3000 / ROOM + 3
     assert {1717, 5, 6} <= set(placed)
 
 

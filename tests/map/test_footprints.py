@@ -112,11 +112,5 @@ def test_colours_are_those_of_the_file_or_else_of_the_kind():
     }
 
 
-def test_shades_tell_low_from_high():
-    shades = {each.model.name: each.shade for each in drawn(*(box(f"{z}", z, 0, z=z) for z in (0, 1, 2)))}
-    assert shades == pytest.approx({"0": 0, "1": 0.5, "2": 1})
-    assert [each.shade for each in drawn(box("a", 0, 0), box("b", 2, 0))] == [1, 1]
-
-
 def test_nothing_is_drawn_of_an_empty_world():
     assert drawn() == ()

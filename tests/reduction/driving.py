@@ -13,10 +13,10 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction import procedure as steps
+from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.procedure import Certificate, Leg, Past
 from ddenv.reduction.stacks import Stacks
-from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.worlds import evidence
 
@@ -142,7 +142,7 @@ class Driver:
             broke=broke,
             proves=leg.rule.proves,
         )
-        inside = stacks.inside(leg.chain[-1])
+        inside = tuple(first for first, stack in stacks.by_first.items() if stack <= leg.chain[-1])
         return stacks.expand(tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide)))
 
     def leg(self, again=()):

@@ -88,7 +88,7 @@ def test_the_rule_is_seldom_wrong_at_either_of_its_rates():
     rule, made = Passing.of(0, 10), random.Random(4)
 
     def found(rate):
-        return standing([0], lambda _, run: made.random() < rate, rule).verdicts[0]
+        return standing([0], lambda _, run: made.random() < rate, rule)[0][0]
 
     assert sum(found(rule.wanted) == "similar" for _ in range(400)) >= 360
     assert sum(found(rule.rather_than) == "similar" for _ in range(400)) <= 40

@@ -22,9 +22,9 @@ from ddenv.reduction.procedure import (
     Similar,
     SteppedBack,
     judge,
+    last_good,
     procedure,
 )
-from ddenv.reduction.stepping_back import last_good
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.driving import Driver, Known, World
 from tests.reduction.worlds import ALGORITHMS

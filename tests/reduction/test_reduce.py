@@ -280,7 +280,7 @@ WRONG = {
     ),
     "unknown algorithm": ({"algorithm": "ddmim"}, "no algorithm 'ddmim' (did you mean ddmin?)"),
     "unknown schema": ({"partitioning": "timesegs"}, "no partitioning 'timesegs' (did you mean timeseg?)"),
-    "a place is missing": ({"positions": {"a": (0, 0, 0)}}, "positions['b']: is missing"),
+    "a place is missing": ({"positions": {"a": (0, 0, 0)}}, "positions['b']: expected x, y, z m, found None"),
     "a place is none": ({"positions": POSITIONS | {"a": (0, float("nan"), 0)}}, "positions['a']: expected x, y, z m"),
     "a place is text": ({"positions": POSITIONS | {"a": "near"}}, "positions['a']: expected x, y, z m"),
     "a trajectory of another shape": ({"trajectory": np.zeros((3, 4))}, "shape (N, 5), found shape (3, 4)"),

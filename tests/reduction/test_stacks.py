@@ -46,16 +46,15 @@ def test_stacks_are_the_connected_parts_of_the_environment(count, pairs):
 
 
 @given(COUNTS, PAIRS, st.sets(st.integers(0, 11)))
-def test_what_is_expanded_has_the_same_stacks_inside(count, pairs, chosen):
+def test_what_holds_any_of_a_stack_is_completed_to_whole_stacks(count, pairs, chosen):
     found = stacks_of(count, pairs)
-    some = tuple(model for model in found.representatives if model in chosen)
-    assert found.inside(Environment.of(found.expanded(some))) == some
     models = Environment.of(model for model in chosen if model < count)
     whole = found.of_any(models)
     assert models <= whole
-    assert whole == Environment.of(found.expanded(found.inside(whole)))
-    # Of a stack that is not whole nothing counts.
-    assert Environment.of(found.expanded(found.inside(models))) <= models
+    inside = [first for first, stack in found.by_first.items() if stack <= whole]
+    assert whole == Environment.of(found.expanded(inside))
+    # No stack is added without reason.
+    assert not any(found.by_first[first].isdisjoint(models) for first in inside)
 
 
 @every_search

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import good_enough, settle
-from ddenv.reduction.algorithms import sweep
-from ddenv.reduction.stepping_back import groups_again, last_good, tried_again
+from ddenv.reduction.algorithms import sweep, tried_again
+from ddenv.reduction.procedure import groups_again, last_good
 from tests.reduction.worlds import carried_through
 
 CHAIN = [Environment.whole(length) for length in range(12, 0, -1)]

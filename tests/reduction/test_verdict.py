@@ -45,6 +45,11 @@ def in_order(shown, candidates, rule):
     return None, verdicts, made
 
 
+def winner_of(verdicts):
+    """The first similar candidate, if all before it are judged."""
+    return len(verdicts) - 1 if verdicts[-1] == "similar" else None
+
+
 @given(
     rates=rates,
     salt=salts,
@@ -57,12 +62,12 @@ def test_any_number_of_workers_in_any_order_finds_what_one_worker_finds(rates, s
     order, shown, candidates = random.Random(salt), outcomes(rates, salt, breaks), range(len(rates))
     winner, verdicts, made = in_order(shown, candidates, rule)
     known, running = {}, []
-    while (now := standing(candidates, lambda *test: known.get(test), rule, enough=enough)).wanted:
-        running += [test for test in now.wanted if test not in running][: workers - len(running)]
+    while (now := standing(candidates, lambda *test: known.get(test), rule, enough=enough))[1]:
+        running += [test for test in now[1] if test not in running][: workers - len(running)]
         done = running.pop(order.randrange(len(running)))
         known[done] = shown(*done)
-    assert now.winner == winner
-    assert list(now.verdicts) == verdicts
+    assert now[0] == verdicts
+    assert winner_of(now[0]) == winner
     assert set(made) <= set(known)
     if workers == 1:
         assert list(known) == made
@@ -74,39 +79,36 @@ def test_the_runs_that_decided_are_those_that_one_worker_makes(rates, salt, rule
     _, verdicts, made = in_order(shown, range(len(rates)), rule)
     for candidate in range(len(verdicts)):
         results = [shown(*test) for test in made if test[0] == candidate]
-        runs, hits = decided_by(lambda run, candidate=candidate: shown(candidate, run), rule)
+        runs, hits = decided_by(shown, candidate, rule)
         assert (runs, hits) == (len(results), results.count(True))
 
 
 @given(rates=rates, salt=salts, rule=rules, refused=st.sets(st.integers(0, 4)))
 def test_refused_candidates_need_no_test_and_cannot_win(rates, salt, rule, refused):
     shown, candidates = outcomes(rates, salt), range(len(rates))
-    now = standing(candidates, shown, rule, refused.__contains__)
-    assert now.winner == in_order(shown, [one for one in candidates if one not in refused], rule)[0]
-    assert standing(candidates, lambda *_: None, rule, lambda _: True).wanted == ()
+    verdicts, _ = standing(candidates, shown, rule, refused.__contains__)
+    assert winner_of(verdicts) == in_order(shown, [one for one in candidates if one not in refused], rule)[0]
+    assert standing(candidates, lambda *_: None, rule, lambda _: True)[1] == []
 
 
 @given(rates=rates, salt=salts, rule=rules, judged=st.integers(0, 4))
 def test_candidates_that_are_judged_need_not_be_looked_at_again(rates, salt, rule, judged):
     shown, count = outcomes(rates, salt), len(rates)
-    whole = standing(range(count), shown, rule)
-    judged = min(judged, len(whole.verdicts) - 1)
-    rest = standing(range(judged, count), shown, rule, first=judged)
-    assert rest.verdicts == whole.verdicts[judged:]
-    assert rest.winner == whole.winner
+    whole, _ = standing(range(count), shown, rule)
+    judged = min(judged, len(whole) - 1)
+    assert standing(range(judged, count), shown, rule, first=judged)[0] == whole[judged:]
 
 
 @given(salt=salts, rule=rules, broken=st.integers(0, 3))
 def test_a_broken_run_that_decides_leaves_a_candidate_unknown_and_the_next_one_may_win(salt, rule, broken):
     hits = outcomes([1.0, 1.0], salt)
-    runs, _ = decided_by(lambda _: True, rule)
+    runs, _ = decided_by(lambda *_: True, 0, rule)
 
     def shown(candidate, run):
         return "broken" if (candidate, run) == (0, broken) else hits(candidate, run)
 
-    now = standing([0, 1], shown, rule)
-    assert now.verdicts == (("unknown", "similar") if broken < runs else ("similar",))
-    assert now.winner == int(broken < runs)
+    verdicts, _ = standing([0, 1], shown, rule)
+    assert verdicts == (["unknown", "similar"] if broken < runs else ["similar"])
 
 
 def test_no_more_is_looked_at_than_workers_can_do():
@@ -117,7 +119,7 @@ def test_no_more_is_looked_at_than_workers_can_do():
             seen.append(number)
             yield number
 
-    assert len(standing(candidates(), lambda *_: None, Acceptance(4), enough=8).wanted) == 8
+    assert len(standing(candidates(), lambda *_: None, Acceptance(4), enough=8)[1]) == 8
     assert seen == [0, 1]
 
 

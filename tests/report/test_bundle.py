@@ -49,7 +49,7 @@ def test_the_run_that_goes_along_says_the_same_and_has_only_the_trajectories_tha
     )
     assert copy.evidence == whole.evidence
     assert copy.nearest == whole.nearest
-    assert copy.nearest.instants
+    assert copy.nearest.parting
     assert not copy.troubles
     assert 0 < trajectories(tmp_path / "handed" / "run.ddenv") < trajectories(run)
 

@@ -124,20 +124,18 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
     assert "2 of 11 models are enough to make the robot fail" in text
     assert "Minimal: no single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %)" in text
     assert "without crate_01 12 11 pass, 1 similar" in text.replace("1 similar, 11 pass", "11 pass, 1 similar")
-    assert "the robot got stuck at (2.00, 0.40, 0.20) m, 4.0 m short of the goal at (6, 0)" in text
+    assert "the robot got stuck at (2.00, 0.40, 0.20) m." in text
     assert "got stuck in 3 of 4 runs: 75 %, 95 % interval (Wilson) 30 % to 95 %" in text
-    assert "11 → 6 → 2 models" in text
     assert f"ddenv test {run.path} --minimal --leave-each-out" in text
     assert "ddenv run crates.yaml --pair model2model/failure-proximal --iterations 3" in text
 
 
 @pytest.mark.programs
-def test_the_nearest_world_that_passes_has_its_map_and_two_runs_side_by_side(run, tmp_path):
+def test_the_nearest_world_that_passes_has_its_map(run, tmp_path):
     fake_moments.isolated(run)
-    assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in page(run, tmp_path).text
-    rows = rows_of(run, "nearest world that passes: x, y, m")
-    assert {row[-1] for row in rows} == {"0.00", "1.00"}
-    assert len(rows) == 8
+    text = page(run, tmp_path).text
+    assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in text
+    assert "The nearest world that passes, from above" in text
 
 
 def test_what_a_removal_drops_stands_in_the_table_of_models(run):
@@ -160,17 +158,6 @@ def test_rounds_as_they_ended_and_what_was_decided_by_hand(run, tmp_path):
         "took back without A: 6 models again",
         "pinned crate_00",
     ]
-    assert [(row[0], row[-1]) for row in rows_of(run, "tried by hand")] == [
-        ("try 1", "similar, adopted"),
-        ("try 2", "dissimilar"),
-        ("try 3", "under way"),
-    ]
-    assert [(row[0], row[2], row[-1]) for row in rows_of(run, "came by")] == [
-        ("0", "the whole world", ""),
-        ("1", "part A", ""),
-        ("├ 2", "without A", "taken back"),
-        ("3", "try 1, adopted by hand", "here"),
-    ]
     # The page needs nothing else, and runs nothing.
     made = page(run, tmp_path)
     assert not made.tags & {"script", "link", "img", "iframe", "a", "object"}
@@ -192,24 +179,10 @@ def test_other_failures_have_names_numbers_and_the_smallest_environment(run):
     assert seen.strong == {0}
 
 
-def test_a_branch_with_steps_of_its_own_is_told_before_the_way_to_here(run):
-    run.created().baseline()
-    left = run.elements
-    for _ in range(3):
-        run.start_round(2, left)
-        test, left = run.similar(0), left[: (len(left) + 1) // 2]
-        run.reduce(0, left, test)
-    run.go_back(1)
-    run.start_round(2, run.elements[:6])
-    run.reduce(1, run.elements[3:6], run.similar(1))
-    assert [row[0] for row in rows_of(run, "came by")] == ["0", "1", "├ 2", "│ 3", "4"]
-
-
 def test_settings_that_were_changed_on_the_way(run):
     run.created().baseline().write("changed", settings={"iterations": 7})
     rows = {row[0]: row[1] for row in rows_of(run, "setting")}
     assert rows["iterations"] == "7 (changed during the run; at first 3)"
-    assert rows["goal"] == "x 6 m, y 0 m"
 
 
 STATES = {

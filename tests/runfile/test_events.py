@@ -92,7 +92,7 @@ def test_a_number_that_cannot_be_is_named(written):
             # A negative process is nonsense to nobody who reads it.
             for value in NONSENSE[field.name in ("pid", "seconds") :]:
                 wrong = complaint(kind, data | {field.name: value})
-                assert wrong.startswith(f"damaged run file: event 7 ({kind}): {field.name}: expected a"), wrong
+                assert wrong.startswith(f"damaged run file: event 7 ({kind}): {field.name}: should be"), wrong
                 assert ", found " in wrong and wrong.isprintable() and len(wrong) < 160
                 checked += 1
     assert checked > 300
@@ -101,16 +101,24 @@ def test_a_number_that_cannot_be_is_named(written):
 @pytest.mark.parametrize(
     ("kind", "data", "named"),
     [
-        ("test_started", {"phase": "nap"}, "phase: expected one of baseline, round, hand, audit, certify, isolate"),
-        ("round_started", {"candidates": [["partition", 0]]}, "candidates: expected a list of 3, found a list of 2"),
-        ("round_started", {"candidates": [["part", 0, None]]}, "candidates: expected one of partition, complement"),
-        ("environment_named", {"models": "xyz"}, "models: expected hexadecimal digits, found 'xyz'"),
-        ("baseline_finished", {"judged": {"outcomes": {"x": "pass"}}}, "judged: outcomes: expected an object with"),
-        ("baseline_finished", {"rate": 1.5}, "rate: expected a number, 0 to 1, found 1.5"),
-        ("certificate_finished", {"claims": [{"without": 0}]}, "claims: environment: is missing"),
-        ("finished", {"minimal": 1}, "minimal: expected true or false, found 1"),
-        ("finished", {"reason": ["[" * 500]}, "reason: expected text, found a list of 1"),
-        ("engine_started", {"command": -1}, "command: expected a whole number"),
+        (
+            "test_started",
+            {"phase": "nap"},
+            "phase: should be 'baseline', 'round', 'hand', 'audit', 'certify' or 'isolate'",
+        ),
+        ("round_started", {"candidates": [["partition", 0]]}, "candidates: 0: 2: is missing"),
+        (
+            "round_started",
+            {"candidates": [["part", 0, None]]},
+            "candidates: 0: 0: should be 'partition' or 'complement'",
+        ),
+        ("environment_named", {"models": "xyz"}, "models: should be hexadecimal digits"),
+        ("baseline_finished", {"judged": {"outcomes": {"x": "pass"}}}, "judged: outcomes: x: '[key]': should be a"),
+        ("baseline_finished", {"rate": 1.5}, "rate: should be less than or equal to 1, found 1.5"),
+        ("certificate_finished", {"claims": [{"without": 0}]}, "claims: 0: environment: is missing"),
+        ("finished", {"minimal": 1}, "minimal: should be a valid boolean, found 1"),
+        ("finished", {"reason": ["[" * 500]}, "reason: should be a valid string, found ["),
+        ("engine_started", {"command": -1}, "command: should be a whole number"),
     ],
 )
 def test_what_is_wrong_is_said_with_what_was_expected(written, kind, data, named):
@@ -131,7 +139,7 @@ def test_all_before_a_damaged_event_is_read(tmp_path):
     raw(run.file, "paused", {"x": 1})
     run.write("resumed")
     state = RunState()
-    with pytest.raises(UserError, match=r"\(paused\): 'x': is no field of it"):
+    with pytest.raises(UserError, match=r"\(paused\): x: is no field of it"):
         for one in run.file.read():
             state = apply(state, one)
     assert state == before

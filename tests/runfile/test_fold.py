@@ -238,7 +238,7 @@ def test_the_tests_of_a_certificate_are_found_without_a_look_at_all_others():
 
 
 def test_an_outcome_that_nobody_knows_is_told():
-    with pytest.raises(UserError, match=r"outcome: expected one of similar, .*, found 'splendid'"):
+    with pytest.raises(UserError, match=r"outcome: should be 'similar', .*, found 'splendid'"):
         read_back((started()[0], started()[1] | {"environment": 0}), finished(outcome="splendid"))
 
 

@@ -52,7 +52,7 @@ runs = st.lists(st.lists(st.integers(0, 4), min_size=2, max_size=2), max_size=4)
 
 @pytest.fixture(autouse=True)
 def few_states_are_kept():
-    with patch("ddenv.runfile.position.GAP", 3), patch("ddenv.runfile.position.KEPT", 4):
+    with patch("ddenv.runfile.position.GAP", 3):
         yield
 
 

@@ -136,7 +136,7 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
         await shows(page, "document.title === 'small · ddenv'")
         await shows(page, "document.querySelector('#caption .models').textContent === '2 of 4 models'")
         await shows(page, "viewer.scene_tree.find(['world', 'models', '003 board']).object.visible === false")
-        await shows(page, "viewer.scene_tree.find(['world', 'removed', '003 board']).object.visible === true")
+        await shows(page, "viewer.scene_tree.find(['world', 'removed', 'all']).object.visible === true")
         await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
         assert await page.value("forbidden") == []
         picture = np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB"))

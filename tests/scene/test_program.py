@@ -24,10 +24,11 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from ddenv.runfile.lock import engine_lock
+from ddenv.runfile.reading import plain
 from ddenv.runfile.store import Live
+from ddenv.runfile.tested import Wanted
 from ddenv.runs import programs
 from ddenv.runs.remembered import state_file
-from ddenv.runs.wanted import Wanted, written
 from ddenv.scene import server
 from tests.tiers import slow
 from tests.waiting import PATIENCE, wait_until
@@ -179,10 +180,10 @@ async def test_a_viewer_says_what_is_shown(in_round):
     process = programs.start_scene(in_round.path)
     try:
         url = url_of(process)
-        process.stdin.write("nonsense\n" + written(Wanted(begun, 1, 1)))
+        process.stdin.write("nonsense\n" + f"{json.dumps(plain(Wanted(begun, 1, 1)))}\n")
         process.stdin.flush()
         await messages(url, titled("part B · not tested yet"))
-        process.stdin.write(written(Wanted()))
+        process.stdin.write(f"{json.dumps(plain(Wanted()))}\n")
         process.stdin.close()
         await messages(url, titled("the failure in what is left"))
     finally:

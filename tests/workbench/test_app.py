@@ -91,7 +91,7 @@ class Choosy(Screen):
 
     def compose(self):
         ids = [binding.id for binding in self.BINDINGS]
-        yield KeyFooter(ids, ids)
+        yield KeyFooter(ids)
 
 
 async def test_footer_help_and_commands_offer_only_what_can_be_done_now(run):

@@ -8,13 +8,13 @@ import pytest
 from attached import Attached
 from textual.widgets import OptionList
 
-from ddenv.runs.wanted import Wanted, read
+from ddenv.runfile.reading import Invalid, read
+from ddenv.runfile.tested import Wanted
 from ddenv.words.signs import CLAIM, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.signs import SignsDialog, signs
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.candidate_rows import COLUMNS, FRESH_COLUMNS, MEANINGS
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.facts import FactsDialog
 from ddenv.workbench.widgets.lines import Lines
@@ -29,7 +29,7 @@ async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run,
         await session.press("less_than_sign", "less_than_sign")
         assert "round 2" in session.text("#header")
         assert table.words(0)["verdict"] == "● similar"
-        assert world.candidate.label == "part A"
+        assert world.shown.candidate.label == "part A"
         assert world.snapshot.state.environment == tuple(run.elements[:2])
         assert "reduced to 2 models after 6 tests" in session.text("#happening")
         assert "◂ moment 22 of 182" in session.text("#status")
@@ -159,7 +159,7 @@ async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch,
     )
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
-        last = lambda: read(told.read_text().splitlines()[-1]) if told.exists() else None  # noqa: E731
+        last = lambda: read(Wanted, told.read_text().splitlines()[-1]) if told.exists() else None  # noqa: E731
         await session.press("m")
         await session.app.workers.wait_for_complete()
         await session.press("escape", "down", "down")
@@ -172,18 +172,5 @@ async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch,
 
 def test_lines_that_are_no_wish_are_no_wish():
     for line in ("", "nonsense", "[1]", '{"at": "x"}', '{"at": true}', '{"other": 1}'):
-        assert read(line) is None
-
-
-async def test_tooltips_say_what_a_column_means_and_which_models_a_row_has(run):
-    fake_moments.mid_round(run).hold()
-    async with Attached(run) as session:
-        table = session.screen.query_one(Candidates)
-        await session.pilot.hover(Candidates, offset=(5, 0))
-        assert "part of the environment" in table.tooltip
-        await session.pilot.hover(Candidates, offset=(5, 1))
-        assert table.tooltip == "part A: crate_00, crate_01"
-        await session.pilot.hover(Candidates, offset=(5, 15))
-        assert table.tooltip is None
-        names = {column.name for column in (*COLUMNS, *FRESH_COLUMNS)}
-        assert names <= MEANINGS.keys()
+        with pytest.raises(Invalid):
+            read(Wanted, line)

@@ -51,13 +51,6 @@ def test_what_the_user_decided_is_marked_on_the_axis():
     assert rule.count(DECIDED) == 2
 
 
-def test_a_legend_stands_where_nothing_else_does():
-    wide, narrow = lines(GUIDED, 90, 14), lines(GUIDED, 30, 14)
-    for line, words in zip(wide, ("█ models left", "╌ at least 11 needed", "▲ you decided"), strict=False):
-        assert line.rstrip().endswith(words)
-    assert not any("models left" in line for line in narrow[:-1])
-
-
 def test_models_come_back_when_a_reduction_is_taken_back():
     text = lines(Course((Point(0, 10), Point(5, 2), Point(10, 10)), 15), 40, 9)
     assert text[0][4] == text[0][-1] == "█"

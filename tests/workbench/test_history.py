@@ -4,18 +4,16 @@ from dataclasses import replace
 
 import fake_moments
 import fake_run
-import pytest
 from attached import Attached, starts
 from textual.widgets import DataTable
 
 from ddenv.runfile import branches
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import Node
-from ddenv.workbench.history import Compare, History, compare
-from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.help.side_by_side import SideBySide
+from ddenv.workbench.history import History, lines
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
-from tests.tiers import slow
 
 
 def tree(*parents, here=0):
@@ -32,7 +30,6 @@ def test_the_way_to_where_the_run_is_goes_straight_down():
     assert tree(0, 1, 1, here=1) == ["0", "1", "├─2", "3"]
     # Long histories are drawn at once.
     assert tree(*range(1500), here=1500)[-1] == "1500"
-    assert branches.path([], 0) == []
 
 
 def test_what_a_node_is_has_a_sign_words_and_tests_of_its_own(run):
@@ -45,13 +42,6 @@ def test_what_a_node_is_has_a_sign_words_and_tests_of_its_own(run):
     state = fold(fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
     assert branches.words(state.nodes[-1], 0) == "minimal"
     assert branches.words(replace(state.nodes[-1], rejected=True), 0) == "was minimal"
-
-
-def test_two_environments_are_compared_by_name(run):
-    state = fold(fake_moments.guided(run).file.events())
-    common, *alone = compare(state.nodes[2], state.nodes[3])
-    assert common == ("crate_00", "crate_01", "crate_04")
-    assert alone == [("crate_05",), ("crate_02", "crate_03")]
 
 
 def cells(session):
@@ -69,18 +59,19 @@ async def test_the_history_follows_the_run_and_compares(run):
         assert [row[4] for row in cells(session)] == ["3 of 4", "1 of 1", "1 of 1", "1 of 1"]
         assert [row[5] for row in cells(session)] == ["", "", "taken back", "here"]
         assert history.under_cursor.number == 3
-        lines = history.query_one(Lines)
-        decided = " ".join(lines.render_line(row).text[10:].strip() for row in range(6))
+        said = history.query_one(Lines)
+        decided = " ".join(said.render_line(row).text[10:].strip() for row in range(6))
         assert decided.startswith("took back without A: 6 models again pinned crate_00")
         await session.press("c")
         assert "mark one environment first" in session.said()
         await session.press("m", "c")
         assert "this one is marked" in session.said()
         await session.press("up", "c")
-        assert isinstance(session.app.screen, Compare)
-        words = session.dialog()
-        assert "only in A: 2 models" in words
-        assert "in both: 3 models" in words
+        assert isinstance(session.app.screen, SideBySide)
+        first, second = session.screen.snapshot.state.nodes[3], session.screen.snapshot.state.nodes[2]
+        told = {name: sides for name, *sides in lines(first, second, 3)}
+        assert told["only in this one"] == ["2: crate_02, crate_03", "1: crate_05"]
+        assert told["in both"][0] == "3: crate_00, crate_01, crate_04" and told["own tests"] == ["6", "6"]
         await session.press("escape")
         run.start_round(2, run.elements[:5])
         run.reduce(0, run.elements[:2], run.similar(0))
@@ -113,16 +104,3 @@ async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_
             in session.said()
         )
         assert len(started) == 1
-
-
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (121, 36), (147, 40)], but=[(121, 36)]), ids=str)
-async def test_both_maps_have_one_scale_and_one_frame(run, size):
-    fake_moments.guided(run).hold()
-    async with Attached(run, size) as session:
-        await session.press("h", "m", "up", "up", "c")
-        await session.pilot.pause()
-        first, second = session.app.screen.query(WorldMap)
-        assert first.viewport.view == second.viewport.view
-        assert first.region.y == second.region.y
-        words = session.dialog()
-        assert "6 own tests" in words and "5 own tests" in words

@@ -319,7 +319,7 @@ def test_a_date_that_no_calendar_has_is_no_setting(tmp_path, monkeypatch):
     path = tmp_path / "config.yaml"
     path.write_text("theme: 2024-13-45")
     monkeypatch.setenv("DDENV_CONFIG", str(path))
-    with pytest.raises(UserError, match="quotes"):
+    with pytest.raises(UserError, match="not valid YAML"):
         read_config()
 
 

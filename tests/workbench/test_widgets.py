@@ -104,8 +104,8 @@ def test_recent_runs_say_how_they_stand(runs):
     fake_moments.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
     (runs / "c.ddenv").write_text("no run")
     told = {run.path.stem: run for run in RunsFolder(runs).look()}
-    assert told["a"].words == "2/11 finished"
-    assert told["b"].words == "6/11 engine is gone"
+    assert (told["a"].brief, told["a"].state_words) == ("2/11", "minimal")
+    assert (told["b"].brief, told["b"].state_words) == ("6/11", "engine is gone")
     assert told["c"].trouble
     assert RunsFolder(runs / "nowhere").look() == []
 

@@ -56,10 +56,7 @@ def why_command(run: str, as_json: bool) -> int:
 )
 @click.option("--again", is_flag=True, help="Search again, although the nearest world that passes is known.")
 @click.option("--give-up", is_flag=True, help="End a search that was interrupted; the run is as it was before.")
-@options.jobs_option()
-@options.cluster_option
-@options.trust_option
-@options.json_option
+@options.engine_options
 def isolate_command(
     run: str, runs: int | None, again: bool, give_up: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
 ) -> int:

@@ -12,7 +12,6 @@ import click
 
 from ddenv.cli.options import json_option, runs
 from ddenv.cli.terminal import terminal_columns, wrapped
-from ddenv.cli.workbench import PORT
 from ddenv.doctor import Finding, is_well
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, runs_folder
@@ -102,10 +101,9 @@ def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
 def _found(run: str | None, copy: Path | None) -> Iterator[Finding]:
     from ddenv.doctor.machine import installation, machine, runs, terminal
     from ddenv.doctor.run_health import repair, run_health
-    from ddenv.runs.programs import FIRST_PORT
 
     if run is None:
-        yield from (*installation(), *terminal(), *machine({"scene": FIRST_PORT, "serve": PORT}), *runs())
+        yield from (*installation(), *terminal(), *machine(), *runs())
         return
     # Asked about one run, only what is wrong elsewhere is worth a line.
     yield from (repair(find_run(run), copy) if copy is not None else run_health(find_run(run)))

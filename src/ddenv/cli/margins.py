@@ -27,10 +27,7 @@ BUDGET = 300
 )
 @click.option("--budget", type=options.whole(1), metavar="N", help="Runs at most; 300 if not given.")
 @click.option("--list", "listed", is_flag=True, help="Only list the numbers, with how far each is tried.")
-@options.jobs_option("Runs")
-@options.cluster_option
-@options.trust_option
-@options.json_option
+@options.engine_options
 def margins_command(
     run: str,
     globs: tuple[str, ...],

@@ -87,7 +87,6 @@ class Number(click.ParamType):  # type: ignore[type-arg]  # as above
 
 
 def whole(least: int, most: int | None = None) -> Number:
-    """Whole numbers in a range."""
     return Number(Setting(None, "", least=least, most=most, kind=int))
 
 
@@ -126,7 +125,6 @@ def _option(one: Setting) -> Option:
 
 
 def jobs_option(what: str = "Tests") -> Option:
-    """How many tests or runs are made at the same time."""
     words = f"{what} at the same time."
     return click.option("--jobs", type=Number(JOBS), default=processor.usable_cores(), show_default=True, help=words)
 
@@ -140,6 +138,9 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print one su
 trust_option = click.option(
     "--trust", is_flag=True, help="Start the controller or the simulator that the scenario brings along."
 )
+
+# For commands that start an engine on a run that is there.
+engine_options = together(jobs_option(), cluster_option, trust_option, json_option)
 
 # For commands that take a scenario.
 scenario_options = together(
@@ -173,6 +174,12 @@ reading_options = together(
         multiple=True,
         type=click.Choice(IGNORABLE),
         help="Skip such elements instead of refusing the file; may be repeated.",
+    ),
+    click.option(
+        "--inside",
+        is_flag=True,
+        default=None,
+        help="Remove single parts of models that never move, such as the walls of a house, in place of whole models.",
     ),
 )
 

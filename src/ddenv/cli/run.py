@@ -75,13 +75,10 @@ def announce_needs(sdf: Path, uris: list[str]) -> None:
 
 @click.command("resume")
 @options.run_argument
-@options.jobs_option()
-@options.cluster_option
 @click.option("--mixed", is_flag=True, help="Go on even if other versions or another processor give other results.")
 @click.option("--anyway", is_flag=True, help="Go on even if the last engines died again and again.")
 @click.option("--again", is_flag=True, help="Make all tests again, in a new run of the same scenario.")
-@options.trust_option
-@options.json_option
+@options.engine_options
 def resume_command(
     run: str, jobs: int, cluster: str | None, mixed: bool, anyway: bool, again: bool, trust: bool, as_json: bool
 ) -> int:
@@ -132,10 +129,7 @@ def resume_command(
     metavar="PART",
     help="Go on with the last certificate, and keep all of its runs, until it shows that this part of the rate is kept.",
 )
-@options.jobs_option()
-@options.cluster_option
-@options.trust_option
-@options.json_option
+@options.engine_options
 def certify_command(
     run: str, runs: int | None, certify_rate: float | None, jobs: int, cluster: str | None, trust: bool, as_json: bool
 ) -> int:

@@ -10,7 +10,7 @@ import click
 
 from ddenv.cli import options
 from ddenv.cli.run import announce_needs
-from ddenv.cli.terminal import announced, asking, say_written
+from ddenv.cli.terminal import announce, asking, say_written
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
 from ddenv.text import percent
@@ -132,8 +132,8 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
     check_drake()
     with RunFile(run) as opened:
         trusted_scenario(opened, asking(trust))
-    with announced(f"making runs of {run.stem} again ...") as say_so:
-        lines = write_mcap(run, file, lambda name, seconds: say_so(f"/{name}: {seconds:.1f} s made again"))
+    announce(f"making runs of {run.stem} again ...")
+    lines = write_mcap(run, file)
     print("\n".join([f"wrote {file}", *(f"  {line}" for line in lines)]))
 
 

@@ -8,21 +8,19 @@ from typing import Any
 
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out
 from ddenv.evidence.rates import wilson_interval
-from ddenv.evidence.took_part import simulated
-from ddenv.runfile.progress import Certificate, Claim, Node
+from ddenv.evidence.slices import simulated
+from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
 from ddenv.words.claims import (
     drift,
-    instead,
     meaning,
     means,
     missing,
     promise,
     rate,
     seen,
-    short,
     smaller_known,
     verdict_on,
     what_ran,
@@ -113,7 +111,6 @@ def _whole_world(state: RunState) -> FreshRuns | None:
 
 
 def summary_lines(state: RunState, path: Path) -> list[str]:
-    """The same for people."""
     before, after = len(state.elements), len(state.environment)
     if state.baseline is None:
         return [printable(f"run file: {path}")]
@@ -154,30 +151,23 @@ def _next(state: RunState, path: Path) -> list[str]:
 
 
 def _certificate_lines(state: RunState) -> list[str]:
+    """What fresh runs show; an unfinished certificate has shown something, too, which holds whenever it is stopped."""
     found = current(state)
     if found is None:
         rates = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
-        return [f"{rates[0]}; {missing(state)}", *_shown_so_far(state)]
+        rows = [one for one in fresh_runs(state) if one.shows]
+        return [
+            f"{rates[0]}; {missing(state)}",
+            *(f"  {what_ran(one)}: {rate(one)}: {one.shows}" for one in rows[:MOST_NAMES]),
+        ]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
-    lines += [_removal(state, found, claim) for claim in removals[:MOST_NAMES]]
+    lines += [f"  without {one.without}: {rate(one)}: {means(state, found, one)}" for one in removals[:MOST_NAMES]]
     if (more := len(removals) - MOST_NAMES) > 0:
         lines.append(f"  and {count(more, 'more model')}")
     if (whole := _whole_world(state)) is not None:
         lines.append(f"  the whole world: {rate(whole)}")
     return [*lines, promise(state, found)] if state.certified else lines
-
-
-def _shown_so_far(state: RunState) -> list[str]:
-    """What an unfinished certificate has shown, which holds whenever it is stopped."""
-    rows = (one for one in fresh_runs(state)[:MOST_NAMES] if one.shows)
-    return [f"  {what_ran(one)}: f in {one.shown} of {count(one.runs, 'fresh run')}: {one.shows}" for one in rows]
-
-
-def _removal(state: RunState, found: Certificate, claim: Claim) -> str:
-    other = instead(state, found, claim)
-    often = f", at most {percent(claim.bound)} as often" if claim.bound is not None and claim.bound < 1.0 else ""
-    return f"  without {claim.without}: {rate(claim)}{often}: {short(claim)}{f'; {other}' if other else ''}"
 
 
 def broken(state: RunState) -> list[str]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 
 import click
 
@@ -50,23 +49,6 @@ def say_written(files: Iterable[object]) -> None:
 def announce(line: str) -> None:
     """Announces a slow step on stderr, so that programs can read stdout."""
     print(printable(line), file=sys.stderr, flush=True)
-
-
-@contextmanager
-def announced(line: str) -> Iterator[Callable[[str], None]]:
-    """Announces a slow step; on a terminal, with the time it has taken so far. Yields what replaces the line there."""
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        announce(line)
-        yield lambda _: None
-        return
-    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(printable(line), total=None)
-        yield lambda words: progress.update(task, description=printable(words))
 
 
 def asking(trust: bool) -> Callable[[str], bool]:

@@ -90,7 +90,6 @@ def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust:
 
 
 def line(result: Mapping[str, Any]) -> str:
-    """A run and how it ended."""
     how = result["failure"]
     if result["end_pose"] is not None:
         x, y, z = result["end_pose"][:3]

@@ -7,17 +7,17 @@ import os
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ddenv.cli.options import Numbers, reading_options, scenarios, together
-from ddenv.cli.terminal import announce, announced, say_written, terminal_columns, wrapped
+from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
-from ddenv.text import count, first_of, padded, printable, shortened, width
+from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_directives
 
 if TYPE_CHECKING:
@@ -26,19 +26,9 @@ if TYPE_CHECKING:
 
 # A line names so many models.
 MOST_NAMES = 5
-LONGEST_NAME, SHORTEST_NAME = 34, 10
-GAP = "  "
-# The columns of the table. A row has the notes of a model twice: with details, and as numbers only.
-HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes", "notes")
-TO_THE_RIGHT = (2, 6)
-# Which of them are shown, from wide terminals to narrow ones.
-CHOICES = (
-    (0, 1, 2, 3, 4, 5, 6, 7),
-    (0, 1, 2, 3, 4, 5, 6, 8),
-    (0, 1, 3, 4, 5, 6, 8),
-    (0, 1, 4, 5, 6, 8),
-    (0, 1, 4, 5, 8),
-)
+LONGEST_NAME = 34
+HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes")
+TO_THE_RIGHT = ("links", "yaw")
 
 # A world, as it is read.
 world_argument = together(
@@ -63,7 +53,7 @@ def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     scenario = load_scenario(path) if kind == "scenario" else None
     file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
     read_as = reading_of(own, **reading)
-    return read_world(file, read_as, announce), read_as
+    return read_world(file, read_as), read_as
 
 
 # How a world was read: a table for people, plain data for programs.
@@ -82,7 +72,6 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 def world_report(world: World) -> dict[str, Any]:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.placement import inside
-    from ddenv.world.sdf.official import refused
 
     removable = frozenset(world.elements())
     return {
@@ -93,7 +82,6 @@ def world_report(world: World) -> dict[str, Any]:
         "models": [_described(model, world, removable) for model in world.models],
         "notes": _notes(world, ""),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
-        "refused": [{"why": why, "place": place} for why, place in refused(world)],
     }
 
 
@@ -141,18 +129,18 @@ def _shapes(model: Model) -> Counter[str]:
 def world_lines(world: World, columns: int | None = None) -> list[str]:
     """The table: a line for each model, then the notes by number, then the totals.
 
-    No line is wider than `columns`, so the table leaves out the least important columns; with None it has all.
+    No line is wider than `columns`: cells that do not fit have more lines, or less words.
     """
     numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
-    by_model: dict[str, dict[str, str]] = {}
+    by_model: dict[str, dict[str, None]] = {}
     for note in sorted(world.notes, key=lambda note: numbers[_text(note)]):
-        number = str(numbers[_text(note)])
         detail = printable(note.detail.removesuffix(" away"))
-        by_model.setdefault(note.model, {})[f"{number} ({detail})" if detail else number] = number
-    table = _table([HEADER, *(_row(model, by_model.get(model.name, {})) for model in world.models)], columns)
+        words = f"{numbers[_text(note)]} ({detail})" if detail else str(numbers[_text(note)])
+        by_model.setdefault(note.model, {})[words] = None
+    table = _table((_row(model, ", ".join(by_model.get(model.name, ()))) for model in world.models), columns)
     notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
     below = ["", "notes", *notes] if notes else []
-    wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
+    wrong = [line for words in _inside(world) for line in wrapped(words, columns)]
     gravity = " ".join(f"{part:g}" for part in world.gravity)
     what = world.version if is_directives(world.path) else f"SDF {world.version}"
     title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
@@ -165,25 +153,12 @@ def _inside(world: World) -> list[str]:
     return [words for _, words in note_inside(world)]
 
 
-def _refused(world: World) -> list[str]:
-    """A line for each reason for which the official checker would refuse the file."""
-    from ddenv.world.sdf.official import refused
-
-    places: dict[str, list[str]] = {}
-    for why, place in refused(world):
-        places.setdefault(why, []).append(place)
-    times = {why: f", and {len(at) - 1} more" if len(at) > 1 else "" for why, at in places.items()}
-    return [
-        printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{times[why]}") for why, at in places.items()
-    ]
-
-
 def _text(note: Note) -> str:
     return printable(f"{note.kind}: {note.what} {note.why}")
 
 
-def _row(model: Model, notes: Mapping[str, str]) -> tuple[str, ...]:
-    """A cell for each of HEADER; `notes` are those with details, and the number of each."""
+def _row(model: Model, notes: str) -> tuple[str, ...]:
+    """A cell for each of HEADER."""
     from ddenv.world.extent import center, model_bounds
 
     box = model_bounds(model)
@@ -195,29 +170,24 @@ def _row(model: Model, notes: Mapping[str, str]) -> tuple[str, ...]:
         "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0]),
         ", ".join(f"{part:.2f}" for part in center(model)),
         f"{model.links[0].pose.yaw():.2f}",
-        ", ".join(notes),
-        ", ".join(dict.fromkeys(notes.values())),
+        notes,
     )
 
 
-def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:
-    """The rows, with as many columns as fit, and names shortened if needed."""
-    from rich.cells import set_cell_size
+def _table(rows: Iterable[tuple[str, ...]], columns: int | None) -> list[str]:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
 
-    widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
-    wide = {choice: sum(widths[i] for i in choice) + len(GAP) * (len(choice) - 1) for choice in CHOICES}
-    shown = next((choice for choice in CHOICES if columns is None or wide[choice] <= columns), CHOICES[-1])
-    if columns is not None and wide[shown] > columns:
-        widths[0] = max(SHORTEST_NAME, widths[0] - (wide[shown] - columns))
-    lines = [GAP.join(_cell(row[i], widths[i], i) for i in shown).rstrip() for row in rows]
-    if columns is None:
-        return lines
-    return [line if width(line) <= columns else f"{set_cell_size(line, columns - 1)}…" for line in lines]
-
-
-def _cell(text: str, columns: int, which: int) -> str:
-    text = shortened(text, columns)
-    return f"{' ' * (columns - width(text))}{text}" if which in TO_THE_RIGHT else padded(text, columns)
+    table = Table(box=None, pad_edge=False, header_style="")
+    for title in HEADER:
+        table.add_column(title, justify="right" if title in TO_THE_RIGHT else "left")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console = Console(width=columns or 10_000, color_system=None)
+    with console.capture() as printed:
+        console.print(table)
+    return [line.rstrip() for line in printed.get().splitlines()]
 
 
 def _totals(world: World) -> str:
@@ -284,7 +254,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
     """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what did not affect the
     runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
     """
-    from ddenv.evidence.took_part import in_whole_world
+    from ddenv.evidence.slices import in_whole_world
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.nearest import removed_in_passing
@@ -345,8 +315,8 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     able = sum(bool(model.links) and not model.static for model in world.models)
     # Drake's plant needs a robot; piles settle as if there were none.
     scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
-    with announced(f"settling {count(able, 'model')} that can move"):
-        settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
+    announce(f"settling {count(able, 'model')} that can move")
+    settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
     for about, words in (*note_inside(world), *notes_on(world, settled)):
         if about != "unrest":
             announce(words)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import product, zip_longest
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 
 import numpy as np
 
-from ddenv.map.cells import FAINT, picture, signs
+from ddenv.map.cells import picture, signs
 from ddenv.map.colors import PLAIN
 from ddenv.map.drawing import tick_step, tick_text, ticks
 from ddenv.map.footprints import Drawn, plan
@@ -53,27 +53,13 @@ def terminal_map(
     margin = np.maximum(0.3, 0.03 * (high - low))
     low, high = low - margin, high + margin
     entries = [entry for entry in _entries(models) if entry[1] not in dim]
-    # The legend stands beside the picture or below it, whichever leaves the larger map.
-    widths = _widths(entries, columns // 2)
-    lines = min(1 + math.ceil(len(entries) / _blocks(widths, columns)), max(3, rows // 3)) if entries else 0
-    view = _view(low, high, columns - AXIS, rows - AROUND - lines)
-    room, beside = columns - AXIS - len(GAP) - _wide(widths), False
-    if entries and room >= 2 * NUMBERS:
-        other = _view(low, high, room, rows - AROUND)
-        if beside := view.scale >= other.scale:
-            view, lines = other, rows - 1
+    legend = _legend(entries, columns, max(3, rows // 3))
+    view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))
     axes = _axes(view)
     canvas = picture(models, view, color=color, dim=dim)
-    _grid(canvas, *axes)
     _marks(canvas, view, spawn, goal, color)
-    drawn = list(_framed(canvas, view, *axes, color))
-    legend = _legend(entries, columns - AXIS - view.columns - len(GAP) if beside else columns, lines)
     title = shortened(_title(world, models, spawn, goal), columns)
-    if not beside:
-        return "\n".join([title, *drawn, *legend])
-    empty = " " * (view.columns + AXIS)
-    both = zip_longest(drawn, legend)
-    return "\n".join([title, *(f"{line or empty}{GAP}{text or ''}".rstrip() for line, text in both)])
+    return "\n".join([title, *_framed(canvas, view, *axes, color), *legend])
 
 
 def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
@@ -98,7 +84,6 @@ def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Poin
 
 
 def _entries(models: Sequence[Drawn]) -> list[Entry]:
-    """Sign, name, centre and size of each model, the largest first."""
     letters = signs(models)
     order = sorted(range(len(models)), key=lambda index: -models[index].outline.area)
     return [(letters[index], models[index].model.name, *_numbers(models[index])) for index in order]
@@ -110,37 +95,21 @@ def _numbers(each: Drawn) -> tuple[str, str]:
     return f"{x:.2f}, {y:.2f}", words
 
 
-def _widths(entries: Sequence[Entry], columns: int) -> list[int]:
-    """The widths of the legend's columns: the names get the rest."""
-    own = [max(map(width, column)) for column in zip(HEADER, *entries, strict=True)]
-    own[1] = max(SHORTEST_NAME, min(own[1], LONGEST_NAME, columns - own[0] - own[2] - own[3] - 3 * len(GAP)))
-    return own
-
-
 def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
-    """At most `most` lines with as many models as fit, from top to bottom and then from left to right."""
+    """At most `most` lines below the map with as many models as fit, from top to bottom and then from left to right."""
     if not entries:
         return []
-    widths = _widths(entries, columns)
-    lines = most - 1
-    room = lines * _blocks(widths, columns)
-    shown = entries if len(entries) <= room else entries[: room - 1]
+    widths = [max(map(width, column)) for column in zip(HEADER, *entries, strict=True)]
+    rest = sum(widths) - widths[1] + 3 * len(GAP)
+    widths[1] = max(SHORTEST_NAME, min(widths[1], LONGEST_NAME, columns - rest))
+    blocks = max(1, (columns + 2 * len(GAP)) // (rest + widths[1] + 2 * len(GAP)))
+    lines = min(most - 1, math.ceil(len(entries) / blocks))
+    shown = entries if len(entries) <= lines * blocks else entries[: lines * blocks - 1]
     cells = [_cell(entry, widths) for entry in shown]
-    if len(shown) < len(entries):
-        words = f"... and {len(entries) - len(shown)} more"
-        remedy = f"{words} (--svg FILE names them)"
-        cells.append(padded(remedy if len(remedy) <= columns else words, _wide(widths)))
+    if more := len(entries) - len(shown):
+        cells.append(shortened(f"... and {more} more (--svg FILE names them)", columns))
     stacks = [[_cell(HEADER, widths), *cells[start : start + lines]] for start in range(0, len(cells), lines)]
     return [shortened((2 * GAP).join(row).rstrip(), columns) for row in zip_longest(*stacks, fillvalue="")]
-
-
-def _wide(widths: Sequence[int]) -> int:
-    return sum(widths) + 3 * len(GAP)
-
-
-def _blocks(widths: Sequence[int], columns: int) -> int:
-    """How many legends fit side by side."""
-    return max(1, (columns + 2 * len(GAP)) // (_wide(widths) + 2 * len(GAP)))
 
 
 def _cell(entry: Entry, widths: Sequence[int]) -> str:
@@ -153,7 +122,6 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
 
 
 def _axes(view: View) -> tuple[dict[int, str], dict[int, str]]:
-    """The numbers along x by column, and along y by row."""
     wide, high = view.columns * view.scale / 2, view.rows * view.scale
     x_step, y_step = tick_step(2 * wide, max(1, view.columns // 8)), tick_step(2 * high, max(1, view.rows // 4))
     across = {view.cell(x, view.y): tick_text(x, x_step) for x in ticks(view.x - wide, view.x + wide, x_step)}
@@ -161,14 +129,6 @@ def _axes(view: View) -> tuple[dict[int, str], dict[int, str]]:
     return {cell[1]: text for cell, text in across.items() if cell}, {
         cell[0]: text for cell, text in down.items() if cell
     }
-
-
-def _grid(canvas: Canvas, across: Iterable[int], down: Iterable[int]) -> None:
-    """A dot on free ground where the lines of two numbers cross."""
-    for row, column in product(down, across):
-        if canvas.chars[row, column] == ord(" "):
-            canvas.chars[row, column] = ord("·")
-            canvas.fore[row, column] = FAINT
 
 
 def _marks(canvas: Canvas, view: View, spawn: Pose | None, goal: Point | None, color: bool) -> None:

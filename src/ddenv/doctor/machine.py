@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-import locale
 import math
 import os
 import platform
 import shutil
-import socket
 import sqlite3
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -20,7 +18,6 @@ from ddenv import __version__
 from ddenv.doctor import Finding
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX, runs_folder
-from ddenv.runs.programs import how_to_install
 from ddenv.text import count
 
 # By the names that packages are installed as, with the module that shows that they are there.
@@ -31,7 +28,6 @@ LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000
 
 
 def installation() -> Iterator[Finding]:
-    """What is installed."""
     yield Finding("installation", "ddenv", f"{__version__}, {Path(__file__).parents[1]}")
     yield Finding("installation", "Python", f"{platform.python_version()}, {sys.executable}")
     for name, module in NEEDED.items():
@@ -42,9 +38,6 @@ def installation() -> Iterator[Finding]:
         else:
             yield Finding("installation", name, "not installed", "wrong", f"pip install {name}")
     yield Finding("installation", "SQLite", sqlite3.sqlite_version)
-    missing = f"not installed; only 'ddenv serve' needs it: {how_to_install('serve')}"
-    served = _version("textual-serve") if importlib.util.find_spec("textual_serve") is not None else missing
-    yield Finding("installation", "textual-serve", served)
 
 
 def _version(name: str) -> str:
@@ -55,7 +48,6 @@ def _version(name: str) -> str:
 
 
 def terminal() -> Iterator[Finding]:
-    """What the workbench would be drawn on."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         yield Finding("terminal", "terminal", "none: input or output is no terminal; 'ddenv run' works without one")
     else:
@@ -63,33 +55,12 @@ def terminal() -> Iterator[Finding]:
         small = columns < SMALLEST[0] or lines < SMALLEST[1]
         advice = f"the workbench is made for {SMALLEST[0]} by {SMALLEST[1]} and more" if small else ""
         yield Finding("terminal", "size", f"{columns} columns, {lines} lines", "note" if small else "ok", advice)
-    yield Finding("terminal", "colours", _colors())
-    encoding = locale.getpreferredencoding(False)
-    told = encoding.lower().replace("-", "") == "utf8"
-    yield Finding("terminal", "letters", encoding, "ok" if told else "note", "" if told else "export LANG=C.UTF-8")
-    known = {"SSH_CONNECTION": "ssh", "TMUX": "tmux", "STY": "screen"}
-    ways = [words for name, words in known.items() if os.environ.get(name)]
-    yield Finding("terminal", "by way of", ", ".join(ways) or "this machine's own")
 
 
-def _colors() -> str:
-    term = os.environ.get("TERM") or "unset"
-    if os.environ.get("NO_COLOR"):
-        return f"none, as NO_COLOR asks; TERM is {term}"
-    if os.environ.get("COLORTERM", "").lower() in ("truecolor", "24bit"):
-        return f"16 million; TERM is {term}"
-    return f"{256 if '256' in term else 16 if term not in ('unset', 'dumb') else 'none'}; TERM is {term}"
-
-
-def machine(ports: Mapping[str, int]) -> Iterator[Finding]:
-    """What may be used of the machine; `ports` are those that programs of ddenv begin with, by what they are for."""
+def machine() -> Iterator[Finding]:
     cores, all_cores = processor.usable_cores(), os.cpu_count() or 1
     yield Finding("machine", "cores", f"{cores} of {all_cores} may be used; {processor.name()}")
     yield _memory()
-    for use, port in ports.items():
-        free = _is_free(port)
-        says = f"{port} on 127.0.0.1 is {'free' if free else 'in use; another one is taken'}"
-        yield Finding("machine", f"port, {use}", says)
     yield _space("temporary files", Path(tempfile.gettempdir()), "machine")
 
 
@@ -103,18 +74,7 @@ def _memory() -> Finding:
     return Finding("machine", "memory", says, "note", "fewer tests at the same time: --jobs 1")
 
 
-def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return False
-    return True
-
-
 def runs() -> Iterator[Finding]:
-    """Where runs are kept."""
     folder = runs_folder()
     yield Finding("runs", "folder", f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
     nearest = next(each for each in (folder, *folder.parents) if each.exists())

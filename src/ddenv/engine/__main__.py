@@ -1,7 +1,4 @@
-"""The engine as a program: `python -m ddenv.engine RUN [--jobs N] [--accept-mode automatic|ask]`.
-
-Exit codes: 0 the reduction ended by itself, 1 it was stopped, 2 it could not go on (one line on stderr says why).
-"""
+"""The engine as a program. Exit codes: 0 it ended by itself, 1 it was stopped, 2 it could not go on (one line on stderr)."""
 
 from __future__ import annotations
 
@@ -18,8 +15,7 @@ from typing import Literal
 from ddenv import __version__
 from ddenv.engine.beginning import check_crash_loop, check_repeats, note_start
 from ddenv.engine.bench import Bench
-from ddenv.engine.control import Control, Stopped
-from ddenv.engine.disturbances import DiskSpace
+from ddenv.engine.control import Control, DiskSpace, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
@@ -45,25 +41,17 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     parser.add_argument("--cluster", help="where the tests are made, in place of what the scenario says")
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    parser.add_argument("--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow")
     parser.add_argument(
-        "--bits", choices=("same", "mixed"), default="same", help="whether tests with other bits may follow"
-    )
-    parser.add_argument(
-        "--anyway", choices=("yes", "no"), default="no", help="whether to start although the last engines died at once"
+        "--anyway", choices=("yes", "no"), default="no", help="start although the last engines died at once"
     )
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
+    parser.add_argument("--certify", type=int, help="one more certificate, with at least so many runs of what is left")
     parser.add_argument(
-        "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
+        "--certify-rate", type=float, help="the last certificate goes on until it shows this part of the rate"
     )
     parser.add_argument(
-        "--certify-rate",
-        type=float,
-        help="go on with the last certificate until it shows that this part of the rate is kept",
-    )
-    parser.add_argument(
-        "--isolate",
-        type=int,
-        help="find the nearest world that passes, with at least so many fresh runs of it; 0: as many as usual",
+        "--isolate", type=int, help="find the nearest world that passes, with so many fresh runs; 0: as usual"
     )
     parser.add_argument(
         "--margins", help="find margins of the numbers with these names, a JSON list of globs; []: of all"
@@ -116,10 +104,10 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         control = Control(journal, terminated, after, disk)
         others = None if options.share is None else tests_of_others(file, scenario, options.share)
         with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
-            if scenario.oracle is None:
-                check_repeats(journal, pool, control, options.bits == "mixed")
-            note_start(scenario, world, robot, journal)
             bench = Bench(journal, pool, control, others)
+            if scenario.oracle is None:
+                check_repeats(journal, bench, options.bits == "mixed")
+            note_start(scenario, world, robot, journal)
             if options.certify:
                 Driver(scenario, world, journal, bench, control).certify(options.certify, options.certify_rate)
             elif options.isolate is not None or journal.state.isolating is not None:

@@ -1,14 +1,10 @@
-"""What an engine does before its first test: it asks whether the engines before it died at once, whether it still computes the same
-as they did, and which models rest on which.
-"""
+"""What an engine asks before its first test: did those before it die at once, does it compute the same, what rests on what."""
 
 from __future__ import annotations
 
-from ddenv.engine.bench import Bench, made_again
-from ddenv.engine.control import Control
+from ddenv.engine.bench import Bench
 from ddenv.engine.journal import Journal
 from ddenv.engine.limits import note
-from ddenv.engine.pool import Workers
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
@@ -52,16 +48,16 @@ def check_crash_loop(journal: Journal) -> None:
         )
 
 
-def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool) -> None:
-    """Makes the first baseline run again, and compares its bits, if this engine computes with anything else than the earlier ones.
+def check_repeats(journal: Journal, bench: Bench, mixed: bool) -> None:
+    """Makes the first baseline run again if this engine computes with anything else than the earlier ones.
 
-    Raises UserError if they differ, unless the run goes on `mixed`; and Stopped.
+    Raises UserError if the bits differ, unless the run goes on `mixed`; and Stopped.
     """
     state = journal.state
     test = _comparable(state)
     if state.physics.now == state.physics.proven or test is None:
         return
-    result = made_again(journal, pool, control, test)
+    result = bench.made_again(test)
     if result is not None and not mixed:
         raise UserError(_differs(journal, result))
     journal.record(events.Compared(result is None))
@@ -91,10 +87,7 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
 
 
 def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> None:
-    """Does nothing where nothing can move, or if it is known. Notes what is wrong with the start of the world.
-
-    Raises UserError if stacks are to be kept and it cannot be known.
-    """
+    """Finds what rests on what, once. Raises UserError if stacks are to be kept and it cannot be known."""
     moves = any(model.links and not model.static for model in world.models)
     # A simulator in Python names the models that affected a run, and those that they rest on.
     in_python = scenario.oracle is not None and scenario.oracle.use is not None

@@ -1,13 +1,10 @@
-"""Makes the tests that are wanted, the first on a free worker, later ones on the others, and records all of them.
-
-Tries of the user come first.
-"""
+"""Makes the tests that are wanted, tries of the user first, and records all of them."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +16,7 @@ from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
 from ddenv.engine.slicing import audit_is_due, compare
-from ddenv.engine.worker import Broken, Start
+from ddenv.engine.worker import Broken, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Test
@@ -41,47 +38,12 @@ PATIENCE = 1.0
 # Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no display, a full disk), all tests
 # break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
 MOST_BROKEN = 25
-# The part of all time that background work may take; and besides that, s: at first, when most is unknown, and for each test that
-# has ended.
-SHARE, FIRST, AFTER_TEST = 0.01, 0.5, 0.002
-
-
-class Background:
-    """Work that may wait, such as forecasts: advances `steps` of some milliseconds as long as there is time for them.
-
-    What begins next takes the place of what is left.
-    """
-
-    def __init__(self) -> None:
-        self._steps: Iterator[object] = iter(())
-        self._began = time.monotonic()
-        self._spent = 0.0
-        self._ended = 0
-
-    def begin(self, steps: Iterator[object]) -> None:
-        """From now on advances `steps`."""
-        self._steps = steps
-
-    def test_ended(self) -> None:
-        """A test has ended: some more time may be taken."""
-        self._ended += 1
-
-    def step(self) -> bool:
-        """Makes one step; returns False where none is left, or no time for it."""
-        began = time.monotonic()
-        if self._spent > FIRST + AFTER_TEST * self._ended + SHARE * (began - self._began):
-            return False
-        made = next(self._steps, self) is not self
-        self._spent += time.monotonic() - began
-        return made
 
 
 class Bench:
     """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges tries of the user.
 
-    A test that `others` have made has its result at once, and takes no worker.
-
-    Before f is fixed, a run that failed is recorded as "failed".
+    A test that `others` have made takes no worker. Before f is fixed, a run that failed is recorded as "failed".
     """
 
     def __init__(
@@ -98,13 +60,10 @@ class Bench:
         self._next_live = 0.0
         self._live_shown = False
         self._broken = 0
-        self.background = Background()
         self.rule = Acceptance(1)
-        # Whether no test ended at the last look: where tests end at once, nobody waits for what may wait.
-        self._quiet = False
 
     def work(self, tests: Sequence[Test]) -> None:
-        """Starts as many of the wanted tests as workers are free, the first ones first, and looks around once.
+        """Starts as many of the wanted tests as workers are free, and looks around once.
 
         Raises Stopped, Steered, and UserError if nothing can be simulated or all tests break.
         """
@@ -143,7 +102,7 @@ class Bench:
     def _make(self, wanted: Test, trial: int | None = None) -> bool | None:
         """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
-        Raises Stopped if it is used up and no test runs.
+        Raises Stopped if the budget is used up and no test runs.
         """
         journal, full = self._journal, self._journal.is_full(wanted.why)
         source = journal.implying(wanted.environment, wanted.run, full)
@@ -181,7 +140,7 @@ class Bench:
         if known is not None and (taken := result_of(known)) is not None:
             self._taken.append((number, taken))
         else:
-            self._pool.submit(number, keep, seed, full, wall_limit(state))
+            self._pool.submit(number, Run(keep, seed, full, wall_limit(state)))
         return False
 
     def settle(self, elements: frozenset[str], late: Callable[[], None]) -> Start | Broken:
@@ -196,11 +155,18 @@ class Bench:
         return result
 
     def made_again(self, test: KnownTest) -> RunResult | Broken | None:
-        """As the function `made_again`, once all workers are idle."""
+        """Makes a run of the whole world again, once all workers are idle; returns how it ended unless it repeats bit for bit."""
         while self._busy:
             # A search that is due begins after this.
             self._look_around(WAIT)
-        return made_again(self._journal, self._pool, self._control, test)
+        journal = self._journal
+        journal.record(Comparing(test.id))
+        self._pool.submit(0, Run(frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state)))
+        while not (ended := self._pool.finished(WAIT)):
+            self._control.poll()
+        result = ended[0][1]
+        same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
+        return None if same else result
 
     # Tries of the user.
 
@@ -220,10 +186,10 @@ class Bench:
             return
         for trial in self._open_trials():
             environment = self._journal.state.environments[trial.environment]
-            now = standing([environment], self._journal.shown, self.rule)
-            if now.verdicts[0]:
-                self._judge(trial, environment, now.verdicts[0])
-            for _, run in now.wanted:
+            (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
+            if verdict:
+                self._judge(trial, environment, verdict)
+            for _, run in wanted:
                 test = Test(environment, run, "hand")
                 if self._key(test) in self._started:
                     continue
@@ -231,7 +197,7 @@ class Bench:
                     return
 
     def _judge(self, trial: Trial, environment: Environment, verdict: str) -> None:
-        runs, _ = decided_by(lambda run: self._journal.shown(environment, run), self.rule)
+        runs, _ = decided_by(self._journal.shown, environment, self.rule)
         tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
         known = sum(self._journal.state.tests[test - 1].trial != trial.number for test in tests)
         self._journal.record(TrialJudged(trial.number, verdict, tests, known))
@@ -248,9 +214,8 @@ class Bench:
     # Looking around.
 
     def tick(self) -> None:
-        """Obeys commands, records finished tests, shows the running robots. Raises as `work`.
-
-        Does not return if the user has changed something: the old search must not use a test that ends now.
+        """Obeys commands, records finished tests, shows the running robots. Raises as `work`: Steered where the user has changed
+        something, since the old search must not use a test that ends now.
         """
         self._look(WAIT)
 
@@ -264,14 +229,11 @@ class Bench:
 
     def _look_around(self, wait: float) -> None:
         self._control.poll()
-        works = self._quiet and self._pool.busy > 0 and self.background.step()
         taken, self._taken = self._taken, []
-        finished = sorted([*taken, *self._pool.finished(0.0 if works or taken else wait)], key=lambda one: one[0])
+        finished = sorted([*taken, *self._pool.finished(0.0 if taken else wait)], key=lambda one: one[0])
         for test, result in finished:
             self._record(test, result)
-            self.background.test_ended()
             self._give_up_if_all_break(result)
-        self._quiet = not finished
         # Before the search gets the workers that are free now.
         self._serve_trials()
         if self._busy == 0:
@@ -326,17 +288,6 @@ class Bench:
             spec = FailureSpec.model_validate(state.scenario["failure"])
             self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
         return self._failures
-
-
-def made_again(journal: Journal, pool: Workers, control: Control, test: KnownTest) -> RunResult | Broken | None:
-    """Makes a run of the whole world again; returns how it ended unless it repeats to the last bit. Raises Stopped."""
-    journal.record(Comparing(test.id))
-    pool.submit(0, frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state))
-    while not (ended := pool.finished(WAIT)):
-        control.poll()
-    result = ended[0][1]
-    same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
-    return None if same else result
 
 
 def _samples(trajectory: np.ndarray) -> bytes:

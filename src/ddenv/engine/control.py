@@ -1,14 +1,18 @@
-"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with its reason."""
+"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with its reason. It also watches the
+disk and the clock.
+"""
 
 from __future__ import annotations
 
 import math
+import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
-from ddenv.engine.disturbances import ClockJumps, DiskSpace
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, rejudged
 from ddenv.environment import Environment
@@ -19,7 +23,7 @@ from ddenv.guiding.selections import Accept, AcceptOther, Adopt, LeaveOut, Pin, 
 from ddenv.guiding.situation import Situation, label_of, numbers_of
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import failures_at
-from ddenv.runfile.store import Request
+from ddenv.runfile.store import NoRoom, Request, RunFile
 from ddenv.world.scenario import FailureSpec
 
 # Decisions within this time start one new search, not several, s.
@@ -36,11 +40,67 @@ class Steered(Exception):
     """The user changed something, so the search has to start again."""
 
 
+# What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log of them.
+NEEDED = 32_000_000
+# The time between two looks, s.
+PERIOD = 1.0
+
+
+class DiskSpace:
+    """Watches the disk of a run file. `terminated` ends all waiting."""
+
+    def __init__(self, file: RunFile, terminated: threading.Event) -> None:
+        self._file = file
+        self._terminated = terminated
+        self._next = 0.0
+        self._enough = True
+        self._telling = False
+
+    def enough(self) -> bool:
+        """Whether a test may start. Writes an event when that changes."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + PERIOD
+            self._tell(self._free() >= NEEDED)
+        return self._enough
+
+    def wait(self, full: NoRoom) -> bool:
+        """Waits for a moment; returns whether to try again what found no room."""
+        if self._telling or self._terminated.is_set():
+            return False
+        if self._enough:
+            # The log may be on the same disk.
+            with suppress(OSError):
+                print(f"{full}; waits until {NEEDED / 1e6:.0f} MB are free", file=sys.stderr, flush=True)
+        self._tell(False)
+        return not self._terminated.wait(PERIOD)
+
+    def _tell(self, enough: bool) -> None:
+        changed, self._enough = enough != self._enough, enough
+        if not changed:
+            return
+        # A small event may find room where a result does not.
+        self._telling = True
+        with suppress(UserError):
+            self._file.append(events.DiskSpace(enough, NEEDED, self._free()))
+        self._telling = False
+
+    def _free(self) -> int:
+        return shutil.disk_usage(self._file.path.parent).free
+
+
+# How far a clock that is kept exact may go on or back between two looks, s.
+SMALL = 2.0
+
+
+def clock_offset() -> float:
+    """Unix time less that of a clock that stands still while the machine sleeps, and that nobody can set, s."""
+    return time.time() - time.monotonic()
+
+
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `credit` is how many tests may still start before a pause, None for any number. `terminated` is set by a signal, `after` is
-    the number of the last command before this engine was asked to start. `disk` says whether there is space for more tests.
+    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start.
     """
 
     def __init__(
@@ -54,7 +114,7 @@ class Control:
         self._searches = False
         self._last = -math.inf
         self._disk = disk
-        self._jumps = ClockJumps(journal)
+        self._offset = clock_offset()
         self._catch_up(after)
 
     def _catch_up(self, after: float) -> None:
@@ -71,13 +131,20 @@ class Control:
         """Obeys new commands. Raises Stopped."""
         if self._terminated.is_set():
             raise Stopped("the engine was terminated")
-        self._jumps.look()
+        self._look_at_clock()
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
             if KINDS.get(command.kind) is Accept:
                 # The reduction comes before any other decision.
                 return
+
+    def _look_at_clock(self) -> None:
+        """Records a jump since the last look: what is reckoned from the time that the run took would be wrong."""
+        offset = clock_offset()
+        jump, self._offset = offset - self._offset, offset
+        if abs(jump) > SMALL:
+            self._journal.record(events.ClockJumped(jump))
 
     def search_begins(self) -> None:
         """From now on what the user changes ends a search."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -21,12 +21,11 @@ from ddenv.evidence.certificate import RUNS_BESIDE, Terms, error_of
 from ddenv.evidence.claims import current, is_minimal
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
+from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.forecast import Memory, Moment, interval, playing
-from ddenv.reduction.guide import Guide, Search, make_guide, search
+from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
-from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
@@ -34,6 +33,7 @@ from ddenv.runfile.fold_decisions import exact_runs
 from ddenv.runfile.progress import Certificate, Leg, Node
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
+from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
 from ddenv.text import count
 from ddenv.words.claims import verdict_on
@@ -59,8 +59,6 @@ class Driver:
         # Of the current search: they are there once it has begun.
         self._leg: steps.Leg
         self._stacks: Stacks
-        self._guide: Guide
-        self._memory: Memory
         self._evidence: Evidence
         # What the baseline shows so far, or why there is nothing to reduce.
         self._baseline: events.BaselineFinished | str = ""
@@ -206,8 +204,8 @@ class Driver:
         """The algorithm and the schemas by name. Raises UserError for unknown ones."""
         asked = self._reduction
         partitioning, prioritization = split_pair(asked.pair)
-        self._stacks, self._memory = Stacks(leg.free), Memory()
-        self._guide = make_guide(
+        self._stacks = Stacks(leg.free)
+        guide = make_guide(
             partitioning,
             prioritization,
             self._known,
@@ -222,13 +220,8 @@ class Driver:
             broke=self._broke,
             proves=leg.rule.proves,
         )
-        return self._begin(leg, self._memory.of(self._guide))
-
-    def _begin(self, leg: steps.Leg, guide: Guide) -> Search:
-        stacks, searched = Stacks(leg.free), partial(search, self._reduction.algorithm, guide=guide)
-        if not leg.again:
-            return stacks.expand(searched(stacks.representatives))
-        return stacks.expand(tried_again(stacks.representatives, leg.again, searched))
+        searched = partial(search, asked.algorithm, guide=guide)
+        return self._stacks.expand(tried_again(self._stacks.representatives, leg.again, searched))
 
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
@@ -294,7 +287,6 @@ class Driver:
             raise UserError(other_way(step.number))
         # Whoever waits before the first test of a round sees its candidates.
         self._audit_slice()
-        self._bench.background.begin(self._forecast(step.number))
         return None
 
     def _announce(self, number: int, round: Round) -> None:
@@ -315,35 +307,13 @@ class Driver:
                 leg.pinned & environment,
             )
         )
+        models = sum(stack <= environment for stack in leg.free.values())
+        expected = search_tests(models, self._reduction, known_failure(journal.state).rate)
+        journal.record(events.Forecast(number, expected, journal.state.tests_done))
         refused = {refusal.environment: refusal.verdict for refusal in journal.state.refused}
         for index, one in enumerate(round.candidates) if refused else ():
             if verdict := refused.get(one.models | leg.pinned):
                 journal.record(events.Vetoed(number, index, verdict, again=True))
-
-    def _forecast(self, number: int) -> Iterator[object]:
-        """Plays the search on, and records how many tests are left; once in a round."""
-        journal, leg, guide = self._journal, self._leg, self._guide
-        assert journal.state.leg is not None
-        moment = Moment(
-            leg,
-            tuple(past.winner for past in journal.state.leg.past),
-            journal.environment,
-            self._reduction.pair,
-            self._begin,
-            guide,
-            self._memory,
-            self._known(),
-            self.shown,
-            self.refused,
-            known_failure(journal.state).rate,
-            max(1, journal.state.jobs),
-        )
-        done, tests = journal.state.tests_done, list[float]()
-        for play in playing(moment):
-            tests += [] if play is None else [play]
-            yield play
-        if tests:
-            journal.record(events.Forecast(number, interval(tests), done))
 
     def _judged(self, step: steps.Judged) -> None:
         """Records a verdict, unless an earlier engine has."""
@@ -427,15 +397,9 @@ class Driver:
         if not self._certificate.claims:
             first, journal = step.certificate.first_run, self._journal
             claims = tuple(self._claim_made(claim, first) for claim in step.claims)
-            rested_on = {
-                test
-                for claim in step.claims
-                for environment, run in claim.claim.rests_on
-                for test in journal.tests(environment, (first + run,), full=True)
-            }
-            for claim in step.claims:
-                rested_on |= set(journal.tests(claim.environment, step.certificate.exact))
-            journal.record(events.CertificateFinished(claims, tuple(sorted(rested_on))))
+            rested_on = journal.full_tests((test for one in step.claims for test in one.claim.rests_on), first)
+            chosen = (test for one in step.claims for test in journal.tests(one.environment, step.certificate.exact))
+            journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
 
     @property
     def _certificate(self) -> Certificate:
@@ -460,9 +424,8 @@ class Driver:
     def _stepped_back(self, step: steps.SteppedBack) -> None:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
-        tests = {test for one, run in step.tests for test in journal.tests(one, (run,), full=True)}
         node, lost = nodes[step.place].number, nodes[step.place + 1].number
-        journal.record(events.RateLost(node, lost, step.again, tuple(sorted(tests))))
+        journal.record(events.RateLost(node, lost, step.again, journal.full_tests(step.tests)))
         self._wait_for_search()
 
     def _left_out(self, step: steps.LeftOut) -> None:

@@ -34,12 +34,11 @@ CHANGED = "a decision of the user, or a slice that was wrong, ended the isolatio
 def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, before: str) -> None:
     """Finds the nearest world that passes, or goes on with that; the run is finished then as it was, because of `before`.
 
-    The end has `at_least` fresh runs, `FEWEST_RUNS` by default; another number than the open search has begins a new one, which
-    finds its tests again. Raises as `Bench.work`.
+    The end has `at_least` fresh runs; another number than the open search has begins a new one. Raises as `Bench.work`.
     """
     now = journal.state.isolating
-    if now is None or at_least not in (None, now.at_least):
-        _begin(world, journal, at_least, before if now is None else now.before)
+    if now is None or at_least not in (None, now.asked.at_least):
+        _begin(world, journal, at_least, before if now is None else now.asked.before)
     removed = _Isolator(journal, bench).carry_out()
     bench.finish_trials()
     # Tests that ran ahead of time are no longer needed.
@@ -69,7 +68,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     journal.record(
         events.IsolationStarted(
             isolation=len(state.isolations) + 1,
-            run=FIRST_RUN if last is None else last.first_run + MOST_CHECKS * last.block,
+            run=FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block,
             block=max(FRESH_RUNS, 2 * least),
             wanted=rule.wanted,
             rather_than=rule.rather_than,
@@ -85,10 +84,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
 
 
 def _suspects(world: World, journal: Journal, reduction: Reduction) -> tuple[tuple[int, ...], int]:
-    """One model of each stack that may go, the likeliest first; and how many of them the reduction has left.
-
-    These come first, and then the nearest to where f ended.
-    """
+    """One model of each stack that may go: first those that the reduction has left (returns how many), then the nearest to f."""
     state, f = journal.state, known_failure(journal.state).failure_test
     sight = Sight(world, state.elements, reduction.delta, reduction.seed)
     distance = distances_to_failure(state.elements, sight.evidence(journal, f)).tolist()
@@ -111,16 +107,16 @@ class _Isolator:
     def __init__(self, journal: Journal, bench: Bench) -> None:
         self._journal, self._bench = journal, bench
         self._whole = journal.state.environments[0]
-        now = _open(journal)
+        now = _open(journal).asked
         self._asked = Asked(
             whole=self._whole,
-            suspects=tuple(model for name in now.suspects for model in journal.models([name])),
+            suspects=now.suspects,
             stacks=_free(journal),
             size=now.size,
             rule=Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than),
             keep_rate=now.keep_rate,
             at_least=now.at_least,
-            first_run=now.first_run,
+            first_run=now.run,
             block=now.block,
         )
 
@@ -172,16 +168,11 @@ class _Isolator:
 
     def _check(self, check: Checked) -> None:
         journal, now = self._journal, _open(self._journal)
-        first = now.first_run + len(now.checks) * now.block
-        rests_on = {
-            test
-            for claim in check.claims
-            for environment, run in claim.claim.rests_on
-            for test in journal.tests(environment, (first + run,), full=True)
-        }
+        first = now.asked.run + len(now.checks) * now.asked.block
+        rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)
         claims = tuple(self._made(claim, first) for claim in check.claims)
         environment = journal.number(self._whole - check.removed)
-        journal.record(events.IsolationChecked(environment, claims, tuple(sorted(rests_on))))
+        journal.record(events.IsolationChecked(environment, claims, rests_on))
 
     def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
         shown = [self.shown(named.environment, run) for run in named.exact or [first + run for run in named.runs]]

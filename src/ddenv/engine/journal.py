@@ -14,7 +14,7 @@ from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import BROKEN, CERTIFY, FIRST_FRESH_RUN, FRESH_RUNS, ISOLATE, Round, RunState, Test
-from ddenv.runfile.store import Motions, RunFile, uncollected
+from ddenv.runfile.store import Motions, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.settings import SETTINGS, read
 
@@ -22,18 +22,17 @@ from ddenv.settings import SETTINGS, read
 class Journal:
     """The events of a run, `state` folded from them, and a memo of its finished tests by (environment, run, full).
 
-    A test in the memo is never made again, but one that broke is made twice, and again by the next engine where a verdict needs it.
-    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only
-    changes runs that it cuts. While a user's `command` is obeyed, events hold its number.
+    A test that broke is made twice, and again by the next engine where a verdict needs it. Tests that ran to their end have
+    `full` True, those that the search asked for False, most both: `early_stop` only changes runs that it cuts. While a user's
+    `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
         self.file = file
         self.state = RunState()
         self.command: int | None = None
-        with uncollected():
-            for recorded in file.events():
-                self.state = apply(self.state, recorded)
+        for recorded in file.events():
+            self.state = apply(self.state, recorded)
         self._number_of = {name: number for number, name in enumerate(self.state.elements)}
         self._numbers: dict[Environment, int] = {}
         self._tests: dict[tuple[int, int, bool], int] = {}
@@ -156,6 +155,10 @@ class Journal:
         """The numbers of the finished tests among these runs."""
         tests = (self.test(environment, run, full) for run in runs)
         return tuple(test.id for test in tests if test is not None)
+
+    def full_tests(self, tests: Iterable[tuple[Environment, int]], first: int = 0) -> tuple[int, ...]:
+        """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
+        return tuple(sorted({one for models, run in tests for one in self.tests(models, (first + run,), full=True)}))
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a run showed f; None if it is not made yet."""

@@ -1,5 +1,5 @@
-"""What the tests showed: the failure f, fixed from runs of the whole world; each result judged by it, as plain data for the run
-file and for `--json`, in which every number is finite; and what the schemas see of them.
+"""What the tests showed: f, fixed from runs of the whole world; each result judged by it, as plain data in which every number is
+finite; and what the schemas see of them.
 """
 
 from __future__ import annotations
@@ -31,13 +31,10 @@ from ddenv.world.scenario import FailureSpec
 
 
 def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
-    """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
+    """A result as the fields of `TestFinished`, with models by name, judged by f and the failures accepted as f; the nearest one
+    counts.
 
-    `failures` are f and the failures that the user accepted as f; the nearest one counts.
-    `first_sensed` and `first_touched` are the first times by model name, s, rounded to 1 ms.
-    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None. `cut` says that it
-    ended early because the robot was stuck for good, `taken` from which other run it was reused, `took_part` which
-    models can have changed a bit of it; both only if there is something to say.
+    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None.
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
@@ -126,11 +123,11 @@ def fix_failure(
     wanted: int = 1,
     chose: int = 0,
 ) -> BaselineFinished | str:
-    """The event that ends the baseline. `tests` are in the order of runs, `trajectories` those of the failing ones, by id.
+    """The event that ends the baseline, or a line that says why there is no f. `tests` are in the order of runs, `trajectories`
+    those of the failing ones, by id.
 
     f is the failure number `wanted`, by how many runs show each; its end is that of the run which shares its failure with most
-    others. If no run failed, or if there is no such number, returns a line that tells the user so. The rate counts f only, not
-    other failures; runs that broke say nothing, and are not in it. With `chose` so many first runs choose f, and only the others
+    others. The rate counts f only; runs that broke are not in it. With `chose` so many first runs choose f, and only the others
     give its rate; where f shows in none of these, all do.
     """
     failed = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]

@@ -1,9 +1,7 @@
-"""What one test may take, real time and memory; and what is noted of a whole world that is slow, or odd at its start.
+"""What one test may take, real time and memory; and what is noted of a whole world that is slow.
 
-The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and all later tests a
-multiple of what these took: so a slow world or machine is not taken for a hanging one. The baseline's event holds it: a resumed
-engine uses the same. Without a size, the workers share most of what this process may use: no test may take the memory of others, or
-bring the kernel to kill the engine.
+The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and later tests a multiple
+of what these took; the baseline's event holds it. Without a size, the workers share most of what this process may use.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from ddenv.runfile.store import Live
 from ddenv.runs import processor
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
-from ddenv.text import about, between, count, duration
+from ddenv.text import between, count, duration
 from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
@@ -91,34 +89,17 @@ def note_rare(journal: Journal) -> None:
 
 
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
-    """Writes an event once a run of the whole world turns out to be slow. `running` tests took so long, s.
-
-    Own simulators keep their own time.
-    """
+    """Writes an event once a run of the whole world on Drake turns out to be slow. `running` tests took so long, s."""
     state = journal.state
     if state.baseline is not None or state.scenario.get("oracle") is not None or "slow" in dict(state.notes):
         return
+    timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
     for live, real in running:
         if real >= KNOWN_AFTER and live.time < SLOW * real:
-            note(journal, "slow", _slow(state, live.time / real))
-
-
-def _slow(state: RunState, rate: float) -> str:
-    """What a slow world will cost: its baseline in full, then what is left to test of it after the slice (`rough_run`)."""
-    asked = Reduction.model_validate(state.scenario["reduction"])
-    timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
-    if rate <= 0.0:
-        return f"this world is slow: not even a tenth of a second was simulated in {KNOWN_AFTER:g} s; {HELPS}"
-    each = timeout / rate
-    runs, jobs = asked.baseline_runs, max(1, state.jobs)
-    baseline = duration(each * -(-runs // jobs))
-    low, likely, high = (each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds)
-    whole = about(likely, low, high)
-    return (
-        f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
-        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run about {whole}; "
-        f"{HELPS}, more --jobs"
-    )
+            # The first tenth of a second may not be over.
+            rate = max(live.time, 0.1) / real
+            words = f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
+            note(journal, "slow", f"{words}{duration(timeout / rate)}; {HELPS}, more --jobs")
 
 
 def give_up_if_late(journal: Journal, late: str) -> None:

@@ -1,6 +1,5 @@
-"""Finds margins with workers and a run file: tries values of numbers as `reduction.margins` asks for them, in worlds built anew.
-
-All of it follows from the run file, so a search that was killed comes to the same table.
+"""Finds margins with workers and a run file: tries values of numbers as `evidence.margins` asks for them. All of it follows from
+the run file, so a search that was killed comes to the same table.
 """
 
 from __future__ import annotations
@@ -16,12 +15,11 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
-from ddenv.engine.worker import Broken
+from ddenv.engine.worker import Broken, Run
 from ddenv.errors import UserError
 from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction.margins import wanted
 from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
@@ -68,7 +66,7 @@ def find_margins(
 ) -> None:
     """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or goes on with the open search.
 
-    The run is then as it `stood`: its status and why. Raises Stopped, and UserError if nothing can be found.
+    The run is then as it `stood`: its status and why. Raises Stopped, and UserError.
     """
     now = journal.state.margining
     if asked is not None:
@@ -159,7 +157,7 @@ class _Search:
         earlier = sum(one.name == name for one in now.runs[: now.before_call])
         first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
         most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.budget - used)
-        return wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
+        return known.wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
 
     def _is_impossible(self, name: str, value: float) -> bool:
         """Whether a value is not possible; that is recorded then."""
@@ -186,7 +184,7 @@ class _Search:
         # Fresh runs are full ones, as those of a certificate.
         seed, full = seed_of(self._parts[0].reduction, run), run >= known.FIRST_FIX_RUN
         limit = wall_limit(self._journal.state)
-        self._pool.submit(self._submitted, self._kept, seed, full, limit, ((name, value),))
+        self._pool.submit(self._submitted, Run(self._kept, seed, full, limit, ((name, value),)))
         self._control.started()
 
     def _record(self, one: Wanted, result: RunResult | Broken) -> None:

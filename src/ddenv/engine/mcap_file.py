@@ -1,17 +1,13 @@
-"""Runs as an MCAP file: what Foxglove, Rerun and `ros2 bag` show. The streams are made again from the seeds, bit for bit.
-
-Transforms, sensors, estimate, commands and models of each run are messages of ROS 2 (common_interfaces and geometry2), with their
-names, fields and units: m, s, rad, and quaternions x, y, z, w. What a message lacks is written as zeros, empty texts and empty
-lists.
+"""Runs as an MCAP file of ROS 2 messages, made again from the seeds, bit for bit: m, s, rad, and quaternions x, y, z, w. What a
+message lacks is written as zeros, empty texts and empty lists.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +15,13 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from ddenv.engine.judging import rows_of
-from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import GOAL, F, reasons
@@ -135,12 +131,10 @@ class Streams:
         self.heard.append((reading, command))
 
 
-def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) -> list[str]:
-    """Makes the failing run, that of what is left, and one that reaches its goal again (`_chosen` says which), and writes their
-    streams to `target`; returns a line about each.
+def write_mcap(run: Path, target: Path) -> list[str]:
+    """Makes the runs of `_chosen` again, and writes their streams to `target`; returns a line about each.
 
-    `progress(name, seconds)` gets the simulated time, s. Raises UserError, also for runs by a simulator of the user's own and for
-    runs that give other bits here; then nothing is written.
+    Raises UserError, also for runs that give other bits here; then nothing is written.
     """
     if target.exists():
         raise UserError(f"{target}: exists already; choose another name")
@@ -148,19 +142,19 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
         subject = read_subject(file)
         if subject.scenario.oracle is not None:
             raise UserError(f"{run}: a simulator of your own made it; only runs on Drake have streams to write")
-        chosen = [_named(subject, name, test) for name, test in _chosen(file)]
+        state = fold(file.events())
+        chosen = [_named(state, name, test) for name, test in _chosen(file, state)]
         stored = {one.test: rows_of(file, one.test) for one in chosen}
-        result_is = shown(fold(file.events()))
     if not chosen:
         raise UserError(f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}")
     template = Variants(subject.world, subject.robot, subject.scenario)
     said, output = [], BytesIO()
     writer = Writer(output)
     schemas = {kind: writer.register_msgdef(kind, definition(kind)) for kind in KINDS}
-    writer.write_message(RESULT, schemas[WORDS], {"data": result_is}, nanoseconds(0.0))
+    writer.write_message(RESULT, schemas[WORDS], {"data": shown(state)}, nanoseconds(0.0))
     for one in chosen:
         streams = Streams()
-        result = template.run(one.models, one.seed, _progress(progress, one.name), one.full, streams)
+        result = template.run(one.models, one.seed, None, one.full, streams)
         if not np.array_equal(result.trajectory, stored[one.test]):
             raise UserError(f"{run}: test {one.test} gives other bits here: another Drake or another processor made it")
         for topic, kind, seconds, message in messages(one, result, streams, subject):
@@ -172,37 +166,29 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     return said
 
 
-def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
-    return lambda seconds, *_: progress(name, seconds)
-
-
-def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:
-    """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal.
-
-    That is in the nearest world that passes, where it is known, and then the first one has its seed; else in what is left
-    without a model of it.
+def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
+    """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal: in the nearest world that
+    passes, where it is known (then the first one has its seed), else in what is left without a model of it.
     """
-    state = fold(file.events())
     passes = nearest(file, state)
     pair = None if passes is None else passes.parting
     if state.f_test is not None:
-        alike = pair is not None and state.tests[pair.with_test - 1].outcome == F
-        yield "whole", pair.with_test if alike and pair is not None else state.f_test.id
+        alike = None if pair is None or state.tests[pair.with_test - 1].outcome != F else pair.with_test
+        yield "whole", alike or state.f_test.id
     if state.evidence_test is not None:
         yield "left", state.evidence_test
     if pair is not None:
         yield "passing", pair.without_test
         return
-    found = () if current(state) is None else reasons(file, state)
-    passing = (each.parting for each in found if each.parting and each.ends[0].kind == GOAL)
-    for parting in islice(passing, 1):
-        yield "passing", parting.without_test
+    for each in () if current(state) is None else reasons(file, state):
+        if each.parting and each.ends[0].kind == GOAL:
+            yield "passing", each.parting.without_test
+            return
 
 
-def _named(subject: Subject, name: str, number: int) -> Chosen:
-    (trial,) = plan(subject, test=number)
-    cut = subject.state is not None and subject.state.tests[number - 1].cut
-    return Chosen(name, number, trial.keep, trial.seed, not cut)
+def _named(state: RunState, name: str, number: int) -> Chosen:
+    test = state.tests[number - 1]
+    return Chosen(name, number, frozenset(state.models_of(test)), test.seed, not test.cut)
 
 
 # The messages.

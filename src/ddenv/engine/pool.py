@@ -10,14 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
 from ddenv.engine.worker import (
     Broken,
-    Changes,
     Make,
     Moment,
     Ready,
@@ -49,10 +48,7 @@ _one_at_a_time = threading.Lock()
 
 @contextmanager
 def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
-    """Adds `more` to the environment for a moment, unless the user has set it: a new process inherits it.
-
-    Libraries read these variables before any Python code runs.
-    """
+    """Adds `more` to the environment for a moment, unless the user has set it: new processes read it before any Python code."""
     with _one_at_a_time:
         added = [name for name in more if name not in os.environ]
         os.environ.update({name: more[name] for name in added})
@@ -94,15 +90,7 @@ class Workers(Protocol):
     def idle(self) -> int: ...
     @property
     def busy(self) -> int: ...
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None: ...
+    def submit(self, test: int, run: Run) -> None: ...
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]: ...
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]: ...
     def live(self) -> list[tuple[Live, float]]: ...
@@ -145,9 +133,8 @@ class Pool:
         make: Make = simulator_of,
         at_a_time: int | None = None,
     ) -> None:
-        """`make` makes the simulator in each worker. `at_a_time` tests share the machine's memory, `jobs` if not given.
-
-        Raises UserError where Drake is needed and not installed.
+        """`make` makes the simulator in each worker. `at_a_time` tests share the machine's memory, `jobs` if not given. Raises
+        UserError where Drake is needed and not installed.
         """
         self._context = multiprocessing.get_context("spawn")
         # The user's own simulator gets the environment unchanged.
@@ -180,22 +167,10 @@ class Pool:
         """How many tests are running."""
         return sum(slot.job is not None and slot.job.test is not None for slot in self._slots)
 
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None:
-        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other
-        values of numbers by name.
-
-        It may take `limit` s of real time, without its preparation; None for what the scenario says.
-        """
-        limit = limit or self._limit
-        self._start(Job(test, Run(keep, seed, full, limit, changes), limit + self._margin))
+    def submit(self, test: int, run: Run) -> None:
+        """Starts a test on an idle worker."""
+        limit = run.limit or self._limit
+        self._start(Job(test, replace(run, limit=limit), limit + self._margin))
 
     def _start(self, job: Job) -> _Slot:
         """Starts a job on an idle worker, one that has prepared if possible."""
@@ -213,7 +188,7 @@ class Pool:
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
         """Tests that have ended, waiting at most `seconds` for one if one runs. Raises UserError if the world cannot be simulated.
 
-        Has to be called often: between two calls no more than `LONGEST_LOOK` counts as time of the tests.
+        Between two calls no more than `LONGEST_LOOK` counts as time of the tests.
         """
         until = time.monotonic() + seconds
         self._look(0.0)
@@ -234,9 +209,7 @@ class Pool:
         return sorted(ended, key=lambda one: one[0])
 
     def _look(self, seconds: float) -> None:
-        """Waits at most `seconds` for a worker to answer, to print or to die. Replaces what died, and kills what takes too long or
-        too much.
-        """
+        """Waits at most `seconds` for an answer, output or a death. Replaces what died, kills what takes too long or too much."""
         heard = set(wait([handle for slot in self._slots for handle in slot.worker.handles], seconds))
         for slot in self._slots:
             if not heard.isdisjoint(slot.worker.handles):
@@ -280,9 +253,8 @@ class Pool:
             self._replace(slot, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}"))
 
     def _lose(self, slot: _Slot, how: str) -> None:
-        """A worker is gone. Its job is broken, unless it had not yet begun with that: then it is made by another one.
-
-        Raises UserError if that happens again and again.
+        """A worker is gone. Its job is broken, or made by another one if it had not yet begun. Raises UserError if that goes on and
+        on.
         """
         slot.breaks += not slot.ready
         if slot.breaks > MOST_BREAKS:
@@ -301,9 +273,7 @@ class Pool:
             self._hand_over(slot)
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
-        """Lets an idle worker settle the world, and find which of `elements` rest on which. The result returns it, or None until it
-        is known.
-        """
+        """Lets an idle worker find which of `elements` rest on which. The result returns it, or None until it is known."""
         slot = self._start(Job(None, Settle(elements), PREPARATION))
 
         def found() -> Start | Broken | None:

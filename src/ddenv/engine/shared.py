@@ -1,7 +1,5 @@
-"""Reuses tests that other runs have made of the same models, with the same seed, in the same simulator.
-
-A simulation is deterministic to the last bit, so a reused test is the test that would be made. The user's own simulators and
-controllers may not be deterministic, so their tests are not reused.
+"""Reuses tests that other runs have made of the same models, with the same seed, in the same simulator: they have the same bits.
+The user's own simulators and controllers may not repeat, so their tests are not reused.
 """
 
 from __future__ import annotations
@@ -69,7 +67,7 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
         if path.resolve() == run.path.resolve():
             continue
         # Files that cannot be read are skipped.
-        with suppress(UserError), RunFile(path) as other:
+        with suppress(UserError, KeyError, TypeError), RunFile(path) as other:
             written = list(other.events()) if _is_alike(run, other) else []
             engines = (each.event for each in written if isinstance(each.event, EngineStarted))
             if {(one.version, one.simulator, one.machine) for one in engines} == {
@@ -94,26 +92,15 @@ def _is_alike(run: RunFile, other: RunFile) -> bool:
     ours, theirs = (next((each.event for each in file.events(most=1)), None) for file in (run, other))
     if not isinstance(ours, Created) or not isinstance(theirs, Created):
         return False
-    asked = _asked(ours.scenario)
-    if asked is None or asked != _asked(theirs.scenario) or ours.elements != theirs.elements:
-        return False
-    return all(run.documents(name) == other.documents(name) for name in ("world", "robot", "resource "))
+    alike = _asked(ours.scenario) == _asked(theirs.scenario) and ours.elements == theirs.elements
+    return alike and all(run.documents(name) == other.documents(name) for name in ("world", "robot", "resource "))
 
 
 def _asked(scenario: dict[str, Any]) -> Any:
     """A scenario without its paths, and of how it is reduced only whether tests end early: the contents of files are compared."""
-    kept = {
-        key: value
-        for key, value in scenario.items()
-        if key not in ("name", "description", "reduction", "world", "folder")
-    }
-    robot, reduction = kept.get("robot"), scenario.get("reduction")
-    if not isinstance(robot, dict) or not isinstance(reduction, dict):
-        return None
-    return kept | {
-        "early_stop": reduction.get("early_stop"),
-        "robot": {key: value for key, value in robot.items() if key != "model"},
-    }
+    paths = dict.fromkeys(("name", "description", "world", "folder"))
+    robot, reduction = scenario["robot"] | {"model": None}, scenario["reduction"]["early_stop"]
+    return scenario | paths | {"robot": robot, "reduction": reduction}
 
 
 def result_of(place: Place) -> RunResult | None:

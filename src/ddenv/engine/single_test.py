@@ -1,5 +1,5 @@
-"""Runs the robot outside of a reduction: in a whole scenario, or in any part of a run's world, judged against the run's f; and asks
-with fresh runs, as many as it takes, whether what a run has left still fails as it did.
+"""Runs the robot outside of a reduction, judged against a run's f; and asks with fresh runs, as many as it takes, whether what a
+run has left still fails as it did.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
+from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
@@ -94,9 +95,8 @@ def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
-    """Makes the runs in worker processes; yields the result of each, in order, as plain data.
-
-    In a run whose baseline is done they are judged by its f; else a failed run is just "failed".
+    """Makes the runs in worker processes; yields the result of each, in order, as plain data. Without f a failed run is just
+    "failed".
     """
     failures = _failures(subject)
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
@@ -105,7 +105,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     try:
         while shown < len(trials):
             while pool.idle and started < len(trials):
-                pool.submit(started, trials[started].keep, trials[started].seed, full=True)
+                pool.submit(started, Run(trials[started].keep, trials[started].seed))
                 started += 1
             for index, result in pool.finished(1.0):
                 trial = trials[index]
@@ -134,10 +134,10 @@ MOST_BROKEN = 5
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What fresh runs showed so far: `shown` of the `runs` that did not break showed f, `broken` more broke.
+    """What fresh runs showed so far: `shown` of the `runs` that did not break showed f.
 
-    `fails`: f shows at the rate that the run's certificate expects (True), or at less than half of it (False); None if the runs do
-    not decide.
+    `fails`: f shows at the rate that the certificate expects (True), or at less than half of it (False); None while that is
+    open.
     """
 
     fails: bool | None
@@ -187,7 +187,7 @@ def reproduce(
     subject: Subject, certificate: Certificate, most: int, jobs: int
 ) -> Iterator[tuple[dict[str, Any], Reproduction]]:
     """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
-    expects at least. Where chosen runs were reduced it runs their seeds, of which each has to show f.
+    expects; where chosen runs were reduced, with their seeds, of which each has to show f.
 
     Yields each run's result, and what all of them show together.
     """

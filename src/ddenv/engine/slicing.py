@@ -1,5 +1,5 @@
-"""Slices in a run: without a test, the environment is cut down to what took part in the runs known there. Some of what is implied
-is simulated all the same, and has to repeat the run that implies it to the last bit.
+"""Slices in a run: the environment is cut down, without a test, to what took part in the runs known there. Some of what is implied
+is simulated all the same, and has to have the same bits.
 """
 
 from __future__ import annotations
@@ -26,9 +26,8 @@ CHEAP = 0.1
 def slice_environment(journal: Journal) -> bool:
     """Cuts the environment down, with an event, where every run known there allows it; returns whether it did.
 
-    Every known run keeps its bits; other seeds may meet what went. So with `accept_rate: kept` it is done after a reduction only
-    if the chance that a fresh run meets any of it is at most what may be lost of the rate; and after the baseline in any case.
-    In accept mode `ask`, where each reduction waits for the user, it is not done.
+    Other seeds may meet what went: with `accept_rate: kept` it is done after a reduction only if the chance of that is at most
+    what may be lost of the rate. In accept mode `ask` it is not done.
     """
     state, there = journal.state, journal.environment
     tests, met = _known(journal, there)
@@ -58,10 +57,8 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
 
 
 def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:
-    """The runs known of the models `there`, of those that decisions rest on, and what took part in each seed's. Where chosen runs
-    are reduced exactly, only those of them that show f count.
-
-    None where slices may not be used, or where it is unknown what took part in one of them.
+    """The runs known of the models `there` that decisions rest on, and what took part in each seed's; of chosen runs only those
+    that show f. None where slices may not be used, or where it is unknown what took part in one.
     """
     tests: list[Test] = []
     met: dict[int, Environment] = {}
@@ -92,9 +89,8 @@ def _closed(journal: Journal, models: Environment, there: Environment) -> Enviro
 
 
 def audit_is_due(state: RunState, phase: str = "") -> bool:
-    """Whether the next implied test has to be simulated: the first one, and then one in so many as the setting says.
-
-    In the `phase` of a certificate each of them, while that is cheap. That a run repeats in a slice which it chose is implied, too.
+    """Whether the next implied test has to be simulated: the first one, and then one in so many as the setting says; in the `phase`
+    of a certificate each, while that is cheap.
     """
     if phase == CERTIFY and _is_cheap(state):
         return True
@@ -120,9 +116,7 @@ def compare(journal: Journal, audits: Iterable[Test]) -> None:
 
 
 def repeats(journal: Journal, audit: Test) -> bool:
-    """Whether a finished audit has the bits of the run that implies it, and sensed what took part at the same times; True for one
-    without bits, since its worker died.
-    """
+    """Whether a finished audit has the bits of the run that implies it; True for one without bits, since its worker died."""
     if audit.audits is None or not (again := journal.file.motions(audit.id)):
         return True
     source, state = journal.state.tests[audit.audits - 1], journal.state

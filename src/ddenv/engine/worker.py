@@ -1,6 +1,5 @@
-"""A worker process, from both sides. It prepares the simulator once, and then runs one test at a time in it.
-
-The engine gives it tasks, hears its answers, and may kill it; what it prints goes to the log.
+"""A worker process, from both sides: it prepares the simulator once, and then runs one test at a time. What it prints goes to the
+log.
 """
 
 from __future__ import annotations
@@ -56,8 +55,8 @@ Make = Callable[[Scenario, World, Model], Simulator]
 class Start:
     """What rests on what in the settled world, as (upper, lower), and how it settled.
 
-    `ties` has models with others that they are tied to: without that a model would move by itself, as a ball without its shelf. So
-    without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
+    `ties` has models with what they are tied to: without it they would move by themselves. None: nothing is known without a
+    test.
     """
 
     supports: list[tuple[str, str]]
@@ -67,12 +66,15 @@ class Start:
 
 @dataclass(frozen=True)
 class Run:
-    """Asks for a test of at most `limit` s of real time, where `changes` have other values of numbers by name."""
+    """Asks for a test. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other values by name.
+
+    It may take `limit` s of real time, without its preparation; None for what the scenario says.
+    """
 
     keep: frozenset[str]
     seed: int
-    full: bool
-    limit: float
+    full: bool = True
+    limit: float | None = None
     changes: Changes = ()
 
 
@@ -101,9 +103,8 @@ class Broken:
 
 @dataclass(frozen=True)
 class Moment:
-    """A test goes on: so far `time` s are simulated. The robot, and the models that are no longer where they started, are there.
-
-    The robot began to move at `begun`, s of `time.monotonic`.
+    """A test goes on: `time` s are simulated; the robot and the models that have moved are there. It began at `begun`, s of
+    `time.monotonic`.
     """
 
     begun: float
@@ -129,7 +130,7 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 def work(line: Connection, output: Connection, parts: Any) -> None:
     """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is printed goes to `output`.
 
-    `parts` has what to make the simulator with, pickled: shared memory, so that starting a worker takes no time in a large world.
+    `parts` has what to make the simulator with, pickled in shared memory.
     """
     _settle_in(output)
     make, of = pickle.loads(bytes(parts))
@@ -187,7 +188,7 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
             return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
         if isinstance(simulator, ExternalSimulator):
             # It ends a test itself, and says why.
-            simulator.limit = task.limit
+            simulator.limit = task.limit or simulator.limit
         return simulator.run(task.keep, task.seed, _progress(tell), task.full)
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:
@@ -197,7 +198,7 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
         if not isinstance(error, UserError):
             traceback.print_exception(error)
             sys.stderr.flush()
-        return Broken("error", _reason(error))
+        return Broken("error", reason_of(error))
 
 
 def _progress(tell: Callable[[Moment], object]) -> Progress:
@@ -218,7 +219,7 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
     return report
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
     """An exception in one line."""
     text = " ".join(str(error).split())
     words = text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"
@@ -236,9 +237,7 @@ def _follow_parent(parent: int) -> None:
 
 
 class WorkerProcess:
-    """A process that runs `work`. Its answers come over one pipe, and what it prints over another: no output can be taken for an
-    answer, and each wakes up whoever waits for its `handles`.
-    """
+    """A process that runs `work`. Answers come over one pipe, output over another; each wakes up who waits for its `handles`."""
 
     def __init__(self, context: SpawnContext, parts: Any) -> None:
         self._line, theirs = context.Pipe()

@@ -1,14 +1,14 @@
 """What fresh runs show of a result: what share of the rate of f it keeps, and how often f still shows without each model.
 
-Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the same seed. For each share there is
-a bet that the first one shows f at more than this share of the second one's rate. If it does not, the bet reaches a wealth of
-1 / error with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic statistics
-and safe anytime-valid inference", 2023). The wealth falls as the share rises, so the highest share whose bet has reached 1 / error
-is a lower bound of what is kept, valid at any time. A bet the other way gives an upper bound. Nothing is assumed about how runs
-with the same seed depend on each other.
+Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the same seed. For each share there
+is a bet that the first one shows f at more than this share of the second one's rate. If it does not, the bet reaches a wealth of
+1 / error with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic
+statistics and safe anytime-valid inference", 2023). So the highest share whose bet has reached 1 / error is a lower bound of
+what is kept; a bet the other way gives an upper bound. Nothing is assumed about how runs with the same seed depend on each
+other.
 
-A run that was not made, or broke, counts against the claim. So the whole world need not run where what is left shows f: it is then
-taken to show f, too, which can only make the bound smaller.
+A run that was not made, or broke, counts against the claim: the whole world need not run where what is left shows f, and is then
+taken to show f, too.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from functools import lru_cache
 from typing import Literal
 
 from ddenv.environment import Environment
-from ddenv.evidence.rates import HIGHEST_RATE, Shown
+from ddenv.evidence.rates import HIGHEST_RATE, Shown, wilson_interval
 
 Verdict = Literal[
     "", "kept", "lost", "exact", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"
@@ -54,11 +54,11 @@ STAKES = (0.15, 0.3, 0.5, 0.7, 0.9)
 
 @dataclass(frozen=True)
 class Terms:
-    """The terms of a certificate: the share of the whole world's rate that it has to show, the share at which the search aims, the
-    chance of error of a claim, and the minimum number of runs.
+    """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
+    of a claim, and the minimum number of runs.
 
-    `at_once`: the runs of a pair are made one right after the other, and none is part of two pairs. Without seeds all rates may
-    change in the course of time, and would between two runs that are far apart.
+    `at_once`: the runs of a pair are made one right after the other, and none is part of two pairs: without seeds all rates may
+    change in the course of time.
     """
 
     certify_rate: float
@@ -133,7 +133,6 @@ def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
 @dataclass(frozen=True)
 class Wanted:
     """What a procedure asks for: these `tests`, as (environment, run); `later` environments will run with later seeds, if at all.
-
     `bound` is what its tests have shown so far.
     """
 
@@ -148,9 +147,8 @@ Procedure = Generator[Wanted, tuple[Shown, ...], tuple[Verdict, float | None]]
 
 @dataclass(frozen=True)
 class Claim:
-    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run).
-
-    `wanted` are the tests that it needs next; `later` ones it may need after these. `broken` of its tests broke.
+    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run). `wanted` are the
+    tests that it needs next, `later` those that it may need after these. `broken` of its tests broke.
     """
 
     verdict: Verdict
@@ -204,8 +202,8 @@ def settle(procedure: Procedure, shown: Callable[[Environment, int], Shown], ahe
 def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     """What share of the rate of `whole` is kept by `left`: "kept" if at least `certify_rate` is, "lost", or "not shown".
 
-    The bound, and so "kept", is wrong with a probability of at most the terms' error. "lost" says that less than `keep_rate` is
-    kept; this is wrong with a probability of at most 1 / `REFUTED`.
+    "kept" is wrong with a probability of at most the terms' error; "lost", less than `keep_rate` is kept, of at most 1 /
+    `REFUTED`.
     """
     if left == whole:
         return (yield from _of_whole(left, max(1, terms.at_least)))
@@ -258,8 +256,8 @@ def falls(
 ) -> Procedure:
     """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
-    The bound, and so "needed", is wrong with a probability of at most the terms' error. "helps" says that f is rarer, but not by so
-    much; "not needed" that it shows about as often, which the next certificate has to show.
+    "needed" is wrong with a probability of at most the terms' error. "helps": f is rarer, but not by so much; "not needed": it
+    shows about as often, which the next certificate has to show.
     """
     assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
     for run in range(MOST_REMOVAL_PAIRS):
@@ -298,3 +296,63 @@ def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: 
         if abs(ratio) >= ENOUGH_RATIO:
             break
     return ("lost" if ratio <= -ENOUGH_RATIO else "kept"), None
+
+
+# How many tests a certificate takes.
+
+# It takes so many times the expected number, if the rates are right.
+SHORTER, LONGER = 0.55, 2.2
+# Of the pairs of runs with the same seed, so many end alike whatever their rates are.
+ALIKE = 0.4
+# The logarithm of the wealth that a bet of the first certificate needs, with what it costs to bet with several stakes at once; and
+# that of a bet against it.
+NEEDS, NEEDS_AGAINST = math.log(2.0 / error_of(1) * len(STAKES)), math.log(REFUTED * len(STAKES))
+# Eight of ten rates are in the interval of so many standard deviations.
+EIGHT_OF_TEN = 1.28
+
+
+def certificate_tests(
+    rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0
+) -> tuple[int, int, int]:
+    """Tests of a certificate of `left` needed models, as (low, likely, high): of ten, about eight take between low and high.
+
+    `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known.
+    """
+    # A damaged run file may ask for nothing, or for all.
+    rate, certify_rate, seen = (
+        min(max(rate, 0.0), 1.0),
+        min(max(certify_rate, 0.01), 0.99),
+        min(max(0, seen), MOST_PAIRS),
+    )
+    rates = [rate, *(wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ())]
+    ends = [_expected(each, certify_rate, left, at_least) for each in rates]
+    # What is not known of the rate and chance within the certificate are independent factors.
+    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
+    longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
+    most = max(ends[0], min(2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS, ends[0] * longer))
+    return math.floor(ends[0] / shorter), round(ends[0]), math.ceil(most)
+
+
+def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> float:
+    """Its tests where the whole world and what is left show f at `rate`, and that without any of its models never.
+
+    As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest stake on average.
+    """
+    kept = (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0)
+    both = ALIKE * rate + (1.0 - ALIKE) * rate * rate
+    alone = max(float(at_least), NEEDS / _growth((rate, 0.0, rate - both), kept))
+    if alone <= MOST_ALONE:
+        of_left, of_whole = alone, alone * (1.0 - rate)
+    else:
+        of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, rate - both, rate - both), kept))
+    needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
+    removal = NEEDS / _growth((0.0, 0.0, rate), needed)
+    removal = max(at_least, removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER)
+    lost = 2.0 * NEEDS_AGAINST / _growth((both, rate - both, rate - both), needed)
+    return min(lost, max(of_left, removal if left else 0.0) + of_whole + left * removal)
+
+
+def _growth(shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
+    """How fast the wealth of a bet grows in a pair, in nats; nearly 0 if it shrinks. `shares` of all pairs have these `gains`."""
+    pairs = tuple(zip(shares, gains, strict=True))
+    return max(1e-4, *(sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES))

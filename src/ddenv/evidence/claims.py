@@ -9,11 +9,10 @@ from statistics import median
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
-from ddenv.evidence.certificate import Terms, falls, keeps, often, settle
-from ddenv.evidence.certificate_cost import Made, certificate_tests
+from ddenv.evidence.certificate import Terms, certificate_tests, falls, keeps, often, settle
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
-from ddenv.runfile.progress import Certificate, Claim, Isolation, narrowed
+from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
@@ -29,10 +28,7 @@ def is_minimal(certificate: Certificate) -> bool:
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
-    """The models but for which a certificate shows the end to be minimal: without them f is rarer, but not by much.
-
-    The one without which f shows most often comes first.
-    """
+    """The models but for which a certificate shows the end to be minimal; the one without which f shows most often comes first."""
     left, *removals = certificate.claims
     helps = [claim for claim in removals if claim.verdict != "needed"]
     if left.verdict != "kept" or {claim.verdict for claim in helps} != {"helps"}:
@@ -42,9 +38,8 @@ def helping(certificate: Certificate) -> tuple[str, ...]:
 
 
 def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settled]:
-    """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left.
-
-    It holds whenever one looks. Models that no run has left out yet are missing.
+    """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left. Models that no run
+    has left out yet are missing.
     """
     node, whole = state.nodes[certificate.node], state.environments[origin(state, certificate.node).id]
     left, outcomes = state.environments[node.id], dict[tuple[Environment, int], Shown]()
@@ -62,16 +57,12 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     def shown(environment: Environment, run: int) -> Shown:
         return outcomes.get((environment, run))
 
-    terms = terms_of(certificate)
+    # Half of the errors is for rates kept, half for removals.
+    terms = Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
     if certificate.seeds:
         return {None: settle(often(left, terms.at_least), shown)}
     claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
     return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
-
-
-def terms_of(certificate: Certificate) -> Terms:
-    """The terms of each claim of a certificate: half of the errors is for rates kept, half for removals."""
-    return Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
@@ -93,9 +84,8 @@ def current(state: RunState) -> Certificate | None:
 
 
 def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tuple[Test, ...]:
-    """The runs of a claim's environment that the certificate rests on (the chosen ones, if seeds were), but for those that broke.
-
-    Runs that were only made ahead of time are not among them.
+    """The sound runs of a claim's environment that the certificate rests on (the chosen ones, if seeds were), not those made ahead
+    of time.
     """
     if certificate.seeds:
         chosen = exact_runs(state)
@@ -109,9 +99,8 @@ def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tupl
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m: median and maximum.
-
-    Both are NaN where no distance is known.
+    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m: median and maximum; NaN
+    where no distance is known.
     """
 
     failure: str
@@ -144,43 +133,21 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
 
 
 def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
-    """How many runs a certificate of the current environment takes, as (low, likely, high).
-
-    Its own runs narrow what the rates before it foretold. Only where they contradict that do they stand alone.
-    """
-    left = len(state.environment) - len(state.pinned.intersection(state.environment))
-    made = 0
-    shown: dict[tuple[int, str | None], tuple[int, int]] = {}
-    for test in state.confirm_tests:
-        if test.run < now.first_run or not test.is_finished:
-            continue
-        made += 1
-        if test.outcome not in BROKEN:
-            hits, runs = shown.get((test.node, test.without), (0, 0))
-            shown[test.node, test.without] = hits + (test.outcome == "similar"), runs + 1
+    """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     if now.seeds:
         return now.at_least, now.at_least, now.at_least
+    left = len(state.environment) - len(state.pinned.intersection(state.environment))
     before = 0 if state.baseline is None else state.baseline.runs
-    without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
-    done = Made(made, shown.get((now.node, None), (0, 0)), without)
-    foretold, by_runs = (
-        certificate_tests(now.rate, now.certify_rate, left, now.at_least, before, known) for known in (None, done)
-    )
-    return narrowed(foretold, by_runs) if made < foretold[-1] else by_runs
+    return certificate_tests(now.rate, now.certify_rate, left, now.at_least, before)
 
 
 def has_dropped(state: RunState) -> bool:
     """Whether the runs of the current environment so far show that f is rarer in it than it may be."""
     here = state.here
-    whole = None if here is None else origin(state, here.number)
-    if (
-        settings(state).accept_rate == "exact"
-        or here is None
-        or whole is None
-        or here is whole
-        or not here.runs
-        or not whole.runs
-    ):
+    if here is None or settings(state).accept_rate == "exact":
+        return False
+    whole = origin(state, here.number)
+    if here is whole or not here.runs or not whole.runs:
         return False
     least = settings(state).keep_rate * whole.shown / len(whole.runs)
     return wilson_interval(here.shown, len(here.runs))[1] < least
@@ -190,11 +157,11 @@ def has_dropped(state: RunState) -> bool:
 class FreshRuns:
     """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
 
-    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome, with broken runs.
-    `low`..`high` is the 95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `is_left`: all that is
-    left ran. `claim` is what the certificate says of them, once it is finished; it makes none of the whole world, nor of earlier
-    environments. What is left keeps at least `bound` of the rate, by the runs so far; without the model f shows at most `bound`
-    times as often. `is_chosen`: the whole world ran only where what is left missed f, so these runs say nothing about its rate.
+    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome. `low`..`high` is the
+    95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `claim` is what the finished certificate
+    says of them. What is left keeps at least `bound` of the rate, by the runs so far; without the model f shows at most `bound`
+    times as often. `is_left`: all that is left ran. `is_chosen`: the whole world ran only where what is left missed f, so these
+    runs say nothing about its rate.
     """
 
     node: int
@@ -212,7 +179,7 @@ class FreshRuns:
 
     @property
     def shows_at_least(self) -> str:
-        """What the runs have shown: "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing yet."""
+        """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
         return f"{'≤' if self.without else '≥'} {percent(self.bound)}"
@@ -222,11 +189,8 @@ class FreshRuns:
         """The same in words."""
         if self.bound is None or not self.shows_at_least:
             return ""
-        return (
-            f"at most {percent(self.bound)} as often"
-            if self.without
-            else f"keeps at least {percent(self.bound)} of the rate"
-        )
+        share = percent(self.bound)
+        return f"at most {share} as often" if self.without else f"keeps at least {share} of the rate"
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:

@@ -16,9 +16,8 @@ Shown = bool | Literal["broken"] | None
 
 
 def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tuple[float, float]:
-    """The Wilson interval of a rate that was seen `successes` times in `trials`, of 95 % or of so many standard deviations.
-
-    Raises ValueError for impossible counts.
+    """The Wilson interval of a rate seen `successes` times in `trials`, of 95 % or so many standard deviations. Raises ValueError
+    for impossible counts.
     """
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"{successes} of {trials}")
@@ -30,8 +29,8 @@ def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tu
 
 
 def anytime_interval(successes: int, trials: int, error: float = 0.05) -> tuple[float, float]:
-    """An interval of a rate that may be asked for after each run: it misses the rate at any time with a probability of at most
-    `error`, however it is decided when to stop. It is 0 to 1 without runs.
+    """An interval of a rate that misses it with a probability of at most `error`, however it is decided when to stop; 0 to 1
+    without runs.
 
     Jeffreys' mixture of Betas against each rate (Robbins, "Statistical methods related to the law of the iterated logarithm",
     1970).
@@ -70,10 +69,10 @@ def iterations_needed(rate: float, confidence: float = 0.95) -> int:
 
 
 def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool | None:
-    """Whether runs show a failure at `rate` (above 0) rather than at half of it: True, False, or None if they do not decide yet.
+    """Whether runs show a failure at `rate` (above 0) rather than at half of it: True, False, or None while they do not decide.
 
-    Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): at either rate it is wrong with a probability of
-    at most about `error`, although it may be asked after each run.
+    Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): wrong with a probability of at most about
+    `error`.
     """
     runs = hits = 0
     for shown in outcomes:
@@ -85,9 +84,8 @@ def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool
 
 
 def leans_to(hits: int, misses: int, rate: float, other: float, error: float) -> bool | None:
-    """The same after `hits` and `misses`, if no fewer runs decided: whether they speak for `rate` or for `other`, a lower one.
-
-    No few runs tell rates above 0.99 apart, so these are taken as 0.99, or as 0.97 for `other`.
+    """The same after `hits` and `misses`: whether they speak for `rate` or for `other`, a lower one. Rates above 0.99, or 0.97 for
+    `other`, are taken as these: no few runs tell them apart.
     """
     rate, other = min(rate, 0.99), min(other, 0.97)
     ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))

@@ -1,4 +1,4 @@
-"""Slices: what is known of a run because nothing that it lacks took part in another one. Pure.
+"""Slices: what is known of a run because nothing that it lacks took part in another one.
 
 Tests share their seeds, and a simulation repeats bit for bit where what took no part in it is removed. So a finished run of models
 E1 implies the run of E2 with the same seed if E2 is a part of E1, has all that took part, and breaks no tie. It implies nothing
@@ -14,11 +14,13 @@ Who uses this keeps to three rules, so that neither workers nor kills change a r
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ddenv.environment import NOTHING, Environment
+from ddenv.runfile.progress import Node
+from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, RunState
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,7 @@ def implies(took_part: Environment, there: Environment, keep: Environment, ties:
 
 
 def fresh_chance(met: Sequence[Environment]) -> float:
-    """The chance that a fresh run meets a model that none of these runs `met`, estimated by the models that only one of them met.
-
-    Good, "The population frequencies of species and the estimation of population parameters", 1953.
-    """
+    """The chance that a fresh run meets a model that none of these runs `met`, by the models that only one met (Good, 1953)."""
     once, more = NOTHING, NOTHING
     for models in met:
         more |= once & models
@@ -78,25 +77,30 @@ def fresh_chance(met: Sequence[Environment]) -> float:
     return min(1.0, len(once) / len(met)) if met else 1.0
 
 
-def reasons(
-    elements: Sequence[str],
-    before: Environment,
-    after: Environment,
-    met: Sequence[Environment],
-    pinned: Environment = NOTHING,
-) -> dict[str, str]:
-    """Why each model of `before` stays in `after` or goes, by name in the order of `elements`, the names of all models.
+# Who took part in the runs of a run file.
 
-    `met` took part in each of the runs known there.
-    """
-    one, runs = len(met) == 1, f"{len(met)} run{'s' * (len(met) != 1)}"
 
-    def why(model: int) -> str:
-        took_part = sum(model in models for models in met)
-        if model not in after:
-            return "took no part in the one run known" if one else f"took part in none of {runs}"
-        if took_part:
-            return f"took part in {took_part} of {runs}"
-        return "is pinned" if model in pinned else "one that took part is tied to it"
+def in_whole_world(state: RunState) -> tuple[Counter[str], int]:
+    """In how many of the baseline runs each model took part, empty where that is unknown; and how many runs these are."""
+    runs = [test for test in state.tests if test.phase == "baseline" and test.outcome not in BROKEN]
+    return Counter(name for test in runs for name in (test.took_part or NOTHING).names(state.elements)), len(runs)
 
-    return {elements[model]: why(model) for model in before}
+
+def in_last(state: RunState) -> Environment | None:
+    """The models that took part in the last similar run; None where that is unknown."""
+    return None if state.evidence is None else state.evidence.took_part
+
+
+def met_by(state: RunState, node: Node) -> list[Environment]:
+    """What took part in each of the runs by which the environment of a node was cut down to its slice, by seed."""
+    met: dict[int, Environment] = {}
+    for number in node.sliced_by:
+        test = state.tests[number - 1]
+        met[test.run] = met.get(test.run, NOTHING) | (test.took_part or NOTHING)
+    return list(met.values())
+
+
+def simulated(state: RunState) -> int:
+    """How many tests of the search were simulated, the baseline included, certificates and isolation apart."""
+    made = (test for test in state.tests if test.is_finished and test.implied_by is None)
+    return sum(test.phase not in (CERTIFY, ISOLATE) for test in made)

@@ -5,16 +5,16 @@ A command is its kind with its fields as JSON: `veto {"round": 2, "candidate": 3
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any, get_args
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
 from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
-from ddenv.guiding.situation import Situation, named, waiting
-from ddenv.runfile.reading import Invalid, read
+from ddenv.guiding.situation import Situation, waiting
+from ddenv.runfile.reading import Invalid, plain, read
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.text import as_sentence, count, snake_case
@@ -43,9 +43,7 @@ def drops(command: Command, state: RunState) -> str:
     if waits is None:
         return ""
     sizes = f"{len(state.environment)} → {count(waits.size, 'model')}"
-    gone = named([name for name in command.new(state) if name not in waits.models]) if isinstance(command, Pin) else ""
-    lost = f" Accepting it removes {gone}, which you want to pin." if gone else ""
-    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it.{lost}"
+    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it."
 
 
 def _begins_anew(command: Command, state: RunState) -> bool:
@@ -83,9 +81,7 @@ def send(file: RunFile, command: Command) -> int:
 
 def written(command: Command) -> tuple[str, dict[str, Any]]:
     """A command as it stands in the run file: its kind, and its fields as JSON."""
-    values = {field.name: getattr(command, field.name) for field in fields(command)}
-    data = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-    return snake_case(type(command).__name__), data
+    return snake_case(type(command).__name__), plain(command)
 
 
 def parse(kind: str, data: Mapping[str, Any]) -> Command:
@@ -93,6 +89,7 @@ def parse(kind: str, data: Mapping[str, Any]) -> Command:
     if kind not in KINDS:
         raise UserError(f"there is no command '{kind[:40]}'")
     try:
-        return read(KINDS[kind], data)
+        command: Command = read(KINDS[kind], json.dumps(data))
     except Invalid as invalid:
         raise UserError(f"no such {invalid}") from None
+    return command

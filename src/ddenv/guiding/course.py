@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import FINISHED, NO_FAILURE, Situation, Words, new_search
-from ddenv.runfile.progress import Node
+from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.text import count, plain, printable
+from ddenv.text import count, printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +170,7 @@ class Change:
     def refusal(self, now: Situation) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
             return ONLY_CHANGEABLE
-        if wrong := [why for name, value in self.asked.items() if (why := _wrong(name, value))]:
+        if wrong := [why for name, value in self.settings.items() if (why := _wrong(name, value))]:
             return "; ".join(wrong)
         new = self.new(now.state)
         budget, done = new.get("budget"), now.state.made
@@ -191,25 +191,10 @@ class Change:
     def new(self, state: RunState) -> dict[str, Value]:
         """The settings that differ from the current ones."""
         now = settings(state)
-        return {key: value for key, value in self.asked.items() if getattr(now, key) != value}
-
-    @property
-    def asked(self) -> dict[str, Value]:
-        """The settings as a scenario holds them: another program may have written a number as text."""
-        numbers = {name for name, one in CHANGEABLE.items() if one.kind is int}
-        return {
-            key: int(each) if key in numbers and str(each).isdecimal() else each for key, each in self.settings.items()
-        }
+        return {key: value for key, value in self.settings.items() if getattr(now, key) != value}
 
 
 CourseCommand = Pause | Resume | Step | AcceptMode | Stop | Undo | GoBack | Change
-
-
-def place(node: Node) -> str:
-    """A node in words."""
-    models = count(len(node.environment), "model")
-    what = plain(node.what)
-    return f"the whole world ({models})" if node.parent is None else f"{models} (#{node.number}, {what})"
 
 
 # The settings that may change during a run: all others define what a test is, or how f was fixed.

@@ -52,9 +52,7 @@ class Accept(OfCandidate):
         return self.not_waiting(now.state)
 
     def words(self, state: RunState) -> Words:
-        one = self.meant(state)
-        left = "" if one is None else f": E is now its {count(one.size, 'model')}. The next round begins"
-        return Words("accept", f"{self.label(state)} is accepted{left}")
+        return Words("accept", f"{self.label(state)} is accepted. The next round begins")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +63,7 @@ class Reject(OfCandidate):
         return self.not_waiting(now.state)
 
     def words(self, state: RunState) -> Words:
-        return Words("reject", f"{self.label(state)} is rejected. {_next_candidate(state, self.candidate)}")
+        return Words("reject", f"{self.label(state)} is rejected")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +79,7 @@ class Veto(OfCandidate):
         return f"{one.label} is {one.verdict} already" if one.verdict else ""
 
     def words(self, state: RunState) -> Words:
-        said = f"{self.label(state)} is vetoed: it is not tried in any round; v again takes that back"
-        return Words("veto", f"{said}. {_next_candidate(state, self.candidate)}")
+        return Words("veto", f"{self.label(state)} is vetoed: it is not tried in any round; v again takes that back")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,16 +93,7 @@ class Unveto(OfCandidate):
         return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
 
     def words(self, state: RunState) -> Words:
-        one = self.meant(state)
-        verdict = "vetoed" if one is None else one.verdict
-        return Words("allow it again", f"{self.label(state)} is no longer {verdict}: it is tried after all")
-
-
-def _next_candidate(state: RunState, after: int) -> str:
-    """What is tried after a candidate of the round, as a sentence without a full stop."""
-    waiting = () if state.round is None else state.round.untried
-    following = next((one for one in waiting if one.index > after), None)
-    return "It was the last one of this round" if following is None else f"Next is {following.label}"
+        return Words("allow it again", f"{self.label(state)} is allowed again: it is tried after all")
 
 
 def round_over(state: RunState) -> str:
@@ -139,9 +127,7 @@ class Pin:
         return "" if self.new(state) else "pinned already"
 
     def words(self, state: RunState) -> Words:
-        new = self.new(state)
-        are = "is pinned, and always stays" if len(new) == 1 else "are pinned, and always stay"
-        return Words("pin", f"{named(new)} {are}. {new_search(state)}")
+        return Words("pin", f"pinned, so that it always stays: {named(self.new(state))}. {new_search(state)}")
 
     def new(self, state: RunState) -> tuple[str, ...]:
         """The models that are not pinned yet."""
@@ -158,9 +144,7 @@ class Unpin:
         return "" if self.pinned(now.state) else "not pinned"
 
     def words(self, state: RunState) -> Words:
-        pinned = self.pinned(state)
-        are = "is" if len(pinned) == 1 else "are"
-        return Words("unpin", f"{named(pinned)} {are} unpinned. {new_search(state)}")
+        return Words("unpin", f"unpinned: {named(self.pinned(state))}. {new_search(state)}")
 
     def pinned(self, state: RunState) -> tuple[str, ...]:
         """The models that are pinned."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.runfile.snapshot import EngineIs
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose
@@ -91,15 +90,7 @@ def new_search(state: RunState, size: int | None = None) -> str:
     """
     if state.baseline is None:
         return "The search begins with that"
-    untried = 0 if state.round is None else len(state.round.untried)
-    broken_off = in_the_making(state)
-    if broken_off is not None:
-        ends = (
-            f"Certificate {broken_off.number} is broken off after {count(fresh_runs_made(state, broken_off), 'run')}; a"
-        )
-    else:
-        ends = f"This round ends with {count(untried, 'candidate')} untried; a" if untried else "A"
-    return f"{ends} new search begins from {count(len(state.environment) if size is None else size, 'model')}"
+    return f"A new search begins from {count(len(state.environment) if size is None else size, 'model')}"
 
 
 def named(names: Iterable[str]) -> str:

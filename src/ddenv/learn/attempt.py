@@ -131,7 +131,6 @@ class Attempt:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """The student's environment."""
         return self._chain[-1]
 
     @property
@@ -184,13 +183,8 @@ class Attempt:
 
     @property
     def verdict(self) -> str:
-        """What is known of the models that are held, and what the student had shown of it."""
+        """What is known of the models that are held."""
         smallest = self.oracle.minimal[0] if self.oracle.minimal else ()
         smaller = smallest if len(smallest) < len(self.held) else ()
         known = of_all_parts(self.held, self.oracle.could_go(self.held), smaller)
-        said = f"{known[:1].upper()}{known[1:]}."
-        tested = [frozenset(each.kept) for each in self.tried]
-        shown = sum(frozenset(self.held) - {name} in tested for name in self.held)
-        if not self.found or shown == len(self.held):
-            return said
-        return f"{said} Your own tests {f'show it for {shown} of them' if shown else 'do not show it'}."
+        return f"{known[:1].upper()}{known[1:]}."

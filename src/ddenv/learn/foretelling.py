@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,16 +44,6 @@ class Foretelling:
     until: int
     reason: Question | None = None
     kind: str = ""
-
-    @property
-    def told(self) -> Foretelling:
-        """The same, with the reason told at the right answer in place of asked."""
-        if self.reason is None:
-            return self
-        seen = self.question.answers[self.question.right].why
-        because = f"{seen} {self.reason.answers[self.reason.right].why}"
-        answers = tuple(replace(each, why=because) if each.why == seen else each for each in self.question.answers)
-        return replace(self, question=replace(self.question, answers=answers), reason=None)
 
 
 def foretelling(position: Position, at: int, what: Foretold) -> Foretelling | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ddenv.learn.lesson import MISCONCEPTIONS, Question, Step, blocks
-from ddenv.learn.race import BOUND, comparison, result
 from ddenv.learn.shelf import Opened
 from ddenv.page.blocks import Block, Name, Paragraph, Part, Picture, Report, Section, Strong, Table, say
 from ddenv.page.step_chart import chart
@@ -14,7 +13,6 @@ FIGURES = (("models", "models"), ("left", "left"), ("search_tests", "tests of ca
 
 
 def handout(opened: Opened) -> Report:
-    """The page of a lesson."""
     lesson, state = opened.lesson, opened.position.end
     end = state.revision
     about = f"The lesson takes about {lesson.minutes} minutes; its run is {lesson.run.name}."
@@ -25,7 +23,6 @@ def handout(opened: Opened) -> Report:
         Section("What you saw", tuple(_texts(opened))),
         Section("Models left after each test", (steps, say("What is left: ", opened.text("{kept}", end), "."))),
         Section("Questions and answers", tuple(_questions(opened))),
-        *_searches(opened),
         Section("What is often mixed up", (Table(("belief", "what is right"), beliefs),)),
     )
     figures = tuple((opened.text(f"{{{name}}}", end), words) for name, words in FIGURES)
@@ -45,24 +42,6 @@ def _texts(opened: Opened) -> Iterator[Block]:
 
 def _part(words: str, style: str) -> Part:
     return Strong(words) if style == "strong" else Name(words) if style == "code" else words
-
-
-def _searches(opened: Opened) -> Iterator[Section]:
-    """What students did themselves, with the tests that the algorithms need for it."""
-    if opened.oracle is None or not any(step.budget or step.race for step in opened.lesson.steps):
-        return
-    found: list[Block] = [
-        say(f"You had {step.budget} tests to find a set of models of which no single one can be left out.")
-        for step in opened.lesson.steps
-        if step.budget
-    ]
-    rows = tuple(
-        (line.name, str(line.tests), "" if line.left is None else ", ".join(line.left))
-        for line in comparison(opened.oracle, tuple(opened.plays.values()), None)
-    )
-    found += [Table(("search", "tests", "models left"), rows), say(BOUND)]
-    found += [say(" ".join(result(opened.racers(step)))) for step in opened.lesson.steps if step.race]
-    yield Section("Searches side by side", tuple(found))
 
 
 def _questions(opened: Opened) -> Iterator[Block]:

@@ -33,7 +33,6 @@ class Question:
 
     @property
     def right(self) -> int:
-        """The place of the right answer."""
         return next(place for place, answer in enumerate(self.answers) if answer.right)
 
 
@@ -95,7 +94,6 @@ class Block:
 
 
 def blocks(text: str) -> tuple[Block, ...]:
-    """The paragraphs and entries of a text."""
     found: list[tuple[bool, list[str]]] = []
     fresh = True
     for line in text.splitlines():

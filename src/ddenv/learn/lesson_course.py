@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -19,7 +19,6 @@ FREE = (
     "Step through the run: forward, back, to the next decision, to the next reduction. The marked line of the algorithm acts; "
     "the variables have the values of this moment. Press `p` to predict what comes next."
 )
-LATER = "The race to come shows how the algorithms do."
 # Without f, which is the failure, and h, the key of the hint.
 LETTERS = "abcdegi"
 DUE = {
@@ -103,7 +102,6 @@ class Course:
 
     @property
     def page(self) -> Page:
-        """What is shown beside the run."""
         text, after, asked = blocks(self._text()), blocks(self._after()), self._asked
         if asked is None:
             return Page(text, after=after)
@@ -115,15 +113,8 @@ class Course:
         if self.step == self.last:
             # A search is no question: it counts only where it succeeds.
             alone = sum(bool(step.budget) and str(n) not in self.score.answered for n, step in enumerate(self._steps))
-            return "\n\n".join((*summary(self._opened.asked - alone, self.score), *self._searches()))
+            return "\n\n".join(summary(self._opened.asked - alone, self.score))
         return self._said(self._opened.lesson.steps[self.step].text)
-
-    def _searches(self) -> Iterator[str]:
-        """What came of the student's own searches, in sentences."""
-        for number in range(self.last):
-            attempt = self._attempt(number)
-            if attempt is not None and attempt.ended:
-                yield f"Your own search: {in_one_sentence(attempt.oracle, self.plays, attempt)}"
 
     def _after(self) -> str:
         here, activity = self.here, self.activity
@@ -136,12 +127,10 @@ class Course:
         attempt = self.attempt
         if attempt is None or not attempt.ended:
             return "Your search is not finished: `t` goes on with it."
-        later = "" if self.plays or not self._opened.plays else f" {LATER}"
-        return f"**{attempt.verdict}**\n\n{in_one_sentence(attempt.oracle, self.plays, attempt)}{later}"
+        return f"**{attempt.verdict}**\n\n{in_one_sentence(attempt.oracle, self.plays, attempt)}"
 
     @property
     def is_open(self) -> bool:
-        """Whether a question waits for its answer."""
         return self._asked is not None and self._asked.chosen is None
 
     def _said(self, words: str) -> str:
@@ -187,7 +176,6 @@ class Course:
         return True
 
     def _return(self) -> None:
-        """From a prediction back to the step, as it was."""
         assert self._own is not None
         (self._asked, at), self._own = self._own, None
         self.position.go(at)
@@ -251,18 +239,15 @@ class Course:
 
     @property
     def activity(self) -> Activity | None:
-        """What there is to do in this step."""
         here = self.here
         return None if here is None else "race" if here.race else "try" if here.budget else None
 
     @property
     def attempt(self) -> Attempt | None:
         """The student's own search in this step, where it was left."""
-        return None if self.here is None else self._attempt(self.step)
-
-    def _attempt(self, number: int) -> Attempt | None:
-        moves = self.score.moves.get(str(number), ())
-        return None if self._opened is None else self._opened.attempt(self._steps[number], moves)
+        if self.here is None or self._opened is None:
+            return None
+        return self._opened.attempt(self.here, self.score.moves.get(str(self.step), ()))
 
     @property
     def plays(self) -> tuple[Play, ...]:
@@ -282,7 +267,6 @@ class Course:
             self.due = False
 
     def watched(self) -> None:
-        """After a race."""
         self.due = False
 
     # Moves in the run.
@@ -313,7 +297,7 @@ class Course:
             if found is not None:
                 self.position.go(id)
                 # What was explained a moment ago is not asked again.
-                shown = found.told if found.kind in self._explained else found
+                shown = replace(found, reason=None) if found.kind in self._explained else found
                 self._explained |= {found.kind}
                 self._asked = Asked(f"free.{id}", shown.question, shown.until, shown.reason)
                 if self._opened is not None:

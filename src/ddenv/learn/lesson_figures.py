@@ -103,7 +103,6 @@ def _first_slice(state: RunState) -> Node | None:
 
 
 def _sliced(state: RunState) -> int:
-    """How many models the first slice left."""
     node = _first_slice(state)
     return len(state.elements if node is None else node.environment)
 
@@ -120,19 +119,15 @@ OF_RUN: dict[str, Callable[[RunState], object]] = {
     "smaller": _left_percent,
     "kept": lambda state: first_of(list(state.environment), _NAMED),
     "tests": lambda state: state.tests_done,
-    "baseline_tests": lambda state: sum(test.phase == "baseline" for test in state.tests),
     "search_tests": _search_tests,
     "fresh_tests": lambda state: sum(test.phase == "certify" for test in state.tests),
     "reruns": lambda state: state.deflake_runs,
     "rounds": lambda state: state.rounds_done,
-    "reductions": lambda state: sum(node.how == "reduced" for node in state.nodes),
     "failed_runs": lambda state: 0 if state.baseline is None else state.baseline.failures,
     "baseline_runs": lambda state: 0 if state.baseline is None else state.baseline.runs,
     "iterations": lambda state: settings(state).iterations,
-    "timeout": lambda state: f"{settings(state).timeout:g} s",
     "epsilon": lambda state: f"{settings(state).epsilon:g} m",
     "failure": lambda state: deed(state.failure),
-    "pair": lambda state: settings(state).pair,
     "runs_each": lambda state: 1 + settings(state).iterations,
     "rate": lambda state: _of_baseline(state, "rate"),
     "rate_low": lambda state: _of_baseline(state, "low"),
@@ -149,8 +144,6 @@ OF_RUN: dict[str, Callable[[RunState], object]] = {
     "reason": lambda state: f"{state.reason[:1].upper()}{state.reason[1:]}",
     "sliced": _sliced,
     "slice": _slice,
-    "implied": lambda state: state.implied,
-    "audits": lambda state: state.audits,
     "audit": lambda state: settings(state).audit,
     "subsets": lambda state: f"{2 ** len(state.elements):,}" if len(state.elements) < 30 else "countless",
 }
@@ -187,7 +180,6 @@ _OF_SET = re.compile(r"(rate|chance) of (\S.*)")
 
 
 def names() -> tuple[str, ...]:
-    """All names that a text may have between braces."""
     return (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
 
 
@@ -259,7 +251,6 @@ class Figures:
 
 
 def _claim(state: RunState, model: str) -> Claim:
-    """The last certificate's claim about a model."""
     certificate = _certificate(state)
     found = next((each for each in certificate.claims if each.without == model), None) if certificate else None
     if found is None:

@@ -61,7 +61,6 @@ class Play:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """What is left at the end."""
         return self.after(self.tests)
 
     def after(self, tests: int) -> tuple[str, ...]:
@@ -219,10 +218,10 @@ def result(plays: Sequence[Play]) -> tuple[str, ...]:
         return (*said, "So there is no winner.")
     first, last = ended[0], ended[-1]
     if first.tests == last.tests:
-        return (*said, f"All needed {count(first.tests, 'test')}.", *_ends(ended))
+        return (*said, f"All needed {count(first.tests, 'test')}.")
     best = _and([play.name for play in ended if play.tests == first.tests])
     said.append(f"{best} needed the fewest tests: {first.tests}. {last.name} needed the most: {last.tests}.")
-    return (*said, why(first, last), *_ends(ended))
+    return (*said, why(first, last))
 
 
 def why(first: Play, last: Play) -> str:
@@ -240,25 +239,11 @@ def _in_steps(play: Play) -> str:
     return f"{count(len(sizes), 'reduction')} of {', '.join(map(str, sizes)) or 'no'} models"
 
 
-def _ends(plays: Sequence[Play]) -> tuple[str, ...]:
-    """What is left, where that differs."""
-    if len({frozenset(play.left) for play in plays}) == 1:
-        return ()
-    sizes: dict[int, list[str]] = {}
-    for play in plays:
-        sizes.setdefault(len(play.left), []).append(play.name)
-    if len(sizes) == 1:
-        return (f"They ended with as many models, {next(iter(sizes))}, but not with the same ones.",)
-    said = "; ".join(f"{_and(names)} with {count(size, 'model')}" for size, names in sorted(sizes.items()))
-    return (f"Their ends differ: {said}.",)
-
-
 def _and(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
 
 
 def bet(plays: Sequence[Play]) -> Question:
-    """Asks before a race who will need the fewest tests."""
     fewest = min(play.tests for play in plays)
     best = [play.name for play in plays if play.tests == fewest]
     tie = len(best) > 1
@@ -303,14 +288,9 @@ def bound(models: int, needed: int) -> int:
 
 
 def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> str:
-    """How the student's search compares."""
     tests, held = count(len(attempt.tried), "test"), count(len(attempt.held), "model")
     done = sorted((play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests)
     others = first_of([f"{play.name} {play.tests}" for play in done], NAMED)
-    sizes = {len(play.left) for play in done}
-    if sizes - {len(attempt.held)}:
-        low, high = min(sizes), max(sizes)
-        others += f", for {count(high, 'model')}" if low == high else f", for {low} to {high} models"
     if not attempt.found:
         behind = f" The algorithms went on until none could: {others}." if others else ""
         return f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"

@@ -126,7 +126,6 @@ class _Node:
         return [_Node(self.file, each, f"{self.key}[{place}]") for place, each in enumerate(self.node.value, 1)]
 
     def named(self) -> list[tuple[str, _Node]]:
-        """The entries of a mapping with names of the user's own."""
         if not isinstance(self.node, yaml.MappingNode):
             raise self.wrong("expected names, each with a file")
         return [(str(key.value), _Node(self.file, value, f"{self.key}.{key.value}")) for key, value in self.node.value]
@@ -137,7 +136,6 @@ class _Node:
         return str(self.node.value)
 
     def words(self) -> str:
-        """A text for readers."""
         text = self.raw()
         self.tried(lambda: lesson_figures.check(text))
         return text

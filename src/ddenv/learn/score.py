@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer
 
@@ -20,17 +22,16 @@ class Score:
     `moves` are those of the student's own searches, by their steps.
     """
 
-    step: int = 0
+    step: Annotated[int, Field(ge=0)] = 0
     done: bool = False
     answered: Mapping[str, bool] = field(default_factory=dict)
     streak: int = 0
     best: int = 0
     misconceptions: Mapping[str, int] = field(default_factory=dict)
-    moves: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    moves: Mapping[str, Annotated[tuple[str, ...], Field(max_length=MOST_MOVES)]] = field(default_factory=dict)
 
     @property
     def right(self) -> int:
-        """How many answers were right."""
         return sum(self.answered.values())
 
     def with_answer(self, key: str, answer: Answer) -> Score:
@@ -47,18 +48,15 @@ class Score:
         return replace(self, step=step, done=self.done or step >= last)
 
 
+_SCORE = TypeAdapter(Score)
+
+
 def score_of(data: Any) -> Score:
     """What was kept; an empty score for anything else."""
-    if not isinstance(data, dict):
-        return Score()
     try:
-        answered = {str(key)[:40]: value is True for key, value in dict(data["answered"]).items()}
-        beliefs = {key: int(number) for key, number in dict(data["misconceptions"]).items() if key in MISCONCEPTIONS}
-        moves = {str(key)[:40]: tuple(map(str, list(each)[:MOST_MOVES])) for key, each in data.get("moves", {}).items()}
-        step, streak, best = (max(0, int(data[key])) for key in ("step", "streak", "best"))
-    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
+        return _SCORE.validate_python(data)
+    except ValidationError:
         return Score()
-    return Score(step, data.get("done") is True, answered, streak, best, beliefs, moves)
 
 
 def summary(asked: int, score: Score) -> list[str]:
@@ -72,7 +70,7 @@ def summary(asked: int, score: Score) -> list[str]:
     if not score.misconceptions and score.answered:
         lines.append("No typical misconception was seen.")
     for name, number in sorted(score.misconceptions.items(), key=lambda item: -item[1]):
-        belief, instead = MISCONCEPTIONS[name]
+        belief, instead = MISCONCEPTIONS.get(name, (name, ""))
         which = "One of your answers is" if number == 1 else f"{number} of your answers are"
         lines.append(f"{which} typical of somebody who {belief}. {instead}")
     return lines

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from string import Template
@@ -55,7 +55,6 @@ class Opened:
         return None if step.budget is None or self.oracle is None else Attempt(self.oracle, step.budget, moves)
 
     def racers(self, step: Step) -> tuple[Play, ...]:
-        """The searches that race in a step."""
         return tuple(self.plays[name] for name in step.race)
 
     def text(self, words: str, at: int) -> str:
@@ -65,12 +64,12 @@ class Opened:
 
     @cached_property
     def foretold(self) -> tuple[Foretelling | None, ...]:
-        """What each step asks to foretell. A reason is asked for once; where it is the same again, it is told."""
+        """What each step asks to foretell. The same reason is asked for once."""
         found: list[Foretelling | None] = []
         kinds = {""}
         for step, at in zip(self.lesson.steps, self.places, strict=True):
             each = None if step.foretell is None else foretelling(self.position, at, step.foretell)
-            found.append(each.told if each is not None and each.kind in kinds else each)
+            found.append(replace(each, reason=None) if each is not None and each.kind in kinds else each)
             kinds |= {"" if each is None else each.kind}
         return tuple(found)
 
@@ -83,7 +82,6 @@ class Opened:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """The event that each step shows."""
         found, at = [], self.position.ids[0]
         for step in self.lesson.steps:
             at = step.at or at

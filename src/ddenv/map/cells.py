@@ -16,10 +16,8 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
 
 Cell = tuple[int, int]
-# With fewer cells than `ROOM` per letter, one letter is kept in each `BLOCK` (rows, columns), and one of each group unless that
-# leaves fewer than `LEAST_ROOM` cells per letter.
-ROOM, LEAST_ROOM = 20, 4
-BLOCK = 3, 8
+# Cells for each letter, so that the map stays readable.
+ROOM = 20
 # One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN, FLOORS, FAINT_SIGN = "+", ".:", "░"
@@ -54,15 +52,10 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
     seen = np.flatnonzero((cells[:, 0] >= 0) & named)
     sizes = np.bincount(grid[grid >= 0], minlength=len(centers))
     seen = seen[np.lexsort((-sizes[seen], signs.rank[seen], ~signs.sure[seen]))]
-    if len(seen) * ROOM > rows * columns:
-        # The sure ones, and the first of each block.
-        blocks: np.ndarray = cells[seen] // BLOCK
-        kept: np.ndarray = signs.sure[seen].copy()
-        kept[np.unique(blocks[:, 0] << 20 | blocks[:, 1], return_index=True)[1]] = True
-        _, first = np.unique(signs.groups[seen], return_index=True)
-        if sum(len(signs.texts[index]) for index in seen[first].tolist()) * LEAST_ROOM <= rows * columns:
-            kept[first] = True
-        seen = seen[kept]
+    # The sure ones, the first of each group, and as many more as stay readable.
+    kept: np.ndarray = signs.sure[seen] | (np.arange(len(seen)) < rows * columns // ROOM)
+    kept[np.unique(signs.groups[seen], return_index=True)[1]] = True
+    seen = seen[kept]
     occupied, placed = set(taken), dict[int, Cell]()
 
     def put(index: int, row: int, column: int) -> bool:
@@ -125,11 +118,10 @@ def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection
 
 
 def _fill(each: Drawn, index: int) -> int:
-    """Floors are greyish; low models are darker than high ones, and models drawn one after the other differ."""
+    """Floors are greyish, and models drawn one after the other differ."""
     if each.floor:
         return packed(_visible(blend(each.color, GREY, 0.6)))
-    dark = 0.15 * (1 - each.shade) + 0.14 * (index % 2)
-    return packed(_visible(blend(each.color, (0, 0, 0), dark)))
+    return packed(_visible(blend(each.color, (0, 0, 0), 0.14 * (index % 2))))
 
 
 def _visible(color: RGB) -> RGB:

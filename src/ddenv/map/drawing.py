@@ -6,7 +6,7 @@ They have no colours but classes: grid, origin, tick, frame, plate, label, badge
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 # Maximum distance outside the page, pixels: some viewers fail on large numbers.
 FAR = 1e5
 CROSS = 4.0  # half the size of the mark of a model without shapes, pixels
-# Of names: fonts, the preferred first, pixels; mean width and height of a letter, relative to the font size; space around, pixels.
-SIZES = (12.0, 10.5, 9.0)
+# Of names: the font, pixels; mean width and height of a letter, relative to the font size; space around, pixels.
+SIZE = 12.0
 WIDTH, HEIGHT = 0.58, 1.15
 GAP = 3.0
 LONGEST_LABEL = 26  # columns
@@ -86,7 +86,6 @@ class Frame:
         return pixels
 
     def pixel(self, point: Point) -> Point:
-        """A point (m) on the page, pixels."""
         x, y = self.pixels(np.array([point]))[0].tolist()
         return x, y
 
@@ -142,7 +141,6 @@ def _grid(value: float) -> str:
 
 
 def tick(x: float, y: float, anchor: str, words: str) -> str:
-    """A number or a name at an axis."""
     return f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{words}</text>'
 
 
@@ -152,7 +150,6 @@ def at(point: Point, drawn: str) -> str:
 
 
 def badge(name: str, letter: str) -> str:
-    """The mark of the start or the goal, around (0, 0)."""
     return f'<circle class="badge {name}" r="10"/><text class="sign" y="4.5">{letter}</text>'
 
 
@@ -176,177 +173,85 @@ def written(text: str) -> str:
 
 
 def labels(
-    models: Sequence[Drawn], wanted: Iterable[int], most: int, frame: Frame, points: Sequence[Point], least: float = 0.0
+    models: Sequence[Drawn], wanted: Iterable[int], most: int, frame: Frame, points: Sequence[Point], size: float = SIZE
 ) -> Iterator[str]:
-    """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m.
-
-    Letters have at least the size `least`, pixels, even if a smaller one fits better.
-    """
+    """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m."""
     largest = sorted(wanted, key=lambda index: -models[index].outline.area)[:most]
-    names = [shortened(each.model.name, LONGEST_LABEL) for each in models]
+    names = {index: shortened(models[index].model.name, LONGEST_LABEL) for index in largest}
+    boxes = np.array([_box(each, frame) for each in models]).reshape(-1, 4)
+    floors = np.array([each.floor for each in models], dtype=bool)
     marks = [np.array([x - MARK, y - MARK, x + MARK, y + MARK]) for x, y in map(frame.pixel, points)]
-    placed = place_labels(names, [_spot(each, frame) for each in models], largest, frame.box, marks)
-    return (_plate(label, max(least, label.size)) for label in placed.values())
+    for index, box in place_labels(names, boxes, floors, frame.box, marks, size).items():
+        yield _plate(names[index], box, size)
 
 
-def _spot(each: Drawn, frame: Frame) -> Spot:
-    if each.outline.polygons:
-        return spot(frame.pixels(convex_hull(np.vstack(each.outline.polygons))), frame.box, each.floor)
-    around = CROSS * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    return spot(frame.pixels(np.array([each.outline.center])) + around, frame.box, False)
+def _box(each: Drawn, frame: Frame) -> np.ndarray:
+    """Left, top, right and bottom of a model on the page, as far as it is on the map."""
+    left, top, right, bottom = frame.box
+    corners = frame.pixels(np.array([each.outline.low, each.outline.high]))
+    around = 0.0 if each.outline.polygons else CROSS
+    low = np.clip(corners.min(axis=0) - around, (left, top), (right, bottom))
+    return np.concatenate([low, np.clip(corners.max(axis=0) + around, (left, top), (right, bottom))])
 
 
-def _plate(label: Label, size: float) -> str:
+def _plate(name: str, box: np.ndarray, size: float) -> str:
     """A name on its own background, so that outlines and neighbours do not make it hard to read."""
-    long, high = 1.04 * label.length * size / label.size + 4, HEIGHT * size
-    turn = f" rotate({label.angle:.1f})" if abs(label.angle) > 0.05 else ""
+    x, y = (box[:2] + box[2:]) / 2
+    long, high = box[2:] - box[:2]
     return (
-        f'<g transform="translate({label.x:.1f} {label.y:.1f}){turn}">'
+        f'<g transform="translate({x:.1f} {y:.1f})">'
         f'<rect class="plate" x="{-long / 2:.1f}" y="{-high / 2:.1f}" width="{long:.1f}" height="{high:.1f}" rx="2"/>'
-        f'<text class="label" y="{0.35 * size:.1f}" font-size="{size:g}">{written(label.text)}</text></g>'
+        f'<text class="label" y="{0.35 * size:.1f}" font-size="{size:g}">{written(name)}</text></g>'
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Spot:
-    """A drawn model: its `box` (left, top, right, bottom), and a rectangle inside it, `along` x `across`, turned by `angle`.
-
-    Angles are in degrees, clockwise. A `floor` has other models on it.
-    """
-
-    box: np.ndarray
-    along: float
-    across: float
-    angle: float
-    floor: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Label:
-    """`text` around the middle (x, y), turned by `angle` degrees, clockwise; `inside` the model or beside it."""
-
-    text: str
-    x: float
-    y: float
-    size: float
-    angle: float
-    inside: bool
-
-    @property
-    def length(self) -> float:
-        """The approximate length of the text."""
-        return width(self.text) * WIDTH * self.size
-
-    @property
-    def box(self) -> np.ndarray:
-        """Left, top, right and bottom."""
-        long, high = self.length, HEIGHT * self.size
-        cosine, sine = abs(math.cos(math.radians(self.angle))), abs(math.sin(math.radians(self.angle)))
-        across, down = (long * cosine + high * sine) / 2, (long * sine + high * cosine) / 2
-        return np.array([self.x - across, self.y - down, self.x + across, self.y + down])
-
-
-def spot(outline: np.ndarray, frame: np.ndarray, floor: bool) -> Spot:
-    """The spot of a convex outline (N, 2), cut to `frame`."""
-    box = np.clip(
-        np.concatenate([outline.min(axis=0), outline.max(axis=0)]), np.tile(frame[:2], 2), np.tile(frame[2:], 2)
-    )
-    sides = np.roll(outline, -1, axis=0) - outline
-    lengths = np.linalg.norm(sides, axis=1)
-    dx, dy = sides[lengths.argmax()]
-    # Names on round models are horizontal.
-    angle = math.atan2(dy, dx) if lengths.max() > 0.4 * np.ptp(outline, axis=0).max() else 0.0
-    angle = _upright(math.degrees(angle))
-    if floor:
-        along, across = (box[2:] - box[:2]).tolist()
-        return Spot(box, along, across, 0.0, floor)
-    turn = math.radians(angle)
-    along = float(np.ptp(outline @ (math.cos(turn), math.sin(turn))))
-    return Spot(box, along, float(np.ptp(outline @ (-math.sin(turn), math.cos(turn)))), angle, floor)
-
-
-def _upright(angle: float) -> float:
-    """The same line in -95 .. 85 degrees, so that no text is upside down and vertical text reads upwards."""
-    return (angle + 95) % 180 - 95
 
 
 def place_labels(
-    names: Sequence[str],
-    spots: Sequence[Spot],
-    wanted: Sequence[int],
+    names: Mapping[int, str],
+    boxes: np.ndarray,
+    floors: np.ndarray,
     frame: np.ndarray,
     taken: Sequence[np.ndarray] = (),
-) -> dict[int, Label]:
-    """Labels for those of the `wanted` models that have room for one, placed in that order.
+    size: float = SIZE,
+) -> dict[int, np.ndarray]:
+    """The boxes of those names, by the numbers of their models, that have room for one, placed in that order.
 
-    `spots` are all models in the order of drawing, `frame` is left, top, right and bottom of the drawing; no label covers
-    the `taken` boxes.
+    `boxes` (N, 4) are of all models, `floors` (N,) have other models on them. All boxes are left, top, right and bottom, pixels, as
+    is the `frame` of the drawing. No label covers the `taken` ones.
     """
-    occupied = list(taken)
-    boxes = np.array([each.box for each in spots]).reshape(-1, 4)
+    occupied, placed = list(taken), dict[int, np.ndarray]()
     areas = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
-    solid = np.array([not each.floor for each in spots], dtype=bool)
-    placed = {}
-    for index in wanted:
-        others = solid.copy()
+    for index, name in names.items():
+        long, high = width(name) * WIDTH * size + 2 * GAP, HEIGHT * size + GAP
+        # Large models may carry the names of others.
+        others = ~floors & (areas < LARGE * long * high)
         others[index] = False
-        # Models drawn earlier lie below.
-        above = others & (np.arange(len(boxes)) > index)
-        small = areas < LARGE * width(names[index]) * WIDTH * HEIGHT * SIZES[-1] ** 2
-        label = _best(_candidates(names[index], spots[index]), boxes[above], boxes[others & small], frame, occupied)
-        if label is not None:
-            placed[index] = label
-            occupied.append(label.box)
+        for box in _places(boxes[index], long, high, bool(floors[index])):
+            outside = (box[:2] < frame[:2]).any() or (box[2:] > frame[2:]).any()
+            if outside or _shared(box, np.array(occupied).reshape(-1, 4)).any():
+                continue
+            if _shared(box, boxes[others]).sum() <= MOST_COVERED * long * high:
+                placed[index] = box
+                occupied.append(box)
+                break
     return placed
 
 
-def _best(
-    candidates: Iterable[Label],
-    above: np.ndarray,
-    others: np.ndarray,
-    frame: np.ndarray,
-    occupied: Sequence[np.ndarray],
-) -> Label | None:
-    """The first label that covers nothing, else the one that covers least; None if all cover too much."""
-    best, least = None, MOST_COVERED
-    for label in candidates:
-        own = label.box
-        outside = (own[:2] < frame[:2]).any() or (own[2:] > frame[2:]).any()
-        if outside or (occupied and _shared(own, np.array(occupied)).any()):
-            continue
-        covered = _shared(own, above if label.inside else others).sum() / np.prod(own[2:] - own[:2])
-        if covered < least:
-            best, least = label, covered
-        if covered == 0:
-            break
-    return best
-
-
-def _candidates(name: str, spot: Spot) -> Iterator[Label]:
-    left, top, right, bottom = spot.box
+def _places(box: np.ndarray, long: float, high: float, floor: bool) -> Iterator[np.ndarray]:
+    """Where a name of this size may stand: in the middle of its model or in the corners of a floor, else beside it."""
+    left, top, right, bottom = box.tolist()
     x, y = (left + right) / 2, (top + bottom) / 2
-    for size in SIZES:
-        long, high = width(name) * WIDTH * size + 2 * GAP, HEIGHT * size + 2 * GAP
-        if spot.floor and long <= spot.along and high <= spot.across:
-            for corner_y in (top + high / 2, bottom - high / 2):
-                for corner_x in (left + long / 2, right - long / 2, x):
-                    yield Label(name, corner_x, corner_y, size, 0.0, True)
-        fits = [(spot.angle, spot.along, spot.across), (_upright(spot.angle + 90), spot.across, spot.along)]
-        for angle, room, rest in sorted(fits, key=lambda fit: abs(fit[0]) > 45):
-            if long <= room and high <= rest:
-                yield Label(name, x, y, size, angle, True)
-    for size in SIZES:
-        long, high = width(name) * WIDTH * size, HEIGHT * size
-        for side in (right + GAP + long / 2, left - GAP - long / 2):
-            yield Label(name, side, y, size, 0.0, False)
-        for end in (top - GAP - high / 2, bottom + GAP + high / 2):
-            yield Label(name, x, end, size, 0.0, False)
+    middles = [(right + long / 2, y), (left - long / 2, y), (x, top - high / 2), (x, bottom + high / 2)]
+    if long <= right - left and high <= bottom - top:
+        corners = [
+            (side, end) for end in (top + high / 2, bottom - high / 2) for side in (left + long / 2, right - long / 2)
+        ]
+        middles = [*(corners if floor else ()), (x, y), *middles]
+    for middle_x, middle_y in middles:
+        yield np.array([middle_x - long / 2, middle_y - high / 2, middle_x + long / 2, middle_y + high / 2])
 
 
 def _shared(box: np.ndarray, others: np.ndarray) -> np.ndarray:
     """The areas of overlap of a box with each of `others` (N, 4)."""
-    if not len(others):
-        return np.zeros(1)
     sides = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
     areas: np.ndarray = np.prod(np.maximum(sides, 0.0), axis=1)
     return areas

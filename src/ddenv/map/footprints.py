@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
 
 from ddenv.map.colors import RGB
-from ddenv.world.extent import convex_hull, model_bounds, shape_bounds
+from ddenv.world.extent import convex_hull, model_bounds
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -132,9 +131,9 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A model to draw from above. `center` and `size` are of the box around it, m; `shade` is 0 for low, 1 for high models.
+    """A model to draw from above. `center` and `size` are of the box around it, m.
 
-    `color` covers most of it, or is the default of its kind if the file has none.
+    `color` is that of its first visual, or the default of its kind if the file has none.
     """
 
     model: Model
@@ -143,7 +142,6 @@ class Drawn:
     size: Vector
     color: RGB
     floor: bool
-    shade: float
 
     @property
     def top(self) -> float:
@@ -159,13 +157,11 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     models = [model for model in world.models if not is_ground(model)]
     outlines = [footprint(model, corners) for model in models]
     boxes = [_box(model) for model in models]
-    tops = np.array([center[2] + size[2] / 2 for center, size in boxes])
     limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
     floors = [len(models) > 2 and each.area > limit for each in outlines]
-    shades = _shades(tops, np.array(floors, dtype=bool))
     drawn = [
-        Drawn(model, outline, *box, _color(model), floor, shade)
-        for model, outline, box, floor, shade in zip(models, outlines, boxes, floors, shades, strict=True)
+        Drawn(model, outline, *box, _color(model), floor)
+        for model, outline, box, floor in zip(models, outlines, boxes, floors, strict=True)
     ]
     return tuple(sorted(drawn, key=_turn))
 
@@ -185,24 +181,9 @@ def _box(model: Model) -> tuple[Vector, Vector]:
     return vector((low + high) / 2), vector(high - low)
 
 
-def _shades(tops: np.ndarray, floors: np.ndarray) -> list[float]:
-    """Heights on a scale from the lowest (0) to the highest (1) model other than floors; 1 for all if these are equal."""
-    others = tops[~floors]
-    if not len(others) or np.ptp(others) < 0.01:
-        return [1.0] * len(tops)
-    shades: list[float] = np.clip((tops - others.min()) / np.ptp(others), 0.0, 1.0).tolist()
-    return shades
-
-
 def _color(model: Model) -> RGB:
-    areas: dict[RGB, float] = defaultdict(float)
-    for link in model.links:
-        for visual in link.visuals:
-            if visual.color is None or visual.color[3] <= 0 or isinstance(visual.shape, Plane):
-                continue
-            low, high = shape_bounds(visual.shape, visual.pose)
+    for visual in (visual for link in model.links for visual in link.visuals):
+        if visual.color is not None and visual.color[3] > 0 and not isinstance(visual.shape, Plane):
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
-            areas[red, green, blue] += float(np.prod((high - low)[:2]))
-    if areas:
-        return max(areas, key=lambda color: areas[color])
+            return red, green, blue
     return STATIC if model.static else DYNAMIC

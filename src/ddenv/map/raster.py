@@ -172,12 +172,10 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
 
 
 def masks(prints: Sequence[Footprint], view: View) -> Spans:
-    """The pixels of each model, in a grid of (2 rows, columns)."""
     return spans(pack(prints), view)
 
 
 def spans(outlines: Outlines, view: View) -> Spans:
-    """The pixels of each model of packed outlines."""
     width, height = view.columns, 2 * view.rows
     polygon, row, left, right = rows_of(outlines, view)
     # A model smaller than a pixel stays visible.
@@ -312,5 +310,4 @@ def _dense(dots: np.ndarray) -> np.ndarray:
 
 
 def arrow(yaw: float, signs: str = ARROWS) -> str:
-    """The arrow nearest to a heading, rad, 0 along x."""
     return signs[round(yaw / (math.pi / 4)) % 8]

@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 
 from ddenv.map.colors import RGB, blend, packed
-from ddenv.map.drawing import Frame, Point, at, badge, labels, path_of, plot, tick, tick_step, tick_text, written
+from ddenv.map.drawing import Frame, Point, at, badge, labels, path_of, plot, tick, written
 from ddenv.map.footprints import Drawn, plan
 from ddenv.text import count, shortened
-from ddenv.world.model import World, is_ground
+from ddenv.world.model import World
 
 # Maximum width and height and minimum width of the map, and its margins, pixels.
 WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0
-LEFT, TOP, RIGHT, BOTTOM = 64.0, 72.0, 28.0, 92.0
+LEFT, TOP, RIGHT, BOTTOM = 64.0, 72.0, 28.0, 52.0
 CORNERS = 48  # of the polygon that stands for a circle
 LEAST = 4.0  # minimum extent of the world along each axis, m: a single crate must not fill the page
 MOST_LABELS = 60
@@ -36,8 +36,6 @@ svg { font: 12px Inter, "Segoe UI", Helvetica, Arial, "DejaVu Sans", sans-serif;
 .start { fill: #1f6feb; }
 .goal { fill: #1a7f37; }
 .sign { fill: #ffffff; font-weight: 700; text-anchor: middle; }
-.scale { fill: none; stroke: #24292f; stroke-width: 1.5; }
-.kind { fill: #f3f4f6; stroke: #6e7781; }
 """
 
 
@@ -62,20 +60,15 @@ def svg_map(world: World, *, spawn: tuple[float, float, float] | None = None, go
         '<rect width="100%" height="100%" fill="#ffffff"/>',
         *_head(world, models),
         *plot(frame, 16, "map", (_model(each, frame) for each in models), [*names, *_marks(frame, spawn, goal)]),
-        *_foot(frame, models),
         "</svg>",
     ]
     return "\n".join(lines) + "\n"
 
 
 def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
-    moving = sum(not each.model.static for each in models)
-    parts = [count(len(models), "model")]
-    parts += [f"{moving} dynamic"] if moving else []
-    parts += ["ground not drawn"] if any(map(is_ground, world.models)) else []
     name = written(shortened(world.path.name, 48))
     yield f'<text class="title" x="{LEFT:.0f}" y="34">{name}</text>'
-    yield tick(LEFT, 56, "start", " · ".join(parts))
+    yield tick(LEFT, 56, "start", f"{count(len(models), 'model')}, without the ground")
 
 
 def _model(each: Drawn, frame: Frame) -> str:
@@ -90,8 +83,7 @@ def _model(each: Drawn, frame: Frame) -> str:
 
 
 def _fill(each: Drawn) -> RGB:
-    """Floors are light, and low models are paler than high ones."""
-    return blend(WHITE, each.color, 0.2 if each.floor else 0.6 + 0.25 * each.shade)
+    return blend(WHITE, each.color, 0.2 if each.floor else 0.8)
 
 
 def _tooltip(each: Drawn) -> str:
@@ -112,19 +104,6 @@ def _marks(frame: Frame, spawn: tuple[float, float, float] | None, goal: Point |
     if goal is not None:
         title = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
         yield at(frame.pixel(goal), f"{title}{badge('goal', 'G')}")
-
-
-def _foot(frame: Frame, models: Sequence[Drawn]) -> Iterator[str]:
-    """The scale bar and the legend of outlines."""
-    left, _, right, bottom = frame.box
-    y = bottom + 68
-    step = tick_step(frame.high[0] - frame.low[0], 6)
-    start = right - step * frame.scale
-    yield f'<path class="scale" d="M{start:.1f} {y - 5:.1f}v5H{right:.1f}v-5"/>'
-    yield tick(start - 8, y + 1, "end", f"{tick_text(step, step)} m")
-    for x, word in () if all(each.model.static for each in models) else ((left, "static"), (left + 90, "dynamic")):
-        yield f'<rect class="kind {word}" x="{x:.1f}" y="{y - 10:.1f}" width="20" height="12"/>'
-        yield tick(x + 27, y, "start", word)
 
 
 def _hex(color: RGB) -> str:

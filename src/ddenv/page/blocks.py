@@ -88,12 +88,10 @@ class Report:
 
 
 def parts(cell: Cell) -> tuple[Part, ...]:
-    """The parts of a cell."""
     return cell if isinstance(cell, tuple) else (cell,)
 
 
 def say(*words: Part, notice: bool = False) -> Paragraph:
-    """A paragraph of these words."""
     return Paragraph(words, notice)
 
 

@@ -13,7 +13,6 @@ HERE = Path(__file__).parent
 
 
 def html(report: Report) -> str:
-    """The page."""
     style = "\n" + (HERE / "style.css").read_text() + (HERE / "page.css").read_text()
     lines = [
         "<!DOCTYPE html>",

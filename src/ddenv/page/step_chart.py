@@ -41,7 +41,6 @@ def chart(state: RunState) -> str:
 
 
 def opening(height: float) -> str:
-    """The beginning of a drawing."""
     return f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {height:.0f}">'
 
 

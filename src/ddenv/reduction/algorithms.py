@@ -6,7 +6,7 @@ An algorithm yields a `Round` and is sent the first similar candidate, or None. 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import takewhile
 
@@ -259,6 +259,23 @@ def sweep(environment: Partition, runs: int | None = None) -> Search:
         else:
             looks += 1
     return Environment.of(environment)
+
+
+def tried_again(environment: Partition, groups: Sequence[Partition], search: Callable[[Partition], Search]) -> Search:
+    """Leaves out each group, or halves of it where that fails; then searches what is left. For a search that stepped back."""
+    waiting = list(reversed(groups))
+    while waiting:
+        inside = frozenset(environment)
+        group = tuple(model for model in waiting.pop() if model in inside)
+        if not group or len(group) == len(environment):
+            continue
+        winner = yield left_out(group, environment)
+        if winner is not None:
+            gone = frozenset(group)
+            environment = tuple(model for model in environment if model not in gone)
+        elif len(group) > 1:
+            waiting += [group[len(group) // 2 :], group[: len(group) // 2]]
+    return (yield from search(environment))
 
 
 def _far_to_near(elements: Partition, guide: Guide) -> Partition:

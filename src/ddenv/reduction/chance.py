@@ -1,7 +1,5 @@
-"""How likely each model is needed: before any test, and after tests.
-
-Models are assumed to be needed independently of each other, and f to show whenever all needed models are there ("Probabilistic
-Delta Debugging", Wang et al. 2021).
+"""How likely each model is needed, before any test and after tests: independently of each other, and f shows whenever all needed
+models are there ("Probabilistic Delta Debugging", Wang et al. 2021).
 """
 
 from __future__ import annotations
@@ -33,10 +31,8 @@ def sigmoid(logits: Floats) -> Floats:
 
 
 def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
-    """A probability that falls with the rank of a model's distance to the failure, as 1 / rank; shape (len(environment),).
-
-    It has no scale: the nearest three models are as likely to include a needed one as the nearest three to nine. Raises
-    evidence.Lacking.
+    """A probability that falls with the rank of a model's distance to the failure, as 1 / rank; shape (len(environment),). It has
+    no scale. Raises evidence.Lacking.
     """
     ranks = np.argsort(np.argsort(distances_to_failure(environment, evidence), kind="stable"), kind="stable")
     return np.asarray(np.clip(DENSITY / (1.0 + ranks), LEAST, MOST))
@@ -72,9 +68,8 @@ def beliefs(prior: Floats, groups: Booleans, miss_chance: float = 0.0) -> Floats
 
 
 def undominated(groups: Booleans) -> Integers:
-    """The rows (K,) of `groups` (T, M) that are no supersets of another row: a larger group adds no information.
-
-    Of equal rows the first one is kept. Empty rows are dropped.
+    """The rows (K,) of `groups` (T, M) that are not empty and no supersets of another row, which says more; of equal ones the
+    first.
     """
     _, firsts = np.unique(groups, axis=0, return_index=True)
     rows = np.sort(firsts[groups[firsts].any(axis=1)])

@@ -47,11 +47,10 @@ class Trial:
 class Evidence:
     """What is known about the world, about the last similar run in the current environment, and from all tests so far.
 
-    `elements` are in the order of the world file. `positions` maps a model to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z
-    (m), yaw (rad) of that run. `failure_position` is where f ended, x, y, z (m). `first_sensed` maps a model to the time (s) when
-    that run first sensed it; `touched` are the models that it touched. `miss_chance` is the probability that a candidate shows f in
-    none of its tests although everything that f needs is there. `delta` is in rad/s. `seed` makes clustering and random orders
-    repeatable. A field that is None is unknown; `need` raises for it.
+    `elements` are in the order of the world file. `positions` maps a model to x, y, z (m). `trajectory` (N, 5) is time (s), x,
+    y, z (m), yaw (rad) of that run; `failure_position` where f ended, x, y, z (m). `first_sensed` maps a model to the time (s)
+    when that run first sensed it. `miss_chance` is the probability that a candidate shows f in none of its tests although all
+    that f needs is there. `delta` is in rad/s. A field that is None is unknown; `need` raises for it.
     """
 
     elements: Names
@@ -88,8 +87,7 @@ class Evidence:
 
     def nearest(self, models: Names) -> Floats:
         """For each of `models`, how near the robot's path comes to it (m) and when (s): shape (len(models), 2). Raises Lacking.
-
-        Computed once for the whole world: rounds ask for it again and again.
+        Computed once for the whole world.
         """
         if not self._nearest:
             times = self.need("trajectory")[:, 0]
@@ -109,7 +107,7 @@ BLOCK = 256
 def nearest_on_path(places: Floats, times: Floats, path: Floats) -> tuple[Floats, Floats]:
     """The distance (m) of each of `places` (M, 3) from the path (N, 3), and when (s) the robot was at the nearest point: two (M,).
 
-    The path is the segments between its points, which were reached at `times` (N,). Of several nearest points the first counts.
+    The path is the segments between its points, reached at `times` (N,). Of several nearest points the first counts.
     """
     if len(path) == 1:
         path, times = np.repeat(path, 2, axis=0), np.repeat(times, 2)

@@ -32,12 +32,11 @@ _ARGUMENTS = {"trajectory": "a trajectory", "failure_position": "a failure_pose"
 class Guide:
     """What an algorithm asks while it searches. Models are numbers, in the order of the world file.
 
-    `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, of which the lowest is tried first.
-    `chances(environment)` is the probability that each model is needed, shape (len(environment),), before any test.
-    `n_partitions` is the granularity at the start of ddenv; `candidates` and `complement_order` are those of `make_round`,
-    `growth` ("paper" or "steady") and `skip` ("known" or "implied") those of ddenv. `rate()` is the rate at which f shows in a
+    `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, the lowest is tried first;
+    `chances(environment)` the probability that each model is needed, shape (len(environment),), before any test. `n_partitions`,
+    `candidates`, `complement_order`, `growth` and `skip` are those of the settings. `rate()` is the rate at which f shows in a
     single run where all that it needs is there, `runs()` how many runs a candidate has if none shows f, `broke(candidate)`
-    whether its tests say nothing about f. `proves` is whether the search has to show by itself that its end is minimal.
+    whether its tests say nothing about f. `proves`: the search has to show by itself that its end is minimal.
     """
 
     split: Split
@@ -64,24 +63,11 @@ def make_guide(
 ) -> Guide:
     """A guide for the schemas of these names, which look at what `evidence()` returns at that moment, and see models by name.
 
-    Raises UserError for unknown names; a schema that lacks evidence raises UserError when it is used. A schema that is a class is
-    instantiated for each guide: it may remember what it has seen. `prior` is "uniform", or "spatial" where positions and the place
-    of the failure are known. `more` are the other fields of `Guide`.
+    Raises UserError for unknown names; a schema that lacks evidence raises UserError when it is used. A schema that is a class
+    is instantiated for each guide. `prior` is "uniform", or "spatial" where that can be known. `more` are the other fields of
+    `Guide`.
     """
     split, rank = _made("partitioning", partitioning), _made("prioritization", prioritization)
-    return guide_of(split, rank, evidence, partitioning, prioritization, prior, **more)
-
-
-def guide_of(
-    split: Callable[..., Any],
-    rank: Callable[..., Any],
-    evidence: Callable[[], Evidence],
-    partitioning: str = "",
-    prioritization: str = "",
-    prior: str = "spatial",
-    **more: Any,
-) -> Guide:
-    """As `make_guide`, with schemas that are there; their names are for error messages."""
 
     def split_now(environment: Partition, n: int) -> list[Partition]:
         known = evidence()

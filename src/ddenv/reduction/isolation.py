@@ -1,11 +1,9 @@
-"""Isolation: the fewest models that have to go from the whole world so that the robot reaches its goal.
+"""Isolation: the fewest models that have to go from the whole world so that the robot reaches its goal. It makes a passing world
+larger, until putting any one model back makes the robot fail: the same search with another predicate, over what is removed.
 
-A reduction makes a failing world smaller. Isolation makes a passing world larger, until putting any one model back makes the robot
-fail: that is the nearest world that passes. It is the same search with another predicate, over what is removed.
-
-Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002, where `dd` moves both ends. Here the failing one
-stays the whole world, as in "Debugging Inputs" (Kirschner, Soremekun and Zeller, 2020): else what comes out would be the
-difference of two worlds that nobody has seen.
+Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002; but the failing end stays the whole world, as
+in "Debugging Inputs" (Kirschner, Soremekun and Zeller, 2020): else the result would be the difference of two worlds that nobody
+has seen.
 """
 
 from __future__ import annotations
@@ -37,9 +35,8 @@ MOST_CHECKS = 6
 
 @dataclass(frozen=True)
 class Passing:
-    """The rule by which a world passes: the robot reaches its goal at the rate `wanted`, rather than at `rather_than`.
-
-    One run decides nothing: Wald's sequential test does, with this chance of `error` at either rate.
+    """The rule by which a world passes: the robot reaches its goal at the rate `wanted`, rather than at `rather_than`, by Wald's
+    sequential test, with this chance of `error` at either rate.
     """
 
     wanted: float
@@ -81,8 +78,8 @@ class Each:
 
 
 @dataclass(frozen=True)
-class Checked:
-    """A step: fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
+class Checked(Step):
+    """Fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
 
     removed: Environment
     claims: tuple[NamedClaim, ...]
@@ -94,9 +91,8 @@ class Checked:
 
 @dataclass(frozen=True)
 class Asked:
-    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each.
-
-    Each check has the error of its number, and begins `block` runs after the one before.
+    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each. Each check has the
+    error of its number, and begins `block` runs after the one before.
     """
 
     whole: Environment
@@ -110,9 +106,7 @@ class Asked:
     block: int
 
 
-def isolation(
-    driver: Runs, asked: Asked, checks: Sequence[Checked] = ()
-) -> Generator[Step | Checked, Any, Environment | None]:
+def isolation(driver: Runs, asked: Asked, checks: Sequence[Checked] = ()) -> Generator[Step, Any, Environment | None]:
     """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
     checks = list(checks)
     while len(checks) < MOST_CHECKS:
@@ -137,7 +131,7 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
 
 def _search(
     driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
-) -> Generator[Step | Checked, Any, Environment]:
+) -> Generator[Step, Any, Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     if smaller:
         searching = by_chunks(tuple(model for model in asked.suspects if model in smaller))
@@ -157,7 +151,7 @@ def _search(
         winner = None if place is None else candidates[place]
 
 
-def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step | Checked, Any, Checked]:
+def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step, Any, Checked]:
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing, error = asked.whole - removed, error_of(number + 1) / 2.0
     backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}
@@ -193,9 +187,8 @@ def _exactly(driver: Runs, model: int, with_it: Environment, runs: tuple[int, ..
 def isolating(suspects: Partition, first: int) -> Search:
     """What has to go from the whole world; empty if the robot does not pass even without all `suspects`.
 
-    Candidates are models to remove, the opposite of a reduction's, and "similar" is a world that passes without them. First go the
-    `first` of the suspects, then twice as many, until the robot passes; of those ddmin puts back as many as it can. Where it ends,
-    each model that is put back alone has been tried: the removal is 1-minimal.
+    "similar" is a world that passes without a candidate's models. First go the `first` of the suspects, then twice as many,
+    until the robot passes; of those ddmin puts back as many as it can, so that the removal is 1-minimal.
     """
     size = max(1, first)
     while suspects:
@@ -218,8 +211,7 @@ def _only(group: Partition, suspects: Partition) -> Round:
 def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
     """Whether fresh runs show that `world` passes, from at least so many: "passes", "fails" or "not shown".
 
-    "passes" is wrong with a probability of at most about the error of the rule: then the goal is not reached more often than at
-    `rather_than`.
+    "passes" is wrong with a probability of at most about the error of the rule: then the rate is no higher than `rather_than`.
     """
     reached = runs = broken = 0
     found: bool | None = None

@@ -18,8 +18,7 @@ def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[fl
     Paper, Algorithm 3. The scores are distances in m.
     """
     end = np.array(evidence.need("failure_position"))
-    scores: list[float] = np.linalg.norm(evidence.centroids(partitions) - end, axis=1).tolist()
-    return scores
+    return list(np.linalg.norm(evidence.centroids(partitions) - end, axis=1))
 
 
 def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
@@ -28,8 +27,7 @@ def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
 
     The scores are distances in m.
     """
-    scores: list[float] = cdist(evidence.centroids(partitions), evidence.path()).mean(axis=1).tolist()
-    return scores
+    return list(cdist(evidence.centroids(partitions), evidence.path()).mean(axis=1))
 
 
 def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
@@ -39,8 +37,7 @@ def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
     The scores are distances in m, to the segments of the path.
     """
     times = evidence.need("trajectory")[:, 0]
-    scores: list[float] = nearest_on_path(evidence.centroids(partitions), times, evidence.path())[0].tolist()
-    return scores
+    return list(nearest_on_path(evidence.centroids(partitions), times, evidence.path())[0])
 
 
 def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
@@ -72,5 +69,4 @@ def random(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """
     models = sum(len(partition) for partition in partitions)
     order = np.random.default_rng([evidence.seed, models, len(partitions)])
-    scores: list[float] = order.random(len(partitions)).tolist()
-    return scores
+    return list(order.random(len(partitions)))

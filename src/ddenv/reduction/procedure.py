@@ -1,9 +1,8 @@
 """What ddenv does, from the first run of the whole world to a certified end: one pure coroutine.
 
-It runs nothing itself. Where it needs tests it yields `Wants`, with the tests in the order of need, and goes on once some of them
-have ended; the driver makes the first, and as many more as it has workers. Every other step that it yields says what was found, and
-`Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce` with a function, the forecast with
-dice. A resumed run drives it again through what is known.
+It runs nothing itself. Where it needs tests it yields `Wants`, and goes on once some of them have ended. Every other step that
+it yields says what was found; `Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce`
+with a function. A resumed run drives it again through what is known.
 
 1. `baseline`: the whole world is run; its failure is f.
 2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
@@ -13,7 +12,7 @@ dice. A resumed run drives it again through what is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, zip_longest
 from typing import Any, Protocol
@@ -34,7 +33,6 @@ from ddenv.evidence.certificate import (
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.guide import Search
 from ddenv.reduction.round import Candidate, Partition, Round
-from ddenv.reduction.stepping_back import groups_again, last_good
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
@@ -57,21 +55,21 @@ class Test:
     without: int | None = None
 
 
-# The steps of the procedure. Each comment says what the driver answers; None unless it says something else.
+class Step:
+    """A step of the procedure. The driver answers None unless the step says something else."""
 
 
 @dataclass(frozen=True)
-class Wants:
+class Wants(Step):
     """The tests that are needed next, in the order in which a single worker would make them."""
 
     tests: tuple[Test, ...]
 
 
 @dataclass(frozen=True)
-class BaselineRan:
-    """The whole world was run so often; the first `chose` of these runs only choose f.
-
-    The answer is what the `Baseline` shows, or None if there is no failure to reduce.
+class BaselineRan(Step):
+    """The whole world was run so often; the first `chose` of these runs only choose f. The answer is what the `Baseline` shows, or
+    None if there is no failure to reduce.
     """
 
     runs: int
@@ -87,14 +85,14 @@ class Baseline:
 
 
 @dataclass(frozen=True)
-class FailureFixed:
+class FailureFixed(Step):
     """The baseline of so many runs is over. The answer is the leg with which the search begins."""
 
     runs: int
 
 
 @dataclass(frozen=True)
-class RoundBegan:
+class RoundBegan(Step):
     """A round of the search. The answer is None, or what is known of it if it was judged before this driver began."""
 
     number: int
@@ -109,10 +107,9 @@ class Past:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown".
-
-    Its first `runs` runs decided; with none, it is part of what lost the rate.
+class Judged(Step):
+    """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown". Its first
+    `runs` runs decided; with none, it is part of what lost the rate.
     """
 
     index: int
@@ -122,7 +119,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Similar:
+class Similar(Step):
     """Candidate number `index` of a round can become the environment. The answer is whether it does."""
 
     number: int
@@ -131,7 +128,7 @@ class Similar:
 
 
 @dataclass(frozen=True)
-class RoundEnded:
+class RoundEnded(Step):
     """A round is over; `winner` is the place of the candidate that became the environment, or None."""
 
     number: int
@@ -139,19 +136,19 @@ class RoundEnded:
 
 
 @dataclass(frozen=True)
-class SearchEnded:
+class SearchEnded(Step):
     """Nothing more can be left out of an environment by the search."""
 
     environment: Environment
 
 
 @dataclass(frozen=True)
-class CertificateDue:
+class CertificateDue(Step):
     """Fresh runs are due. The answer is the `Certificate` that they are made for."""
 
 
 @dataclass(frozen=True)
-class Certified:
+class Certified(Step):
     """What fresh runs show of what is left, and then of it without each model, up to a claim that ends the certificate."""
 
     certificate: Certificate
@@ -159,7 +156,7 @@ class Certified:
 
 
 @dataclass(frozen=True)
-class SteppedBack:
+class SteppedBack(Step):
     """What is left lost the rate. The search goes back to place number `place` of the chain.
 
     It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on
@@ -172,38 +169,20 @@ class SteppedBack:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeftOut(Step):
     """Without `model` f shows about as often, so the search goes on in `environment`. The answer is the next leg."""
 
     model: int
     environment: Environment
 
 
-Step = (
-    Wants
-    | BaselineRan
-    | FailureFixed
-    | RoundBegan
-    | Judged
-    | Similar
-    | RoundEnded
-    | SearchEnded
-    | CertificateDue
-    | Certified
-    | SteppedBack
-    | LeftOut
-)
-
-
 @dataclass(frozen=True)
 class Leg:
-    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back.
+    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back. What is
+    left has to keep the rate of f in `whole`.
 
-    What is left has to keep the rate of f in `whole`.
-
-    `pinned` models always stay. `free` are the models that may go, each with those that go with it, by the one that stands for
-    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the
-    usual number. The groups `again` are left out first.
+    `pinned` models always stay. `free` are the models that may go, each with those that go with it. `rule` says when a candidate
+    is taken. The first round has `n_partitions`, None for the usual number. The groups `again` are left out first.
     """
 
     first_round: int
@@ -218,9 +197,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class Certificate:
-    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`.
-
-    With `exact` it claims what these runs of the search show; its fresh runs say how often f shows with other seeds.
+    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`. With `exact` it claims
+    what these runs of the search show; its fresh runs say how often f shows with other seeds.
     """
 
     number: int
@@ -231,9 +209,8 @@ class Certificate:
 
 @dataclass(frozen=True)
 class NamedClaim:
-    """A claim about an environment: about what is left, or about that without `model`.
-
-    It rests on the runs `exact` of the search alone, if there are any, else on fresh ones.
+    """A claim about an environment: what is left, or that without `model`. It rests on the runs `exact` of the search, or on fresh
+    ones.
     """
 
     model: int | None
@@ -366,8 +343,8 @@ def judge(
 ) -> Generator[Step, Any, int | None]:
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
-    Verdicts come in order: tests of later ones that have ended wait for their turn. What is dissimilar, but not by the `usual`
-    rule, was missed: the algorithm may come back to it.
+    Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
+    missed.
     """
     judged, refusals = 0, driver.refusals
     while True:
@@ -375,8 +352,8 @@ def judge(
             # The user may want a candidate that was passed over after all.
             judged, refusals = 0, driver.refusals
         candidates = islice(environments, judged, None)
-        now = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
-        for verdict in now.verdicts:
+        verdicts, wanted = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
+        for verdict in verdicts:
             if not verdict:
                 break
             environment = environments[judged]
@@ -385,16 +362,16 @@ def judge(
             if verdict == "similar":
                 return judged
             judged += 1
-        if not now.wanted:
+        if not wanted:
             return None
-        yield Wants(tuple(Test(environments[index], run, why, index) for index, run in now.wanted))
+        yield Wants(tuple(Test(environments[index], run, why, index) for index, run in wanted))
 
 
 def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
     if driver.refused(environment):
         return Judged(index, environment, "missed", 0)
     # By these runs alone: more of them may have ended.
-    runs, hits = decided_by(lambda run: driver.shown(environment, run), rule)
+    runs, hits = decided_by(driver.shown, environment, rule)
     missed = verdict == "dissimilar" and not usual.verdict(hits, runs - hits)
     return Judged(index, environment, "missed" if missed else verdict, runs)
 
@@ -460,18 +437,15 @@ def settled(
         # Of each pair the larger world first: its run may imply the other one.
         next_ones = [sorted(one.claim.wanted, key=lambda test: -len(test[0])) for one in named]
         later = zip_longest(*(one.claim.later for one in named))
+        without = {one.environment: one.model for one in reversed(named)}
         wants = dict.fromkeys(
-            Test(environment, first_run + run, why, without=_left_out(named, environment))
+            Test(environment, first_run + run, why, without=without.get(environment))
             for tests in (*next_ones, *later)
             for environment, run in filter(None, tests)
         )
         if not wants:
             return tuple(named)
         yield Wants(tuple(wants))
-
-
-def _left_out(named: Iterable[NamedClaim], environment: Environment) -> int | None:
-    return next((claim.model for claim in named if claim.environment == environment), None)
 
 
 def onward(
@@ -495,7 +469,7 @@ def onward(
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
     """Back to the last environment that is not shown to have lost the rate of all runs of the whole world.
 
-    Of each only runs by the seeds of this certificate count. By others it was taken, or went back to: these favour it.
+    Only runs by the seeds of this certificate count: by others it was taken, or went back to, which favour it.
     """
     first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
     rate = driver.rate()
@@ -518,3 +492,27 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
     tests = tuple((environment, first + run) for claim in claims.values() for environment, run in claim.rests_on)
     leg: Leg = yield SteppedBack(place, again, tests)
     return leg
+
+
+def groups_again(good: Environment, bad: Environment, end: Environment) -> list[Partition]:
+    """What to leave out of `good` at once: all that went after `bad`, then halves of what went from `good` to `bad`."""
+    later, step = tuple(bad - end), tuple(good - bad)
+    halves = [step[: len(step) // 2], step[len(step) // 2 :]] if len(step) > 1 else []
+    return [group for group in (later, *halves) if group]
+
+
+def last_good(
+    chain: Sequence[Environment], judged: Callable[[Environment], Claim]
+) -> int | tuple[tuple[Environment, int], ...]:
+    """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
+
+    `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.
+    """
+    good, bad = 0, len(chain) - 1
+    while bad - good > 1:
+        place = (good + bad) // 2
+        claim = judged(chain[place])
+        if not claim.verdict:
+            return claim.wanted + claim.later
+        good, bad = (place, bad) if claim.verdict == "kept" else (good, place)
+    return good

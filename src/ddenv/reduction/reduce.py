@@ -1,11 +1,9 @@
-"""`ddenv.reduce`: the reduction as a function, for a test of your own. It needs neither Drake nor a robot. Wrong arguments raise
-UserError, in one line.
-"""
+"""`ddenv.reduce`: the reduction as a function, for a test of your own. It needs neither Drake nor a robot."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count, takewhile
@@ -20,16 +18,20 @@ from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, Verdict, error_of
 from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate
 from ddenv.reduction import procedure as steps
+from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
 from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Partition, Round
-from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.settings import SETTINGS
 
 NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothing to reduce"
 # Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
 FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 1_000_000
+
+# Larger numbers are a mistake, and their squares could be infinite.
+LARGEST = 1e9
+PLACE = "x, y, z m"
 
 Test = Callable[[frozenset[str]], bool]
 Value = TypeVar("Value")
@@ -45,9 +47,8 @@ class Step:
 
 @dataclass(frozen=True)
 class NamedRound:
-    """A round, before it is tested: the environment, and its parts in the order in which they are tried.
-
-    A candidate is "partition" or "complement", and the number of its part.
+    """A round, before it is tested: the environment, its parts in the order in which they are tried, and its candidates:
+    "partition" or "complement", and the number of its part.
     """
 
     environment: Names
@@ -78,10 +79,9 @@ class RateClaim:
 class Reduction:
     """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test in `rounds` rounds.
 
-    `history` begins with all elements; each further step is a reduction, or a step back to more elements. The tests are those of
-    all elements at first, of the search, and those that show what the result is worth. `minimal`: what is kept shows the failure
-    often enough, and no single element can be left out; each was left out in a test. With the rule "kept", `claims` say what
-    fresh calls of the test showed of this; with "first" there are none.
+    `history` begins with all elements; each further step is a reduction, or a step back. `minimal`: what is kept shows the
+    failure often enough, and no single element can be left out; each was left out in a test. With the rule "kept", `claims` say
+    what fresh calls of the test showed of this.
     """
 
     kept: tuple[str, ...]
@@ -135,22 +135,17 @@ def reduce(
     `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and returns whether the failure showed.
     A test that returns False is repeated up to `iterations` times, for failures that do not show every time.
 
-    With `accept_rate` "first", the first run with the failure decides, as in the paper; the end may fail far more rarely than all
-    elements do. With "kept", the default if there are `iterations`, all elements are run `baseline_runs` times at first, and more
-    often if the failure is rare. The search takes what seems to keep `keep_rate` of their failure rate. Fresh runs show at the end
-    whether at least `certify_rate` of it is kept, and without which elements the failure is rarer; where a claim fails, the search
-    steps back or goes on.
-    All claims together are wrong with a probability of at most 5 %.
+    With `accept_rate` "first", the first run with the failure decides, as in the paper. With "kept", the default if there are
+    `iterations`, all elements are run `baseline_runs` times or more at first, the search takes what seems to keep `keep_rate` of
+    their failure rate, and fresh runs show at the end whether at least `certify_rate` of it is kept, and without which elements
+    the failure is rarer. All claims together are wrong with a probability of at most 5 %.
 
     `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of the run that failed.
     `failure_pose` is where it failed, beginning with x, y, z (m); the default is the trajectory's end. `first_sensed` maps names to
-    the time (s) when the robot first sensed them; other names were never sensed. `touched` are the names that it touched. `traits`
-    maps each name to its `ddenv.Traits`. Only what the chosen schemas look at is required. `n_partitions`, `candidates`,
-    `complement_order`, `growth`, `skip`, `prior` and `delta` (rad/s) mean the same as in a scenario's section `reduction`.
-
-    With `check`, all elements are tested first, as "kept" always does: without the failure there is nothing to reduce. `on_round`
-    is called with each round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are
-    passed on.
+    the time (s) when the robot first sensed them, `traits` to `ddenv.Traits`. Only what the chosen schemas look at is required.
+    `n_partitions` and what follows, to `delta` (rad/s), mean the same as in a scenario's section `reduction`. With `check`, all
+    elements are tested first. `on_round` is called with each round before it is tested. Raises UserError, in one line, for wrong
+    arguments; exceptions of `test` are passed on.
     """
     names = _names(elements)
     accept_rate = accept_rate or ("kept" if iterations else "first")
@@ -161,26 +156,22 @@ def reduce(
         "skip": skip,
         "prior": prior,
     }
-    for name, word in variants.items():
-        _check_choice(name, word, SETTINGS[name].choices)
-    # To repeat runs exactly takes seeds, and `test` has none.
-    _check_choice("accept_rate", accept_rate, ("first", "kept"))
-    counts = {"iterations": iterations, "n_partitions": n_partitions, "seed": seed, "baseline_runs": baseline_runs}
-    for name, number in counts.items():
-        _check_count(name, number)
-    _check_number("delta", delta)
-    _check_number("keep_rate", keep_rate, 0.95)
-    _check_number("certify_rate", certify_rate, 0.95)
+    _check_words(**variants, accept_rate=accept_rate)
+    _check_counts(iterations=iterations, n_partitions=n_partitions, seed=seed, baseline_runs=baseline_runs)
+    _check_numbers(LARGEST, delta=delta)
+    _check_numbers(0.95, keep_rate=keep_rate, certify_rate=certify_rate)
     path = _trajectory(trajectory)
-    failure = path[-1, 1:4] if failure_pose is None and path is not None else failure_pose
+    failure = _place(path[-1, 1:4] if failure_pose is None and path is not None else failure_pose)
+    if failure is None and failure_pose is not None:
+        raise _wrong("failure_pose", PLACE, failure_pose)
     known = Evidence(
         names,
-        _each("positions", positions, names, _place),
+        _each("positions", positions, names, PLACE, _place),
         path,
-        None if failure is None else _place("failure_pose", failure),
-        _each("first_sensed", first_sensed, None, _time),
+        failure,
+        _each("first_sensed", first_sensed, None, "a time in s", _time),
         None if touched is None else frozenset(touched),
-        _each("traits", traits, names, _known_traits),
+        _each("traits", traits, names, "ddenv.Traits", lambda value: value if isinstance(value, Traits) else None),
         delta=float(delta),
         seed=int(seed),
     )
@@ -212,7 +203,7 @@ def reduce(
         leg = caller.leg()
         caller.carry_out(steps.search_on(caller, leg))
         rests = [caller.left - Environment.of((element,)) for element in caller.left]
-        minimal = all(standing([rest], caller.shown, leg.rule).verdicts[0] == "dissimilar" for rest in rests)
+        minimal = all(standing([rest], caller.shown, leg.rule)[0] == ["dissimilar"] for rest in rests)
     tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
     return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
 
@@ -220,8 +211,7 @@ def reduce(
 @dataclass
 class _Caller:
     """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides.
-
-    `calls` counts them by what they were made for: "baseline", "round" or "certify".
+    `calls` counts them by what they were made for.
     """
 
     names: Names
@@ -268,8 +258,8 @@ class _Caller:
         return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
 
     def rate(self) -> float:
-        """From the baseline, and from fresh calls: at first these are made only where what is left does not show the failure, which
-        would show the rate as too low, so none counts after the first that was not made.
+        """From the baseline, and from fresh calls up to the first not made: they are made only where what is left missed the
+        failure.
         """
         shown = list(self._of_whole)
         for number in range(1, self._certificates + 1):
@@ -379,28 +369,29 @@ class _Caller:
         return RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound)
 
 
-# Larger numbers are a mistake, and their squares could be infinite.
-LARGEST = 1e9
+def _wrong(what: str, expected: str, found: object) -> UserError:
+    return UserError(f"{what}: expected {expected}, found {found!r}")
 
 
-def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:
-    """Raises UserError for a word that is none of these."""
-    if value not in choices:
-        raise UserError(f"{name}: {value!r} is not allowed; use one of {', '.join(choices)}")
+def _check_words(**given: str) -> None:
+    # To repeat runs exactly takes seeds, and `test` has none.
+    for name, word in given.items():
+        choices = [one for one in SETTINGS[name].choices if one != "exact"]
+        if word not in choices:
+            raise UserError(f"{name}: {word!r} is not allowed; use one of {', '.join(choices)}")
 
 
-def _check_count(name: str, value: int) -> None:
-    """Raises UserError for what is no whole number, or less than the setting of this name can be."""
-    least = SETTINGS[name].least or 0
-    if not isinstance(value, Integral) or not least <= value < 2**31:
-        raise UserError(f"{name}: expected {least} or more, found {value!r}")
+def _check_counts(**given: int) -> None:
+    for name, number in given.items():
+        least = SETTINGS[name].least or 0
+        if not isinstance(number, Integral) or not least <= number < 2**31:
+            raise _wrong(name, f"{least} or more", number)
 
 
-def _check_number(name: str, value: float, most: float = LARGEST) -> None:
-    """Raises UserError for what is no number above 0, at most `most`."""
-    if not isinstance(value, Real) or not 0 < value <= most:
-        limit = "" if most == LARGEST else f", at most {most:g}"
-        raise UserError(f"{name}: expected a number above 0{limit}, found {value!r}")
+def _check_numbers(most: float, **given: float) -> None:
+    for name, number in given.items():
+        if not isinstance(number, Real) or not 0 < number <= most:
+            raise _wrong(name, f"a number above 0, at most {most:g}", number)
 
 
 def _names(elements: Iterable[str]) -> Names:
@@ -409,7 +400,7 @@ def _names(elements: Iterable[str]) -> Names:
         names = tuple(elements)
         twice = [name for name, times in Counter(names).items() if times > 1]
     except TypeError:
-        raise UserError(f"elements: expected names, found {elements!r}") from None
+        raise _wrong("elements", "names", elements) from None
     if twice:
         raise UserError(f"elements: {twice[0]!r} occurs twice; give each element its own name")
     return names
@@ -423,7 +414,7 @@ def _trajectory(trajectory: Floats | None) -> Floats | None:
         path = np.asarray(trajectory)
         path = path.astype(float, casting="safe" if path.dtype.kind in "cOSU" else "unsafe")
     except (TypeError, ValueError):
-        raise UserError("trajectory: expected finite numbers of shape (N, 5)") from None
+        path = np.zeros(0)
     if path.ndim != 2 or path.shape[1] != 5 or not len(path) or not (np.abs(path) <= LARGEST).all():
         raise UserError(f"trajectory: expected finite numbers of shape (N, 5), found shape {path.shape}")
     if (np.diff(path[:, 0]) < 0).any():
@@ -432,36 +423,33 @@ def _trajectory(trajectory: Floats | None) -> Floats | None:
 
 
 def _each(
-    what: str, values: Mapping[str, Any] | None, names: Names | None, read: Callable[[str, Any], Value]
+    what: str,
+    values: Mapping[str, Any] | None,
+    names: Names | None,
+    expected: str,
+    read: Callable[[Any], Value | None],
 ) -> dict[str, Value] | None:
-    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError if it is no mapping."""
+    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError where it makes nothing."""
     if values is None:
         return None
     if not isinstance(values, Mapping):
         raise UserError(f"{what}: expected a mapping from names to values, found {type(values).__name__}")
-    return {name: read(f"{what}[{name!r}]", values.get(name)) for name in (values if names is None else names)}
+    found: dict[str, Value] = {}
+    for name in values if names is None else names:
+        if (value := read(values.get(name))) is None:
+            raise _wrong(f"{what}[{name!r}]", expected, values.get(name))
+        found[name] = value
+    return found
 
 
-def _place(what: str, values: Any) -> Place:
-    """A position, m. Raises UserError, as those below."""
-    if values is None:
-        raise UserError(f"{what}: is missing")
+def _place(values: Any) -> Place | None:
     try:
-        numbers = [] if isinstance(values, str) else [float(value) for value in values][:3]
+        x, y, z = [float(value) for value in values][:3]
     except (TypeError, ValueError, OverflowError):
-        numbers = []
-    if len(numbers) < 3 or not all(abs(number) <= LARGEST for number in numbers):
-        raise UserError(f"{what}: expected x, y, z m, found {values!r}")
-    return numbers[0], numbers[1], numbers[2]
+        return None
+    bounded = all(abs(number) <= LARGEST for number in (x, y, z))
+    return (x, y, z) if bounded and not isinstance(values, str) else None
 
 
-def _time(what: str, value: float) -> float:
-    if not isinstance(value, Real) or not 0 <= value <= LARGEST:
-        raise UserError(f"{what}: expected a time in s, found {value!r}")
-    return float(value)
-
-
-def _known_traits(what: str, value: Any) -> Traits:
-    if not isinstance(value, Traits):
-        raise UserError(f"{what}: expected ddenv.Traits, found {value!r}")
-    return value
+def _time(value: Any) -> float | None:
+    return float(value) if isinstance(value, Real) and 0.0 <= float(value) <= LARGEST else None

@@ -13,9 +13,8 @@ Partition = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A sub-environment to try: `kind` is "partition" or "complement" of the round's partition number `partition`.
-
-    `part` is that partition, `models` are those that are there, `lacks` those of the environment that are not.
+    """A sub-environment to try: "partition" or "complement" of the round's partition number `partition`, which is `part`. `models`
+    are there, `lacks` are those of the environment that are not.
     """
 
     kind: str
@@ -29,7 +28,7 @@ class Candidate:
 class Round:
     """`partitions` in the order in which they are tried, with the `scores` that rank them. The first similar candidate wins.
 
-    `runs` is how many runs a candidate has if none shows f, where the algorithm wants no more for now; None is as many as usual.
+    `runs` is how many runs a candidate has if none shows f, None as many as usual.
     """
 
     n_partitions: int
@@ -74,9 +73,8 @@ def round_of(
     ranked: Sequence[tuple[Partition, float]],
     wanted: Iterable[tuple[str, int]],
 ) -> Round:
-    """A round with the candidates `wanted`, given as (kind, partition), without E itself and without repetitions.
-
-    The empty set is a candidate only if E is a single model.
+    """A round with the candidates `wanted`, as (kind, partition), without E itself, repetitions, and the empty set unless E is a
+    single model.
     """
     partitions, scores = zip(*ranked, strict=True)
     whole = Environment.of(environment)

@@ -1,7 +1,5 @@
-"""Stacks: models that are connected by which models rest on which, as one element of a search.
-
-The algorithm gets one model of each stack, and searches as ever. Its rounds are expanded, so that whatever is tested has all
-of a stack or nothing of it.
+"""Stacks: models that rest on each other, as one element of a search. The algorithm gets one model of each; its rounds are
+expanded, so that whatever is tested has all of a stack or nothing of it.
 """
 
 from __future__ import annotations
@@ -33,10 +31,6 @@ class Stacks:
     def expanded(self, representatives: Iterable[int]) -> Partition:
         """All models of the stacks for which `representatives` stand, one stack after the other."""
         return tuple(model for first in representatives for model in self.by_first[first])
-
-    def inside(self, models: Environment) -> Partition:
-        """The representatives of the stacks of which all models are among `models`."""
-        return tuple(first for first, stack in self.by_first.items() if stack <= models)
 
     def of_any(self, models: Environment) -> Environment:
         """All models of the stacks of which any model is among `models`."""

@@ -36,12 +36,10 @@ class Rule(Protocol):
 class Acceptance:
     """The rule of a search. A candidate is dissimilar after `most_misses` runs without f and none with it.
 
-    With `rate` 0 the first run with f makes it similar, as in the paper. Otherwise `rate` is the estimated rate of f in the whole
-    world, and Bayes decides between three rates of the candidate: that one, one that is clearly below `keep_rate` of it, and
-    `SPURIOUS`. After each of `steps_back` the rule is stricter: the search has taken worlds where f is rarer. It bounds no error
-    by itself, the certificate does; it makes a refuted certificate rare.
-
-    With `exact` the runs of these numbers decide, and no others.
+    With `rate` 0 the first run with f makes it similar, as in the paper. Otherwise `rate` is the estimated rate of f in the
+    whole world, and Bayes decides between three rates of the candidate: that one, one clearly below `keep_rate` of it, and
+    `SPURIOUS`; stricter after each of `steps_back`. It bounds no error by itself, the certificate does. With `exact` the runs of
+    these numbers decide, and no others.
     """
 
     most_misses: int
@@ -74,8 +72,7 @@ class Acceptance:
     @property
     def proves(self) -> bool:
         """Whether a search has to show by itself that its end is minimal; else the certificate alone does, with fewer runs in all.
-
-        Where many misses are chance, or models turned out to take a bit of the rate each, that would cost another certificate.
+        Where many misses are chance, that would cost another certificate.
         """
         return not self.rate or self.steps_back > 0 or (1.0 - self.rate) ** self.misses > FEW_MISSED
 
@@ -100,21 +97,6 @@ def _by_bayes(rate: float, keep_rate: float, steps_back: int, shown: int, missed
     return "similar" if keeps > 0.5 else "dissimilar"
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Where a round stands.
-
-    `verdicts` has "similar", "dissimilar", "unknown" (a test broke) or "" (open) for each candidate looked at. `winner` is the
-    first similar candidate, if no candidate before it is open. `wanted` are the tests still needed, as (candidate, run), in the
-    order in which a single worker would run them if none showed the failure. Idle workers may take them from the front: the
-    verdicts stay the same.
-    """
-
-    verdicts: tuple[Verdict, ...]
-    winner: int | None
-    wanted: tuple[tuple[int, int], ...]
-
-
 def standing(
     candidates: Iterable[Environment],
     shown: Callable[[Environment, int], Shown],
@@ -123,57 +105,45 @@ def standing(
     *,
     first: int = 0,
     enough: int | None = None,
-) -> Standing:
-    """Where a round stands (paper, Algorithm 1 lines 4 to 13).
+) -> tuple[list[Verdict], list[tuple[int, int]]]:
+    """Where a round stands (paper, Algorithm 1 lines 4 to 13): the verdict of each candidate, "" while it is open, and the
+    tests still needed, as (candidate, run), in the order in which a single worker would make them if none showed f.
 
     `shown(candidate, run)` returns whether a finished run showed f. The rule decides from the runs of a candidate, in their order;
     a broken run makes it unknown. `refused` candidates count as dissimilar. `candidates` begin with number `first`. They are
-    looked at up to the first one that is sure to be similar, since no later one is worth a test, or until there are `enough`
-    wanted tests.
+    looked at up to the first one that is sure to be similar, since no later one is worth a test, or until there are `enough` tests.
     """
     verdicts: list[Verdict] = []
     wanted: list[tuple[int, int]] = []
     for index, candidate in enumerate(candidates, first):
-        verdict, missing = ("dissimilar", []) if refused(candidate) else _row(shown, candidate, rule)
+        verdict, missing, _, _ = ("dissimilar", [], 0, 0) if refused(candidate) else _row(shown, candidate, rule)
         verdicts.append("" if missing else verdict)
         wanted += [(index, run) for run in missing]
-        if verdict == "similar":
-            return Standing(tuple(verdicts), None if wanted else index, tuple(wanted))
-        if enough is not None and len(wanted) >= enough:
+        if verdict == "similar" or (enough is not None and len(wanted) >= enough):
             break
-    return Standing(tuple(verdicts), None, tuple(wanted))
+    return verdicts, wanted
 
 
-def _row(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[Verdict, list[int]]:
-    """The verdict if no missing run shows f, and the missing runs up to there.
+def _row(
+    shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule
+) -> tuple[Verdict, list[int], int, int]:
+    """The verdict if no missing run shows f, the missing runs up to there, and how many runs decided and how many showed f.
 
     A later run that showed f decides nothing while an earlier one is open: else the verdict would depend on timing.
     """
     missing: list[int] = []
-    hits = misses = 0
-    while not (verdict := rule.verdict(hits, misses)):
-        run = rule.run(hits + misses)
-        known = shown(candidate, run)
-        if known == "broken":
-            return "unknown", missing
+    runs = hits = 0
+    while not (verdict := rule.verdict(hits, runs - hits)):
+        known = shown(candidate, rule.run(runs))
         if known is None:
-            missing.append(run)
-        if known:
-            hits += 1
-        else:
-            misses += 1
-    return verdict, missing
-
-
-def decided_by(shown: Callable[[int], Shown], rule: Rule) -> tuple[int, int]:
-    """How many runs of a candidate decided its verdict, and how many of them showed f; all of them are finished."""
-    hits = misses = 0
-    while not rule.verdict(hits, misses):
-        known = shown(rule.run(hits + misses))
+            missing.append(rule.run(runs))
+        runs += 1
         if known == "broken":
-            return hits + misses + 1, hits
-        if known:
-            hits += 1
-        else:
-            misses += 1
-    return hits + misses, hits
+            return "unknown", missing, runs, hits
+        hits += known is True
+    return verdict, missing, runs, hits
+
+
+def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[int, int]:
+    """How many runs of a candidate decided its verdict, and how many of them showed f; all of them are finished."""
+    return _row(shown, candidate, rule)[2:]

@@ -130,7 +130,6 @@ def _needed(record: Record) -> set[int]:
 
 
 def _issue(record: Record, needs: list[str]) -> bytes:
-    """The text of an issue, as Markdown."""
     state, found = record.state, current(record.state)
     assert found is not None
     at = f" at ({', '.join(f'{value:.2f}' for value in state.f_position[:2])}) m" if state.f_position else ""

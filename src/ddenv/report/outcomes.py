@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ddenv.evidence.claims import FreshRuns, current, fresh_runs, never_left_out
-from ddenv.evidence.took_part import why_sliced
-from ddenv.map.drawing import tick
+from ddenv.evidence.claims import FreshRuns, current, fresh_runs
 from ddenv.page.blocks import (
     Block,
     Cell,
     Name,
-    Picture,
     Section,
     Strong,
     Table,
@@ -21,20 +18,18 @@ from ddenv.page.blocks import (
     say,
     thousands,
 )
-from ddenv.page.step_chart import WIDTH, opening
 from ddenv.report.run_data import Record
-from ddenv.runfile.events import DEEDS, BaselineFinished
+from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.baseline import failed_in, missed
-from ddenv.words.claims import drift, means, missing, promise, verdict_on
+from ddenv.words.claims import drift, means, missing, promise
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200
-HEIGHT, LEFT, RIGHT, LINE = 58.0, 20.0, 36.0, 26.0
 MEANING = {
     "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
     "other": "another failure",
@@ -53,25 +48,6 @@ PHASES = (
 )
 # The maximum number of failures in the table, and of models by name.
 MOST, MOST_NAMES = 30, 6
-
-
-def interval(base: BaselineFinished) -> str:
-    """The line as SVG, its colours as classes of `style.css`."""
-
-    def at(rate: float) -> float:
-        return LEFT + (WIDTH - LEFT - RIGHT) * min(1.0, max(0.0, rate))
-
-    ticks = "".join(
-        f'<path class="grid" d="M{at(each):.1f} {LINE - 9}v18"/>{tick(at(each), LINE + 26, "middle", percent(each))}'
-        for each in (0.0, 0.25, 0.5, 0.75, 1.0)
-    )
-    return (
-        f"{opening(HEIGHT)}"
-        f'{ticks}<path class="grid" d="M{at(0):.1f} {LINE}H{at(1):.1f}"/>'
-        f'<path class="span" d="M{at(base.low):.1f} {LINE}H{at(base.high):.1f}"/>'
-        f'<circle class="dot" cx="{at(base.rate):.1f}" cy="{LINE}" r="6"/>'
-        f'<text class="said" x="{at(base.rate):.1f}" y="{LINE - 13}" text-anchor="middle">{percent(base.rate)}</text></svg>'
-    )
 
 
 def sureness(record: Record) -> Section | None:
@@ -96,7 +72,7 @@ def _baseline(state: RunState) -> list[Block]:
     )
     if base.broken:
         words += f" {count(base.broken, 'more run')} broke, and {'says' if base.broken == 1 else 'say'} nothing."
-    blocks: list[Block] = [say(words), Picture("interval", interval(base), "The failure rate with its interval.")]
+    blocks: list[Block] = [say(words)]
     if base.rate < 1:
         blocks.append(say(as_sentence(missed(state))))
     if base.others:
@@ -125,15 +101,11 @@ def _tests(state: RunState) -> list[Block]:
     table = Table(head, rows, range(1, 3 + len(phases)))
     # Before the end of the run, anything may still come to be needed.
     slices, ahead = _slices(state), state.ahead if state.status == "finished" else 0
-    if not state.deflake_runs and not state.cut_tests and not state.tally["lost"] and not ahead:
-        return [table, *slices]
-    words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates whose first test did not show f."
-    if state.cut_tests:
-        words += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
-    if ahead:
-        words += f" {thousands(ahead)} were made ahead of time by idle workers, and no verdict rests on them."
-    if lost := state.tally["lost"]:
-        words += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
+    words = (
+        f"Of the tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, "
+        f"{thousands(state.cut_tests)} were ended early, when the robot was stuck for good, and {thousands(ahead)} were made "
+        "ahead of time by idle workers and not needed."
+    )
     return [table, say(words), *slices]
 
 
@@ -146,9 +118,7 @@ def _slices(state: RunState) -> list[Block]:
         blocks.append(say(f"{known} {TEACHING}"))
     for node in state.nodes:
         if node.how == "sliced":
-            rows = tuple((Name(name), why) for name, why in why_sliced(state, node).items())
             blocks.append(say(f"Environment {node.number}: {slice_words(state, node)}."))
-            blocks.append(Table(("model", "which"), rows[:MOST_ROWS]))
     if words := refuted_words(state):
         blocks.append(say(Strong("Slices were wrong."), f" {plain(words)}.", notice=True))
     return blocks
@@ -225,13 +195,7 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         )
     if state.certified:
         words += f" {as_sentence(promise(state, found))}"
-    # Other certificates of the same environment: each stands for itself.
-    earlier = (
-        say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
-        for one in state.certificates
-        if one.node == found.node and one.claims and one is not state.certificate
-    )
-    return [table, say(words), *earlier]
+    return [table, say(words)]
 
 
 def _fresh_row(state: RunState, each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:

@@ -16,20 +16,13 @@ LONGEST_VALUE = 120
 
 
 def settings(record: Record) -> Section:
-    """The section with the settings."""
     scenario, jobs = record.state.scenario, record.state.jobs
     rows = [
         (one.label, _read(scenario, record.asked, one), one.meaning)
         for one in SETTINGS.values()
         if one.name in section(scenario, one.section) or not one.stored
     ]
-    rows += [("driver", value_words(section(scenario, "controller").get("use")), "who drives the robot")]
-    rows += [("start", _place(section(scenario, "robot").get("spawn")), "where the robot starts")]
-    rows += [("goal", _place(scenario.get("goal")), "where it has to go")]
     rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
-    oracle = section(scenario, "oracle")
-    program = oracle.get("command") or oracle.get("use")
-    rows += [("simulator", value_words(program), "what runs the robot in place of Drake")]
     table = Table(
         ("setting", "value", "meaning"), tuple((name, Name(value), meaning) for name, value, meaning in rows if value)
     )
@@ -54,18 +47,6 @@ def value_words(value: Any) -> str:
     return plain(f"{value:g}" if isinstance(value, float) else value)[:LONGEST_VALUE]
 
 
-def _place(values: Any) -> str:
-    """A place as in the file, such as x 1, y 2."""
-    if not isinstance(values, dict):
-        return ""
-    units = {"yaw": "rad", "tolerance": "m", "x": "m", "y": "m", "z": "m"}
-    return ", ".join(
-        f"{key} {value_words(value)} {units[key]}"
-        for key, value in values.items()
-        if key in units and value_words(value)
-    )
-
-
 def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
     import yaml
 
@@ -77,7 +58,6 @@ def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
 
 
 def repeat(record: Record) -> Section:
-    """The section on what to type."""
     state, run = record.state, shlex.quote(plain(record.path))
     blocks: list[Block] = []
     if state.baseline is not None:

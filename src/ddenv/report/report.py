@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,7 +19,6 @@ from ddenv.page.blocks import (
     percent,
     place,
     say,
-    section,
     thousands,
 )
 from ddenv.page.html import html
@@ -30,22 +28,20 @@ from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import margins, what_is_left, why
-from ddenv.runfile.events import DEEDS, Place, deed
+from ddenv.runfile.events import deed
 from ddenv.runfile.fold import spent
-from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.claims import ended, for_everyone
 from ddenv.world.access import write_file
 
 KINDS = (".html", ".htm", ".md")
-PICTURES = ("map", "near", "chart", "interval")
+PICTURES = ("map", "chart")
 # Models are named up to this number.
 MOST_NAMES = 6
 
 
 def content(record: Record) -> Report:
-    """The report on a run."""
     state = record.state
     about = (what_is_left, worth, why, margins, way, guiding, others_met, sureness, settings, repeat)
     sections = [each(record) for each in about]
@@ -104,31 +100,12 @@ def _failure(state: RunState) -> list[Paragraph]:
     description, position = plain(state.scenario.get("description", "")), state.f_position
     said = [say(description)] if description else []
     if position is not None:
-        words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
-        said.append(say(f"{words}{_short_of(state, position)}{_after(state)}."))
+        said.append(say(f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m."))
     elif state.tests_done:
         seen = count(state.tests_done, "run")
         said.append(say(f"The whole world is run first to fix the failure: {seen} ended so far."))
     notes = (plain(each) for _, each in state.notes)
     return [*said, *(say(as_sentence(words), notice=True) for words in notes)]
-
-
-def _short_of(state: RunState, position: Place) -> str:
-    goal = section(state.scenario, "goal")
-    try:
-        x, y = vector((goal.get("x"), goal.get("y")), 2)
-    except Invalid:
-        return ""
-    return f", {math.dist((x, y), position[:2]):.1f} m short of the goal at ({x:g}, {y:g})"
-
-
-def _after(state: RunState) -> str:
-    test = state.f_test
-    if test is None or state.failure not in DEEDS:
-        return ""
-    if test.cut:
-        return f"; this was certain after {test.simulated_seconds:.1f} s"
-    return f"; it had {test.simulated_seconds:.1f} s" if state.failure in ("stuck", "out of time") else ""
 
 
 def _figures(record: Record) -> tuple[tuple[str, str], ...]:

@@ -44,11 +44,11 @@ WORDS = {
     "goal": "goal",
     "end": "end of f",
 }
-# Pixels: the drawing's own width, the highest map and close-up, the lowest map, and the margins.
-WIDTH, HIGHEST, CLOSE_HIGH, LEAST_HIGH = 880.0, 620.0, 420.0, 180.0
+# Pixels: the drawing's own width, the highest and the lowest map, and the margins.
+WIDTH, HIGHEST, LEAST_HIGH = 880.0, 620.0, 180.0
 LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
-# The minimum drawn along each axis: of the world and of a close-up, m; and the minimum magnification of a close-up.
-LEAST, CLOSE, CLOSER = 4.0, 2.0, 3.0
+# The minimum drawn along each axis, m.
+LEAST = 4.0
 # The maximum number of labels, and how many of the models drawn last they must not hide.
 MOST_LABELS, MOST_AVOIDED = 24, 1000
 # The maximum number of points on a path.
@@ -68,24 +68,7 @@ def picture(
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
     these models, in place of those that are left.
     """
-    return _picture(record, _whole(record), name, ways, named)
-
-
-def close_up(record: Record) -> str:
-    """A map of only what is left and f's end; "" if it would add little to the whole map."""
-    kept = [each for each in record.models if each.model.name in record.kept]
-    end = _places(record).get("end")
-    if end is None or not kept:
-        return ""
-    frame = _frame(kept, [end], CLOSE, CLOSE_HIGH)
-    return _picture(record, frame, "near", None, None) if frame.scale >= CLOSER * _whole(record).scale else ""
-
-
-def _whole(record: Record) -> Frame:
-    return _frame(record.models, list(_places(record).values()), LEAST)
-
-
-def _picture(record: Record, frame: Frame, name: str, ways: Ways | None, named: Collection[str] | None) -> str:
+    frame = _frame(record.models, list(_places(record).values()))
     if ways is None:
         last = record.evidence if record.evidence is not record.original else None
         ways = {"way": record.original, "last": last}
@@ -134,10 +117,10 @@ def _sort(record: Record, name: str) -> str:
     return "kept" if name in record.kept else "gone"
 
 
-def _frame(models: Sequence[Drawn], points: Sequence[Point], least: float, most: float = HIGHEST) -> Frame:
+def _frame(models: Sequence[Drawn], points: Sequence[Point]) -> Frame:
     """The map is as wide as the page, and never too flat."""
     across = WIDTH - LEFT - RIGHT
-    return Frame.around(models, points, 0.03, least, (across, most), (across, LEAST_HIGH), (LEFT, TOP))
+    return Frame.around(models, points, 0.03, LEAST, (across, HIGHEST), (across, LEAST_HIGH), (LEFT, TOP))
 
 
 def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:

@@ -1,4 +1,4 @@
-"""How a run got there: the chart of its models, its rounds, and what the user did: decisions, tries, and the tree of reductions."""
+"""How a run got there: the chart of its models, its rounds, and what the user decided."""
 
 from __future__ import annotations
 
@@ -9,19 +9,13 @@ from itertools import groupby
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, moment, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
-from ddenv.runfile import branches
-from ddenv.runfile.progress import Node
-from ddenv.runfile.state import REFUSED, Candidate, Round, RunState, Trial
+from ddenv.runfile.state import REFUSED, Candidate, Round, RunState
 from ddenv.text import count, plain
-from ddenv.words.claims import seen
-from ddenv.words.decisions import CAME_BY
 
 # The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
 MOST_ROUNDS = 60
-# Longer tables of decisions, trials or nodes show only the first and the last rows.
+# Longer tables of decisions show only the first and the last rows.
 MOST = 120
-# The maximum number of steps in the line about a history without branches.
-MOST_STEPS = 40
 
 
 def way(record: Record) -> Section | None:
@@ -89,7 +83,6 @@ def _row(state: RunState, round: Round, tests: int, undone: bool) -> tuple[Cell,
 
 
 def _summed(rounds: Sequence[Round], tests: int) -> tuple[Cell, ...]:
-    """Several rounds in one row."""
     wins = sum(each.winner is not None for each in rounds)
     numbers = " to ".join(str(number) for number in dict.fromkeys((rounds[0].number, rounds[-1].number)))
     words = f"{wins} of {len(rounds)} reduced" if wins else "none"
@@ -97,7 +90,7 @@ def _summed(rounds: Sequence[Round], tests: int) -> tuple[Cell, ...]:
 
 
 def guiding(record: Record) -> Section | None:
-    """The section on decisions and the tree; None without both."""
+    """The section on decisions; None before the baseline is done."""
     state = record.state
     blocks: list[Block] = []
     if state.decisions:
@@ -107,60 +100,7 @@ def guiding(record: Record) -> Section | None:
         blocks += [say(f"{count(len(rows), 'decision')} {lead}"), done]
     elif state.baseline is not None:
         blocks.append(say("The user changed nothing: every reduction is the algorithm's own."))
-    if state.trials:
-        trials = [_trial(state, each) for each in state.trials]
-        blocks.append(Table(("tried by hand", "at", "models", "tests", "verdict"), _cut(trials, 4), {1, 2, 3}))
-    blocks += _tree(state)
-    return Section("Decisions and branches", tuple(blocks)) if blocks else None
-
-
-def _trial(state: RunState, trial: Trial) -> tuple[Cell, ...]:
-    verdict = trial.verdict or ("not ended" if state.ended else "under way")
-    words = f"{verdict}, adopted" if trial.adopted else verdict
-    return trial.label, str(trial.node), str(trial.size), str(len(trial.tests)), words
-
-
-def _tree(state: RunState) -> list[Block]:
-    nodes = state.nodes
-    if len(nodes) < 2:
-        return []
-    straight = all(node.parent == node.number - 1 and node.how in ("reduced", "sliced") for node in nodes[1:])
-    if straight and state.node == len(nodes) - 1 and not any(node.rejected or node.lost_rate for node in nodes):
-        return [say(f"From environment to environment, without branches: {_steps(nodes)}.")]
-    drawn = branches.rows(nodes, state.node)
-    rows = [_node(state, each.node, each.lines.replace("─", " ")) for each in drawn]
-    here = [place for place, each in enumerate(drawn) if each.node.number == state.node and len(drawn) <= MOST]
-    head = ("environment", "models", "came by", "round", "tests", "f shown", "")
-    return [
-        say("The tree of reductions, each environment below the one it came from:"),
-        Table(head, _cut(rows, 2), {1, 3, 4, 5}, here),
-    ]
-
-
-def _steps(nodes: Sequence[Node]) -> str:
-    sizes = [str(len(node.environment)) for node in nodes]
-    if len(sizes) > MOST_STEPS:
-        sizes = [*sizes[: MOST_STEPS // 2], "…", *sizes[-MOST_STEPS // 2 :]]
-    return f"{' → '.join(sizes)} models"
-
-
-def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:
-    marks = ["taken back"] if node.rejected else []
-    marks += ["f too rare"] if node.lost_rate else []
-    marks += ["minimal"] if node.minimal else []
-    marks += ["here"] if node.number == state.node else []
-    how, _ = CAME_BY[node.how]
-    came = f"{plain(node.what)}, {how}" if how else plain(node.what)
-    round = "" if node.round is None else str(node.round)
-    return (
-        f"{indent}{node.number}",
-        str(len(node.environment)),
-        came,
-        round,
-        str(node.tests),
-        seen(node),
-        ", ".join(marks),
-    )
+    return Section("Decisions", tuple(blocks)) if blocks else None
 
 
 def _cut(rows: Sequence[tuple[Cell, ...]], words: int) -> tuple[tuple[Cell, ...], ...]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from ddenv.evidence.claims import current
 from ddenv.map.footprints import Drawn
 from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, place, say
-from ddenv.report.report_map import close_up, picture
+from ddenv.report.report_map import picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
@@ -19,14 +19,12 @@ from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
 from ddenv.text import count, first_of, plain
 from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said
-from ddenv.world.model import is_ground
 
 # The maximum number of models in the table and with a sentence, of names in a list, of those that a removal drops, and of maps.
 MOST_MODELS, MOST_NAMES, MOST_DROPPED, MOST_MAPS = 200, 12, 3, 6
 
 
 def what_is_left(record: Record) -> Section:
-    """The section on what is left."""
     state = record.state
     title = "The minimal environment" if state.certified else "What is left so far"
     if state.baseline is None:
@@ -34,14 +32,8 @@ def what_is_left(record: Record) -> Section:
     if record.world is None:
         return Section(title, _names_alone(state))
     blocks: list[Block] = [Picture("map", picture(record), _alternative(state))]
-    if near := close_up(record):
-        blocks += [
-            say("Where the robot failed, closer:"),
-            Picture("near", near, "A closer look at where the robot failed."),
-        ]
     if state.baseline is not None:
         blocks += _models(record)
-    blocks += _stay(record)
     return Section(title, tuple(blocks))
 
 
@@ -84,18 +76,6 @@ def _size(each: Drawn) -> str:
     return " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
 
 
-def _stay(record: Record) -> list[Block]:
-    """The models that are no elements, and so always stay."""
-    elements = frozenset(record.state.elements)
-    models = () if record.world is None else record.world.models
-    others = [model for model in models if model.name not in elements]
-    if not others:
-        return []
-    grounds = [model.name for model in others if is_ground(model)]
-    protected = [model.name for model in others if not is_ground(model)]
-    return [say(Strong("Always there:"), " ", *named(grounds + protected, MOST_NAMES), ".")]
-
-
 def _names_alone(state: RunState) -> tuple[Block, ...]:
     if state.baseline is None:
         return (say(f"{count(len(state.elements), 'model')} can be removed. No map: the world cannot be read."),)
@@ -134,7 +114,7 @@ def margins(record: Record) -> Section | None:
 
 
 def _passing(record: Record, found: Nearest) -> list[Block]:
-    """The nearest world that passes, and the two runs side by side."""
+    """The nearest world that passes, with the ways of two runs."""
     blocks: list[Block] = [say(plain(found.sentences))]
     one = found.parting
     if one is None:
@@ -144,16 +124,7 @@ def _passing(record: Record, found: Nearest) -> list[Block]:
             f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without"
         )
         blocks.append(_map(record, record.elements, found.gone, one, "nearest", words, found.gone))
-    rows = tuple(
-        (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
-        for each in found.instants
-    )
-    head = ("time, s", "whole world: x, y, m", "nearest world that passes: x, y, m", "apart, m")
-    return [*blocks, Table(head, rows, {0, 1, 2, 3})]
-
-
-def _place(point: tuple[float, float]) -> str:
-    return f"{point[0]:.2f}, {point[1]:.2f}"
+    return blocks
 
 
 def _map(

@@ -16,7 +16,7 @@ from math import isfinite
 from numbers import Real
 from pathlib import Path
 from types import ModuleType, TracebackType
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -34,6 +34,7 @@ BUILT_IN = {
 # The maximum time that an import may take, real s: some load whole frameworks.
 LONGEST_IMPORT = 60.0
 
+Answer = TypeVar("Answer")
 # Modules loaded from the folder of the last user's controller; another folder may have modules of the same names.
 _brought: set[str] = set()
 
@@ -166,50 +167,62 @@ class Guarded:
         return _command(answer, self._setup.joints)
 
     def _guarded(self, what: str, call: Callable[[Any], Any], given: Any) -> Any:
+        late = f"took longer than {self._seconds:g} s (controller.answer_within)"
         try:
-            with first_on_path(self._folder), redirect_stdout(sys.stderr):
-                return call_within(self._seconds, call, given)
-        except TooLate:
-            problem = f"took longer than {self._seconds:g} s (controller.answer_within)"
-        except _WrongAnswer as error:
-            problem = str(error)
-        # The controller may also exit, or interrupt itself.
-        except BaseException as error:
-            problem = f"raised {described(error)}"
-        raise ControllerFailed(f"controller {self._name}: {what} {problem}")
+            with redirect_stdout(sys.stderr):
+                return guarded(lambda: call_within(self._seconds, call, given), self._folder, late)
+        except BadCode as error:
+            raise ControllerFailed(f"controller {self._name}: {what} {error}") from None
 
 
-class _WrongAnswer(Exception):
-    """What is wrong with a controller's command."""
+class BadCode(Exception):
+    """What the user's code did wrong."""
+
+
+class WrongAnswer(Exception):
+    """What is wrong with an answer of the user's code."""
+
+
+def guarded(call: Callable[[], Answer], folder: Path, late: str) -> Answer:
+    """Returns `call()`, which runs the user's code, with modules searched in `folder` first. Raises BadCode, `late` for TooLate."""
+    try:
+        with first_on_path(folder):
+            return call()
+    except TooLate:
+        problem = late
+    except WrongAnswer as error:
+        problem = str(error)
+    # The code may also exit, or interrupt itself.
+    except BaseException as error:
+        problem = f"raised {described(error)}"
+    raise BadCode(problem)
 
 
 def _command(answer: Any, joints: tuple[str, ...]) -> Twist | WheelSpeeds:
-    """A controller's answer as a command of finite numbers. Raises _WrongAnswer."""
+    """A controller's answer as a command of finite numbers. Raises WrongAnswer."""
     if isinstance(answer, Twist):
         return Twist(_number(answer.speed, "a speed"), _number(answer.turn_rate, "a turn rate"))
     if isinstance(answer, tuple | list) and len(answer) == 2:
         return Twist(_number(answer[0], "a speed"), _number(answer[1], "a turn rate"))
     speeds = answer.speeds if isinstance(answer, WheelSpeeds) else answer
     if not isinstance(speeds, Mapping):
-        raise _WrongAnswer(
-            f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds by joint)"
-        )
+        raise WrongAnswer(f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds by joint)")
     return WheelSpeeds({_joint(joint, joints): _number(speed, f"'{joint}'") for joint, speed in speeds.items()})
 
 
 def _joint(joint: Any, joints: tuple[str, ...]) -> str:
     if not isinstance(joint, str) or joint not in joints:
         hint = nearest(str(joint)[:80], joints)
-        raise _WrongAnswer(f"returned a speed for '{str(joint)[:80]}'{hint}; wheels are {', '.join(joints)}")
+        raise WrongAnswer(f"returned a speed for '{str(joint)[:80]}'{hint}; wheels are {', '.join(joints)}")
     return joint
 
 
 def _number(value: Any, what: str) -> float:
     if not isinstance(value, float | int) and not isinstance(value, Real):
-        raise _WrongAnswer(f"returned {what} that is {_kind(value)}; expected a number")
+        raise WrongAnswer(f"returned {what} that is {_kind(value)}; expected a number")
     number = float(value)
     if not isfinite(number) or abs(number) > FASTEST:
-        raise _WrongAnswer(f"returned {what} of {number:g}; the maximum is {FASTEST:g}")
+        raise WrongAnswer(f"returned {what} of {number:g}; the maximum is {FASTEST:g}")
     return number
 
 

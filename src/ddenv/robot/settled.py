@@ -21,15 +21,13 @@ class Settled:
     """What the models that can move do in `seconds` of simulated time while nobody comes near them.
 
     `places` are the poses of their links at the end, in the world frame and in the order of the file. `restless` models still
-    move then, `fallen` ones have fallen out of the world, `wild` ones were faster than anything that falls. What is `broken`
-    could not be simulated, and has no place.
+    move then, `fallen` ones have fallen out of the world. What is `broken` could not be simulated, and has no place.
     """
 
     seconds: float = 0.0
     places: Mapping[str, tuple[Pose, ...]] = field(default_factory=dict)
     restless: tuple[str, ...] = ()
     fallen: tuple[str, ...] = ()
-    wild: tuple[str, ...] = ()
     broken: tuple[str, ...] = ()
 
 
@@ -57,7 +55,6 @@ def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:
     for about, names, does, do, why in (
         ("restless", settled.restless, "does", "do", f"not come to rest within {settled.seconds:.1f} s"),
         ("fallen", settled.fallen, "falls", "fall", "out of the world"),
-        ("wild", settled.wild, "flies", "fly", "apart, faster than anything falls: look for models inside each other"),
         ("broken", settled.broken, "cannot", "cannot", "be simulated: their motion diverges"),
     ):
         if names:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.runfile.progress import Node
+from ddenv.runfile.progress import Node, path
 
 HERE, MINIMAL, REJECTED, OTHER = "●", "◆", "✗", "○"
 
@@ -25,7 +25,7 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
     for node in nodes:
         if node.parent is not None:
             children[node.parent].append(node.number)
-    straight_path = set(path(nodes, here))
+    straight_path = {node.number for node in path(nodes, here)}
     found: list[Row] = []
     # What is still to be drawn: a branch's first node, what comes before its lines, and its fork.
     todo = [(0, "", "")] if nodes else []
@@ -40,16 +40,6 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
         # The first one goes on top of the stack: it is drawn above those made later.
         todo += [(child, after, "├─") for child in reversed(sides)]
     return found
-
-
-def path(nodes: Sequence[Node], number: int) -> list[int]:
-    """The nodes from the whole world to one of them, both included."""
-    found: list[int] = []
-    step: int | None = number if nodes else None
-    while step is not None and len(found) < len(nodes):
-        found.append(step)
-        step = nodes[step].parent
-    return found[::-1]
 
 
 def sign(node: Node, here: int) -> str:

@@ -8,19 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, dataclass_transform
 
-from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.reading import OneOf, Range
+from ddenv.environment import NOTHING
+from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Positive, Real, Seconds, Share
 from ddenv.text import snake_case
 
-Natural = Annotated[int, Range(0)]
-Number = Annotated[int, Range(1)]
-Share = Annotated[float, Range(0, 1)]
-Seconds = Annotated[float, Range(0)]
 Pair = tuple[Natural, Natural]
-Pose = tuple[float, float, float, float, float, float, float]
-Place = tuple[float, float, float]
+Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
+Place = tuple[Real, Real, Real]
 Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "isolate")]
 Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]
 Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
@@ -48,16 +44,17 @@ def named(kinds: Sequence[str], position: Sequence[float]) -> str:
     return f"{how} at ({x:.2f}, {y:.2f})"
 
 
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
 class Event:
-    """Every event is one of these."""
+    """Every event is one of these, and so a frozen dataclass."""
 
-    __slots__ = ()
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
 
 # The engine.
 
 
-@dataclass(frozen=True, slots=True)
 class Created(Event):
     """The first event: the scenario as plain data, and the names of all models that may go. In `welds` the first one is welded to
     the second.
@@ -68,18 +65,16 @@ class Created(Event):
     welds: tuple[Pair, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class EngineStarted(Event):
     """`version` is that of ddenv, `simulator` has those of Drake and numpy, or the oracle, `machine` Python and the processor."""
 
-    pid: int
+    pid: Natural
     jobs: Natural
     version: str
     simulator: str
     machine: str = ""
 
 
-@dataclass(frozen=True, slots=True)
 class Cluster(Event):
     """What has happened to a cluster, in `words`, and how many tests its workers can make at the same time now."""
 
@@ -87,31 +82,26 @@ class Cluster(Event):
     words: str
 
 
-@dataclass(frozen=True, slots=True)
 class Comparing(Event):
     """A test is made again, because this engine computes with something else than the earlier ones."""
 
     test: Number
 
 
-@dataclass(frozen=True, slots=True)
 class Compared(Event):
     """Whether its bits are the same; if not, the user goes on with mixed tests."""
 
     same: bool
 
 
-@dataclass(frozen=True, slots=True)
 class Paused(Event):
     """No new test starts."""
 
 
-@dataclass(frozen=True, slots=True)
 class Resumed(Event):
     """Tests start again."""
 
 
-@dataclass(frozen=True, slots=True)
 class DiskSpace(Event):
     """Whether the disk has room for more tests: `needed` bytes; `free` are there."""
 
@@ -120,14 +110,12 @@ class DiskSpace(Event):
     free: Natural
 
 
-@dataclass(frozen=True, slots=True)
 class ClockJumped(Event):
     """Unix time went on or back by so many seconds at once: the machine slept, or its clock was set."""
 
-    seconds: float
+    seconds: Real
 
 
-@dataclass(frozen=True, slots=True)
 class Finished(Event):
     """The run ended by itself. `minimal` says whether no model can be removed."""
 
@@ -135,14 +123,12 @@ class Finished(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
 class EngineStopped(Event):
     """The engine was stopped and can be resumed."""
 
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
 class EngineFailed(Event):
     """The engine could not go on."""
 
@@ -152,12 +138,10 @@ class EngineFailed(Event):
 # The world.
 
 
-@dataclass(frozen=True, slots=True)
 class SupportsStarted(Event):
     """The piles are being settled, to find which models rest on which; only if that takes more than a second."""
 
 
-@dataclass(frozen=True, slots=True)
 class Supports(Event):
     """The first model of each pair rests on the second once the whole world has settled; `why` that is unknown.
 
@@ -169,12 +153,10 @@ class Supports(Event):
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
 class Still(Event):
     """Nothing in the world moves by itself: there are no ties."""
 
 
-@dataclass(frozen=True, slots=True)
 class Noted(Event):
     """A sentence about something that is wrong with the whole world; one `about` each thing."""
 
@@ -182,12 +164,11 @@ class Noted(Event):
     words: str
 
 
-@dataclass(frozen=True, slots=True)
 class EnvironmentNamed(Event):
     """These models are environment number `environment`, from 0; the whole world is number 0 without an event."""
 
     environment: Number
-    models: Environment
+    models: Models
 
 
 # Tests.
@@ -195,9 +176,10 @@ class EnvironmentNamed(Event):
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Run number `run` of an environment, with a seed of its own. `phase` says what for: see `ddenv.runfile.state.Test`.
+    """Run number `run` of an environment, with a seed of its own.
 
-    `without` is the model that a fresh run leaves out, or puts back.
+    `phase` says what for: the baseline, a `candidate` of a round, the user's `trial` ("hand"), an audit of a slice, a certificate
+    ("certify": with a fresh seed, `without` a model if it is given) or an isolation.
     """
 
     test: Number
@@ -211,21 +193,18 @@ class Start:
     without: Natural | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class TestStarted(Start, Event):
     """A test starts. It `audits` the test that implies it."""
 
     audits: Number | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class Implied(Start, Event):
     """A test starts and ends at once: the result is that of the test `by`, which has its trajectories."""
 
     by: Number = field(kw_only=True)
 
 
-@dataclass(frozen=True, slots=True)
 class TestFinished(Event):
     """How a test ended; its trajectories stand beside it.
 
@@ -237,18 +216,17 @@ class TestFinished(Event):
     test: Number
     outcome: Outcome
     failure: str
-    distance: float | None
+    distance: Real | None
     end_pose: Pose | None
     simulated_seconds: Seconds
     wall_seconds: Seconds
     first_sensed: tuple[tuple[Natural, Seconds], ...] = ()
     first_touched: tuple[tuple[Natural, Seconds], ...] = ()
     cut: bool = False
-    took_part: Environment | None = None
+    took_part: Models | None = None
     taken: str = ""
 
 
-@dataclass(frozen=True, slots=True)
 class TestLost(Event):
     """A test was running when the engine ended."""
 
@@ -259,8 +237,8 @@ class TestLost(Event):
 class Outcomes:
     """Tests that are judged anew, by their ids: their outcomes, and how far from f they ended, m."""
 
-    outcomes: dict[int, Outcome]
-    distances: dict[int, float]
+    outcomes: dict[Natural, Outcome]
+    distances: dict[Natural, Real]
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +258,6 @@ class SeenFailure:
         return named(self.kinds, self.position)
 
 
-@dataclass(frozen=True, slots=True)
 class BaselineFinished(Event):
     """f is fixed by the runs of the whole world: `failure_test` is the test whose end is f.
 
@@ -316,7 +293,6 @@ class BaselineFinished(Event):
 # The search.
 
 
-@dataclass(frozen=True, slots=True)
 class LegStarted(Event):
     """A search starts from the current environment, with round number `round`.
 
@@ -329,7 +305,6 @@ class LegStarted(Event):
     rate: Share = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class RoundStarted(Event):
     """An environment is split into partitions; candidates are "partition" or "complement", the number of the partition, and the
     distance that ranks it, m, if it is one.
@@ -339,13 +314,12 @@ class RoundStarted(Event):
     n_partitions: Natural
     environment: Natural
     partitions: tuple[tuple[Natural, ...], ...]
-    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, float | None], ...]
-    pinned: Environment = NOTHING
+    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, Real | None], ...]
+    pinned: Models = NOTHING
 
 
-@dataclass(frozen=True, slots=True)
 class Forecast(Event):
-    """How many tests of candidates the engine expected to be left, low, likely and high, when `tests_done` were finished.
+    """How many more tests of candidates a search of so many models takes, low, likely and high, when `tests_done` were finished.
 
     In one case of ten fewer than the low number are left, in one of ten more than the high one.
     """
@@ -363,7 +337,6 @@ class OfCandidate:
     candidate: Natural
 
 
-@dataclass(frozen=True, slots=True)
 class CandidateJudged(OfCandidate, Event):
     """The verdict on a candidate, by these tests; `known` of them were made for something else."""
 
@@ -372,19 +345,16 @@ class CandidateJudged(OfCandidate, Event):
     known: Natural = 0
 
 
-@dataclass(frozen=True, slots=True)
 class Waiting(OfCandidate, Event):
     """A candidate showed f, and waits for the user."""
 
 
-@dataclass(frozen=True, slots=True)
 class Decided(OfCandidate, Event):
     """The user accepts or rejects it."""
 
     decision: Annotated[str, OneOf("accept", "reject")]
 
 
-@dataclass(frozen=True, slots=True)
 class Reduced(OfCandidate, Event):
     """A candidate becomes the environment; `evidence_test` is a run of it that showed f."""
 
@@ -392,14 +362,12 @@ class Reduced(OfCandidate, Event):
     evidence_test: Number
 
 
-@dataclass(frozen=True, slots=True)
 class RoundFinished(Event):
     """A round is over."""
 
     round: Number
 
 
-@dataclass(frozen=True, slots=True)
 class Sliced(Event):
     """The environment is cut down to what took part in these tests. `audit`: one of them is simulated there, too."""
 
@@ -409,7 +377,6 @@ class Sliced(Event):
     audit: bool = False
 
 
-@dataclass(frozen=True, slots=True)
 class SlicesRefuted(Event):
     """The audit `test` does not repeat the test `by`, which implies it. Slices are no longer used, implied tests are void, and the
     run goes back to a node.
@@ -423,7 +390,6 @@ class SlicesRefuted(Event):
 # Certificates.
 
 
-@dataclass(frozen=True, slots=True)
 class CertificateStarted(Event):
     """Full runs with fresh seeds follow, from run number `run` on. They have to show that what is left keeps `certify_rate` of the
     rate of f, which was estimated as `rate`; the search aimed at `keep_rate`. Before there was a `certify_rate`, they were one.
@@ -434,10 +400,10 @@ class CertificateStarted(Event):
     certificate: Number
     run: Natural
     rate: Share
-    keep_rate: Annotated[float, Range(1e-9, 1)]
-    error: Annotated[float, Range(1e-9, 1)]
+    keep_rate: Part
+    error: Part
     at_least: Natural
-    certify_rate: Annotated[float, Range(1e-9, 1)] | None = None
+    certify_rate: Part | None = None
     seeds: tuple[Natural, ...] = ()
 
 
@@ -461,7 +427,6 @@ class ClaimMade:
     bound: Share | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class CertificateFinished(Event):
     """What fresh runs show; the claims rest on these tests."""
 
@@ -469,7 +434,6 @@ class CertificateFinished(Event):
     tests: tuple[Number, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class RateLost(Event):
     """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is not taken again.
 
@@ -482,7 +446,6 @@ class RateLost(Event):
     tests: tuple[Number, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class LeftOut(Event):
     """A certificate showed that a model is not needed; `by_user`: that it only helps, and the user left it out."""
 
@@ -495,7 +458,6 @@ class LeftOut(Event):
 # Isolation.
 
 
-@dataclass(frozen=True, slots=True)
 class IsolationStarted(Event):
     """The fewest models are sought that have to go from the whole world so that the robot reaches its goal.
 
@@ -510,7 +472,7 @@ class IsolationStarted(Event):
     wanted: Share
     rather_than: Share
     keep_rate: Share
-    error: Annotated[float, Range(1e-9, 1)]
+    error: Part
     at_least: Natural
     suspects: tuple[Natural, ...]
     size: Natural
@@ -518,7 +480,6 @@ class IsolationStarted(Event):
     chosen: tuple[Natural, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class RemovalJudged(Event):
     """What the search says of an environment of isolation."""
 
@@ -539,7 +500,6 @@ class ReturnedMade:
     high: Share
 
 
-@dataclass(frozen=True, slots=True)
 class IsolationChecked(Event):
     """What fresh runs show of an environment; the claims rest on these tests."""
 
@@ -548,14 +508,12 @@ class IsolationChecked(Event):
     tests: tuple[Number, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class IsolationFinished(Event):
     """The environment in which the robot passes; None if there is none."""
 
     environment: Natural | None
 
 
-@dataclass(frozen=True, slots=True)
 class IsolationGivenUp(Event):
     """The user ends it."""
 
@@ -571,15 +529,14 @@ class NumberAsked:
     """
 
     name: str
-    now: float
-    low: float
-    high: float
-    scale: Annotated[float, Range(1e-12)]
-    resolution: Annotated[float, Range(1e-12)]
+    now: Real
+    low: Real
+    high: Real
+    scale: Positive
+    resolution: Positive
     unit: str = ""
 
 
-@dataclass(frozen=True, slots=True)
 class MarginsStarted(Event):
     """A search for how far each of the `numbers` may change in an environment where f shows at `rate`, with at most `budget` runs.
 
@@ -590,38 +547,35 @@ class MarginsStarted(Event):
     numbers: tuple[NumberAsked, ...]
     environment: Natural
     rate: Share
-    error: Annotated[float, Range(1e-9, 1)]
+    error: Part
     budget: Number
     certified: bool
     status: Annotated[str, OneOf("finished", "stopped")]
     before: str
 
 
-@dataclass(frozen=True, slots=True)
 class MarginRan(Event):
     """How a run ended in which the number `name` had a `value`; outcome, failure, distance and end as in `TestFinished`."""
 
     name: str
-    value: float
+    value: Real
     run: Natural
     seed: Natural
     outcome: Outcome
     failure: str
-    distance: float | None
+    distance: Real | None
     end_pose: Pose | None
     wall_seconds: Seconds
 
 
-@dataclass(frozen=True, slots=True)
 class MarginImpossible(Event):
     """The number `name` cannot have this `value`, and `why`."""
 
     name: str
-    value: float
+    value: Real
     why: str
 
 
-@dataclass(frozen=True, slots=True)
 class MarginsFinished(Event):
     """All numbers that were asked for are looked at, or the budget is used up."""
 
@@ -629,14 +583,12 @@ class MarginsFinished(Event):
 # Decisions of the user.
 
 
-@dataclass(frozen=True, slots=True)
 class AcceptModeChanged(Event):
     """Reductions are made at once, or wait for the user."""
 
     mode: Annotated[str, OneOf("automatic", "ask")]
 
 
-@dataclass(frozen=True, slots=True)
 class Vetoed(OfCandidate, Event):
     """A candidate is left out; `again`: because the same models were refused before."""
 
@@ -644,26 +596,22 @@ class Vetoed(OfCandidate, Event):
     again: bool = False
 
 
-@dataclass(frozen=True, slots=True)
 class Unvetoed(OfCandidate, Event):
     """It is tried after all."""
 
 
-@dataclass(frozen=True, slots=True)
 class Pinned(Event):
     """These models always stay."""
 
     models: tuple[Natural, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class Unpinned(Event):
     """These models may go again."""
 
     models: tuple[Natural, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class TrialStarted(Event):
     """The user tries a selection."""
 
@@ -671,7 +619,6 @@ class TrialStarted(Event):
     environment: Natural
 
 
-@dataclass(frozen=True, slots=True)
 class TrialJudged(Event):
     """Its verdict, as of a candidate."""
 
@@ -681,7 +628,6 @@ class TrialJudged(Event):
     known: Natural = 0
 
 
-@dataclass(frozen=True, slots=True)
 class Adopted(Event):
     """A try becomes the environment."""
 
@@ -690,7 +636,6 @@ class Adopted(Event):
     evidence_test: Number
 
 
-@dataclass(frozen=True, slots=True)
 class AcceptedOther(Event):
     """The failure of a test counts as f from here on; `what` names it. `instead`: in a branch, in place of what was f."""
 
@@ -702,7 +647,6 @@ class AcceptedOther(Event):
     instead: bool = False
 
 
-@dataclass(frozen=True, slots=True)
 class WentBack(Event):
     """A node is the current one again; `rejected` is the node that is undone. `judged` if other failures count as f there."""
 
@@ -711,21 +655,18 @@ class WentBack(Event):
     judged: Outcomes | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class Changed(Event):
     """New values of keys in the scenario's section `reduction`."""
 
     settings: dict[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
 class CommandRefused(Event):
     """A command was not possible."""
 
     why: str
 
 
-@dataclass(frozen=True, slots=True)
 class CommandHandled(Event):
     """A command caused no other event."""
 

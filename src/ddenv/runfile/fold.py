@@ -20,7 +20,7 @@ from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, wi
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, PastRound, Point, narrowed
 from ddenv.runfile.state import Candidate, Round, RunState, Split
-from ddenv.runfile.store import Recorded, RunFile, uncollected
+from ddenv.runfile.store import Recorded, RunFile
 from ddenv.text import count
 
 # Verdicts that tests led to, not the user.
@@ -29,8 +29,7 @@ JUDGED = ("similar", "missed", "dissimilar", "unknown")
 
 def fold(recorded: Iterable[Recorded], state: RunState | None = None) -> RunState:
     """The state after these events, from the beginning or from an earlier `state`. Raises UserError for invalid ones."""
-    with uncollected():
-        return reduce(apply, recorded, state or RunState())
+    return reduce(apply, recorded, state or RunState())
 
 
 def apply(state: RunState, recorded: Recorded) -> RunState:
@@ -362,14 +361,10 @@ def _vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
 
 def _unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
     candidate, round = tried(state, event), current(state)
-    words = {
-        "rejected": f"took back the rejection of {_described(state, candidate)}",
-        "undone": f"allowed {_described(state, candidate)} again",
-    }.get(candidate.verdict, f"took back the veto of {_described(state, candidate)}")
     known = next((one for one in state.refused if one.environment == candidate.kept), None)
     changes = {
         **with_candidate(state, replace(candidate, verdict="")),
-        **decision(state, at, "unveto", words),
+        **decision(state, at, "unveto", f"allowed {_described(state, candidate)} again"),
         "refused": tuple(one for one in state.refused if one is not known),
         "refusals": state.refusals + 1,
         # A refusal in an earlier round has blocked candidates since, so the search starts again.
@@ -464,4 +459,4 @@ def _as_it_was(state: RunState, at: float) -> Changes:
     if state.isolating is None:
         margins = fold_claims.open_margins(state)
         return _ended(state, margins.status, margins.before, at)
-    return _ended(state, "finished", state.isolating.before, at)
+    return _ended(state, "finished", state.isolating.asked.before, at)

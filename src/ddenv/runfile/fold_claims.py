@@ -7,25 +7,21 @@ from dataclasses import replace
 
 from ddenv.runfile import events as e
 from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, origin, searched_anew, without_open
-from ddenv.runfile.fold_tests import Changes, with_node, with_removal, with_test
+from ddenv.runfile.fold_tests import Changes, shared, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Margins, Node, NumberTried, Returned
 from ddenv.runfile.state import OUTCOMES, RunState, Test
 
 
 def certificate_started(state: RunState, event: e.CertificateStarted, _: float) -> Changes:
-    certificate = Certificate(
-        number=event.certificate,
-        node=state.node,
-        first_run=event.run,
-        keep_rate=event.keep_rate,
-        rate=event.rate,
-        error=event.error,
-        at_least=event.at_least,
-        certify_rate=event.keep_rate if event.certify_rate is None else event.certify_rate,
-        branch=origin(state, state.node).parent is not None,
-        seeds=event.seeds,
-    )
+    special = {
+        "number": event.certificate,
+        "node": state.node,
+        "first_run": event.run,
+        "certify_rate": event.certify_rate or event.keep_rate,
+        "branch": origin(state, state.node).parent is not None,
+    }
+    certificate = Certificate(**shared(event, Certificate) | special)
     if certificate.number != len(state.certificates) + 1:
         raise ValueError(certificate.number)
     fresh = PersistentTuple.of(test for test in state.fresh if state.tests[test - 1].run >= event.run)
@@ -44,17 +40,8 @@ def _claim(state: RunState, made: e.ClaimMade) -> Claim:
     known = made.environment < len(state.environments) and all(outcome in OUTCOMES for outcome in made.outcomes)
     if not known or made.shown > made.runs or (made.verdict == "lost" and not made.runs):
         raise ValueError(made)
-    return Claim(
-        without=None if made.without is None else state.elements[made.without],
-        verdict=made.verdict,
-        shown=made.shown,
-        runs=made.runs,
-        low=made.low,
-        high=made.high,
-        outcomes=tuple(made.outcomes.items()),
-        environment=made.environment,
-        bound=made.bound,
-    )
+    without = None if made.without is None else state.elements[made.without]
+    return Claim(**shared(made, Claim) | {"without": without, "outcomes": tuple(made.outcomes.items())})
 
 
 def _check_tests(state: RunState, tests: Sequence[int]) -> None:
@@ -91,24 +78,12 @@ def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
 
 
 def isolation_started(state: RunState, event: e.IsolationStarted, _: float) -> Changes:
-    isolation = Isolation(
-        number=event.isolation,
-        first_run=event.run,
-        block=event.block,
-        wanted=event.wanted,
-        rather_than=event.rather_than,
-        keep_rate=event.keep_rate,
-        error=event.error,
-        at_least=event.at_least,
-        suspects=tuple(map(state.elements.__getitem__, event.suspects)),
-        size=event.size,
-        before=event.before,
-        chosen=event.chosen,
-    )
     sound = 0 < event.rather_than < event.wanted < 1
     if event.isolation != len(state.isolations) + 1 or not sound or state.baseline is None:
         raise ValueError(event.isolation)
-    return {"isolations": (*without_open(state), isolation)}
+    if max(event.suspects, default=0) >= len(state.elements):
+        raise ValueError("suspects")
+    return {"isolations": (*without_open(state), Isolation(event))}
 
 
 def removal_judged(state: RunState, event: e.RemovalJudged, _: float) -> Changes:
@@ -141,8 +116,7 @@ def _returned(state: RunState, made: e.ReturnedMade) -> Returned:
         ("needed", "not needed") if made.back is None else ("passes", "fails")
     ):
         raise ValueError(made)
-    back = None if made.back is None else state.elements[made.back]
-    return Returned(back, made.verdict, made.reached, made.runs, made.low, made.high)
+    return Returned(**shared(made, Returned) | {"back": None if made.back is None else state.elements[made.back]})
 
 
 def _open(state: RunState) -> Isolation:

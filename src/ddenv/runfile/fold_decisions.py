@@ -11,7 +11,7 @@ from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, wi
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
-from ddenv.text import count, first_of, truncated
+from ddenv.text import count, first_of, plain, truncated
 
 # Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40
@@ -19,31 +19,18 @@ NAMED, LONGEST = 3, 40
 
 def pinned(state: RunState, event: e.Pinned, at: float) -> Changes:
     models = _named(state, event.models)
-    words = f"pinned {listed(models)}{_cut_short(state)}"
+    words = f"pinned {listed(models)}"
     return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
 
 
 def unpinned(state: RunState, event: e.Unpinned, at: float) -> Changes:
     models = _named(state, event.models)
-    words = f"unpinned {listed(models)}{_cut_short(state)}"
+    words = f"unpinned {listed(models)}"
     return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
 
 
 def _named(state: RunState, models: Iterable[int]) -> tuple[str, ...]:
     return tuple(map(state.elements.__getitem__, models))
-
-
-def _cut_short(state: RunState) -> str:
-    """What a new search ends: a certificate that is not finished, a reduction that waits, a round with untried candidates."""
-    now, current = state.certificate, state.round
-    if now is not None and state.confirming and not now.claims:
-        return f"; certificate {now.number} broken off"
-    if current is None:
-        return ""
-    waits = state.waiting_candidate
-    dropped = "" if waits is None else f"; {current.candidates[waits].label}, which waited, dropped"
-    untried = len(current.untried)
-    return dropped + (f"; round {current.number} ended with {untried} untried" if untried else "")
 
 
 def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
@@ -141,17 +128,14 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
 
 def changed(state: RunState, event: e.Changed, at: float) -> Changes:
     before = dict(state.scenario["reduction"])
-    words = ", ".join(
-        f"{key} from {_limit(before.get(key))} to {_limit(value)}" for key, value in event.settings.items()
-    )
+    words = ", ".join(f"{key} from {_said(before.get(key))} to {_said(value)}" for key, value in event.settings.items())
     scenario = {**state.scenario, "reduction": before | event.settings}
     # The budget does not affect the search.
     anew = {} if set(event.settings) == {"budget"} else searched_anew(state)
     return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
 
 
-def _limit(value: object) -> object:
-    """A setting in words; a budget may be None."""
+def _said(value: object) -> object:
     return "no limit" if value is None else value
 
 
@@ -312,7 +296,7 @@ def searched_anew(state: RunState) -> Changes:
 def place(node: Node) -> str:
     """A node in words."""
     models = count(len(node.environment), "model")
-    return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
+    return f"the whole world ({models})" if node.parent is None else f"{models} (#{node.number}, {plain(node.what)})"
 
 
 def listed(models: Sequence[str]) -> str:

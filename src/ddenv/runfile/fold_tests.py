@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from ddenv.runfile import events as e
@@ -23,21 +23,14 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
     removals, removal = state.removals, None
     if event.phase == ISOLATE:
         removals, removal = with_removal(state, event.environment)
-    test = Test(
-        id=event.test,
-        environment=event.environment,
-        phase=event.phase,
-        round=event.round,
-        candidate=event.candidate,
-        run=event.run,
-        seed=event.seed,
-        without=None if event.without is None else state.elements[event.without],
-        trial=event.trial,
-        removal=removal,
-        audits=event.audits if isinstance(event, e.TestStarted) else None,
-        node=_node_of(state, event),
-        engine=state.engines,
-    )
+    special = {
+        "id": event.test,
+        "without": None if event.without is None else state.elements[event.without],
+        "removal": removal,
+        "node": _node_of(state, event),
+        "engine": state.engines,
+    }
+    test = Test(**shared(event, Test) | special)
     if test.id != len(state.tests) + 1 or test.environment >= len(state.environments):
         raise ValueError(test.id)
     changes = {
@@ -55,6 +48,11 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
         return changes
     candidate = candidate_of(state, event.round, event.candidate)
     return changes | with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
+
+
+def shared(event: Any, kind: type[Any]) -> dict[str, Any]:
+    """The fields that a part of an event and the state have in common."""
+    return {field.name: getattr(event, field.name) for field in fields(kind) if hasattr(event, field.name)}
 
 
 def _node_of(state: RunState, event: e.TestStarted | e.Implied) -> int:

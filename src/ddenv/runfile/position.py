@@ -16,8 +16,8 @@ from ddenv.runfile.store import Recorded
 # What a step goes to: the next event that a viewer sees; the end of the next chapter; the next reduction; the next verdict or
 # decision of the user.
 Step = Literal["moment", "round", "reduction", "decision"]
-# A state is kept for so many events, and at most so many are kept: after that the gaps between them double.
-GAP, KEPT = 64, 512
+# A state is kept of one in so many events.
+GAP = 256
 # These change nothing that a viewer sees.
 _UNSEEN = (
     "command_handled",
@@ -68,7 +68,6 @@ class Position:
         self.at: int | None = None
         self.end = RunState()
         self.chapters: list[Chapter] = []
-        self._gap = GAP
         self._kept: list[RunState] = [self.end]
         self._ids = array("q", [0])
         # The events that started the tests, by the tests' ids less one.
@@ -86,11 +85,8 @@ class Position:
             return
         self.end = after
         self._ids.append(id)
-        if (len(self._ids) - 1) % self._gap == 0:
+        if (len(self._ids) - 1) % GAP == 0:
             self._kept.append(after)
-            if len(self._kept) > KEPT:
-                del self._kept[1::2]
-                self._gap *= 2
         if len(after.tests) > len(before.tests):
             self._starts.append(id)
         if kind not in _UNSEEN:
@@ -152,8 +148,8 @@ class Position:
             return None
         wanted = self._ids[place]
         if not (self._near and self._near[0].recorded.id <= wanted <= self._near[-1].recorded.id):
-            kept, end = self._kept[(place - 1) // self._gap], self._ids[-1]
-            noted = takewhile(lambda event: event.id <= end, self._read(kept.revision, self._gap))
+            kept, end = self._kept[(place - 1) // GAP], self._ids[-1]
+            noted = takewhile(lambda event: event.id <= end, self._read(kept.revision, GAP))
             self._near = [Moment(*step) for step in steps(noted, kept)]
         return self._near[bisect_right(self._near, wanted, key=lambda each: each.recorded.id) - 1]
 

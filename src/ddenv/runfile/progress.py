@@ -4,11 +4,12 @@ margins; and what its tests were computed with.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.events import EngineStarted, MarginImpossible, MarginRan, NumberAsked
+from ddenv.runfile.events import EngineStarted, IsolationStarted, MarginImpossible, MarginRan, NumberAsked
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,15 +96,22 @@ class Node:
     to_audit: bool = False
 
 
+def path(nodes: Sequence[Node], number: int | None) -> tuple[Node, ...]:
+    """The nodes from the whole world to one of them, both included."""
+    found: list[Node] = []
+    while number is not None and number < len(nodes):
+        found.append(nodes[number])
+        number = nodes[number].parent
+    return tuple(reversed(found))
+
+
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """What fresh runs show of the environment of `node`; number 1 is the run's first certificate.
 
-    `first_run` is the number of its first run. They have to show that what is left keeps `certify_rate` of the whole world's rate,
-    which was estimated as `rate`; the search aimed at `keep_rate`. All claims together are wrong with a probability of at most
-    `error`. What is left is run `at_least` so often. `claims` are empty while its tests are made. `past`: a search began since.
-    `branch`: the environment is in a branch whose f is another failure, so that the rate where that branch begins stands for the
-    whole world's. With `seeds`, on which what is left shows f, it claims what chosen runs of the search show, and asks for no rate.
+    Its terms are those of `CertificateStarted`, and `first_run` is the number of its first run. `claims` are empty while its tests
+    are made. `past`: a search began since. `branch`: the environment is in a branch whose f is another failure, so that the rate
+    where that branch begins stands for the whole world's.
     """
 
     number: int
@@ -122,14 +130,11 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One claim of a certificate: about what is left, or, if `without` is a model, about that without it.
+    """One claim of a certificate, as in `ClaimMade`: about what is left, or, if `without` is a model, about that without it.
 
     `verdict`: what is left is "kept" (it keeps the rate), "lost", or "exact" (its rate was only measured); a model is "needed"
     (without it f is rare enough), "helps" (f is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide,
-    "unknown" if they broke. `shown` of `runs` showed f; `outcomes` has the number of each outcome. `low`..`high` is the 95 %
-    interval of the rate, 0..1 without runs. What is left keeps at least `bound` of the rate; without a model f shows at most
-    `bound` times as often as with it. None is not known.
-    A claim that `is_exact` is about these runs of the search, and about no rate.
+    "unknown" if they broke. A claim that `is_exact` is about these runs of the search, and about no rate.
     """
 
     without: str | None
@@ -185,8 +190,7 @@ class Returned:
     """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back.
 
     `verdict`: the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not
-    decide, "unknown" if they broke. The robot reached its goal in `reached` of `runs`; `low`..`high` is the 95 % interval of that
-    rate, 0..1 without runs, or both are its share where the claim is about chosen runs.
+    decide, "unknown" if they broke.
     """
 
     back: str | None
@@ -207,29 +211,14 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Isolation:
-    """A search for the fewest models that have to go from the whole world so that the robot reaches its goal.
+    """A search for the fewest models that have to go from the whole world so that the robot reaches its goal, as it was `asked`.
 
-    It passes if it reaches it at the rate `wanted` rather than at `rather_than`; of a world with a model put back, the rate has to
-    fall below `keep_rate` of what it is without it. All claims are wrong with a probability of at most `error`. `first_run` is the
-    number of the first run with a fresh seed; each check has `block` of them. The `suspects` are removed first to last, at first
-    `size` of them: what the reduction left. `before` is why the reduction had ended.
     `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: the last word is
     spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: the user
-    gave it up, or ended it by another decision. With `chosen` runs a world passes if each of these does, and no rate is asked for.
+    gave it up, or ended it by another decision.
     """
 
-    number: int
-    first_run: int
-    block: int
-    wanted: float
-    rather_than: float
-    keep_rate: float
-    error: float
-    at_least: int
-    suspects: tuple[str, ...]
-    size: int
-    before: str
-    chosen: tuple[int, ...] = ()
+    asked: IsolationStarted
     checks: tuple[Check, ...] = ()
     ended: bool = False
     found: int | None = None

@@ -21,6 +21,7 @@ from ddenv.runfile.progress import (
     Point,
     Refusal,
     Removal,
+    path,
 )
 
 # The first of each two models rests on the second, or is tied to it.
@@ -54,33 +55,21 @@ class RunState:
     failed     the engine could not continue: `reason` says why
 
     `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`;
-    `fresh` are the ids of its tests. `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the
-    number of the current one; the run came to it when `came_at` tests were finished. `environments` are all that were named;
-    tests, nodes and tries have their numbers. `leg` is the current search; once `search_due`, a new one has to begin. `judged` are
-    the tests that verdicts rest on, in their order. `refused` environments are not taken because the user said so, `lost` ones with
-    all of their parts because they lost the rate of f, each beside the failures that counted as f then: the search went so many
-    `steps_back`, and leaves out the groups `again` first in the next leg.
-    `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
-    as f in the current node.
-    `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
-    `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
-    `settling`; `unsettled` says why it could not be found. `welds` has (model, other) where the files weld a model to another:
-    these always stay or go together. `ties` has (model, other)
-    where a model is tied to another; None if that is unknown. Of the tests, `implied` ones were not simulated, and
-    `audits` were although they were implied. Tests up to `mixed_until` were computed with something else, and imply nothing now.
-    If one of these, the first of `refuted`, did not repeat the second, slices are no
-    longer used.
-    `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world.
-    `margins` say how far numbers may change. `ahead` tests
-    were made ahead of time and are not needed so far; decisions rest on those with the bits 1 << id of `rests_on`. `engines` counts
-    the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one makes them again.
-    `notes` say what is wrong with the whole world: a word and a sentence each.
-    `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
-    with the machine, compared with what the tests were made with.
-    `refusal` is the last command that the engine could not obey, with the reason.
-    `tally` counts the tests by outcome. `needs_room` is how many bytes
-    have to be free on the disk before more tests start, 0 if there is room. `working_seconds` is the time that ended engines
-    have worked, s; `started_at` (Unix time, s) is set while one works.
+    `fresh` are the ids of its tests. The run came to `node` when `came_at` tests were finished. Once `search_due`, a new `leg` has
+    to begin. `judged` are the tests that verdicts rest on, in their order. `refused` environments are not taken because the user
+    said so, `lost` ones with all of their parts because they lost the rate of f, each beside the failures that counted as f then:
+    the search went so many `steps_back`, and leaves out the groups `again` first in the next leg. The ends of the tests in
+    `failures` count as f in the current node. `lower_bound` is the minimum number of models needed, if f shows wherever everything
+    it needs is present.
+    `supports`, `welds` and `ties` have (model, other): it rests on the other once the whole world has settled (found while
+    `settling`; `unsettled` says why it could not be), is welded to it by the files, or tied to it; `ties` are None if unknown.
+    Of the tests, `implied` ones were not simulated, `audits` were although they were implied, and `ahead` are not needed so far;
+    decisions rest on those with the bits 1 << id of `rests_on`. Those up to `mixed_until` were computed with something else, and
+    imply nothing now. If one of these, the first of `refuted`, did not repeat the second, slices are no longer used.
+    `engines` counts the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one
+    makes them again. `notes` say what is wrong with the whole world: a word and a sentence each. `refusal` is the last command
+    that the engine could not obey, with the reason. `needs_room` is how many bytes have to be free on the disk before more tests
+    start. `working_seconds` is the time that ended engines have worked; `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
@@ -215,11 +204,7 @@ class RunState:
     @property
     def path(self) -> tuple[Node, ...]:
         """The nodes from the whole world to the current one."""
-        path, node = [], self.here
-        while node is not None:
-            path.append(node)
-            node = None if node.parent is None else self.nodes[node.parent]
-        return tuple(reversed(path))
+        return path(self.nodes, self.node)
 
     @property
     def finished_tests(self) -> tuple[Test, ...]:
@@ -422,15 +407,11 @@ class Trial:
 class Test:
     """Run number `run` of environment number `environment`, with its seed.
 
-    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
-    "hand" (for the user's trial number `trial`), "audit" (of a slice), "certify" (with a fresh seed, of what is left, of the whole
-    world, or of what is left without the model `without`) or "isolate" (of the whole world after removal number `removal`). `node`
-    was the current one; for a fresh run it is the last one on the way there with its environment. In a round, a `run` above 0 is a
-    re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it
-    ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or
-    touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `took_part` are
-    the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that test implies it;
-    `audits`: it was, although that test implies it. `taken`: its result was copied from another run. `engine` made it, from 1.
+    What an event says of it is as in `TestStarted` and `TestFinished`. `outcome` is "running" until it ends; a baseline run that
+    failed is "failed" until f is fixed. `node` was the current one; for a fresh run it is the last one on the way there with its
+    environment. In a round, a `run` above 0 is a re-run (deflaking). `removal` is the number of the removal in whose world it ran.
+    `implied_by`: it was not simulated, since that test implies it; `audits`: it was, although that test implies it. `taken`: its
+    result was copied from another run. `engine` made it, from 1.
     """
 
     id: int

@@ -6,7 +6,6 @@ are text, event data is JSON, trajectories are rows of little-endian float64.
 
 from __future__ import annotations
 
-import gc
 import json
 import math
 import os
@@ -22,9 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import KINDS, NAMES, Created, Event, Implied, TestFinished
+from ddenv.runfile.events import KINDS, NAMES, Created, Event, Implied, Pose, TestFinished
 from ddenv.runfile.lock import engine_lock
-from ddenv.runfile.reading import LARGEST, Invalid, number, plain, read, vector
+from ddenv.runfile.reading import LARGEST, Invalid, Real, plain, read
 
 APPLICATION_ID = 0x64644531
 # The format of the file. Those before the oldest one are refused; 8 has the bounds of certificates.
@@ -146,18 +145,6 @@ class NoRoom(UserError):
     """The disk takes no more: what was to be written is not there, and nothing else has changed."""
 
 
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Does not look for garbage while many events are read: all that is made of them stays."""
-    looks = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if looks:
-            gc.enable()
-
-
 class RunFile:
     """An open run file. Raises UserError for a file that is missing, not a run file, or of another format.
 
@@ -228,8 +215,7 @@ class RunFile:
 
     def events(self, after: int = 0, most: int = -1) -> list[Recorded]:
         """All events with an id above `after`, in order; at most `most` unless that is negative. Raises UserError."""
-        with uncollected():
-            return list(self.read(after, most))
+        return list(self.read(after, most))
 
     def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
         """The same, one after the other, so that those before a damaged one can be used."""
@@ -283,11 +269,14 @@ class RunFile:
 
     def live(self) -> list[Live]:
         """The running tests, by worker slot."""
-        rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
-        try:
-            return [Live(int(slot), int(test), number(at), *_poses(json.loads(text))) for slot, test, at, text in rows]
-        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, KeyError):
-            raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
+        found = []
+        for slot, test, at, text in self._all("SELECT slot, test, time, pose FROM live ORDER BY slot"):
+            try:
+                number, time, poses = read(tuple[int, Real, dict[str, Pose]], f"[{test}, {at}, {text}]")
+                found.append(Live(slot, number, time, poses.pop(ROBOT), poses))
+            except (Invalid, KeyError):
+                raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
+        return found
 
     # The methods below are for the engine alone.
 
@@ -389,8 +378,9 @@ def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
         if kind not in KINDS:
             raise Invalid(f"is of an unknown kind {str(kind)[:40]!a}")
         if command is not None and (type(command) is not int or not 0 <= command <= LARGEST):
-            raise Invalid("command: expected a whole number")
-        return Recorded(int(id), _moment(at), read(KINDS[kind], content), command)
+            raise Invalid("command: should be a whole number")
+        event = read(KINDS[kind], data if command is None else json.dumps(content))
+        return Recorded(int(id), _moment(at), event, command)
     except Invalid as invalid:
         named = f" ({kind})" if kind in KINDS else ""
         raise UserError(f"damaged run file: event {id}{named}: {invalid}") from None
@@ -418,12 +408,6 @@ def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any],
     cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (at, kind, text))
     assert cursor.lastrowid is not None
     return cursor.lastrowid
-
-
-def _poses(stored: Any) -> tuple[tuple[float, ...], dict[str, tuple[float, ...]]]:
-    """The robot's pose, and those of models."""
-    poses = {str(name): vector(pose) for name, pose in stored.items()}
-    return poses.pop(ROBOT), poses
 
 
 def _identity(path: Path) -> tuple[int, int]:

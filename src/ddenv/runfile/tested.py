@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ddenv.runfile.events import CandidateJudged, Implied, OfCandidate, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import CERTIFY, Candidate, RunState, Test, Trial
@@ -31,8 +33,21 @@ def purpose(state: RunState, test: Test) -> str:
     return "baseline"
 
 
-def made_for(state: RunState, test: Test) -> Candidate | Trial | None:
-    """The candidate of the current round, or the try, that a test was made for."""
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a viewer wants the scene to show: the moment of the event `at`, None for the present, and a row of the table then.
+
+    A candidate is one of round number `round`; without one, and without a try, the scene follows the run.
+    """
+
+    at: int | None = None
+    round: int | None = None
+    candidate: int | None = None
+    trial: int | None = None
+
+
+def made_for(state: RunState, test: Test | Wanted) -> Candidate | Trial | None:
+    """The candidate of the current round, or the try, that a test was made for, or that is wanted."""
     if test.trial is not None:
         return state.trials[test.trial - 1] if 0 < test.trial <= len(state.trials) else None
     current = state.round

@@ -6,15 +6,22 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ddenv.errors import UserError
 from ddenv.runfile.events import Created
+from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.clusters import check_cluster
+from ddenv.runs.export import renamed
 from ddenv.runs.folder import run_path
-from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts, scenario_named
-from ddenv.runs.trust import check_named, trust_cluster
+from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, named, read_parts, scenario_named
+from ddenv.runs.trust import check_named, trust_cluster, trusted_scenario
 from ddenv.world.access import check_ending, is_world, read_bytes
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_world
+from ddenv.world.whole import whole_of
+from ddenv.world.write import without
 
 
 def create_named(
@@ -29,6 +36,11 @@ def create_named(
 
     `asks` whether what it starts is trusted. `name` and `output` as for `run_path`. Raises UserError, with nothing written.
     """
+    if given.get("inside") and (of_run := named(subject)) is not None and of_run[0] == "run":
+        with RunFile(of_run[1]) as file:
+            scenario = trusted_scenario(file, asks, given["cluster"])
+        path = run_path(f"{scenario.name}-inside", name, output)
+        return path, create_inside(of_run[1], path)
     scenario = scenario_named(subject, given, announce)
     if output is not None and is_world(output):
         check_ending(output, scenario.world)
@@ -36,16 +48,13 @@ def create_named(
         trust_cluster(scenario)
     check_named(scenario, subject, asks)
     path = run_path(scenario.name, name, output)
-    return path, create_run(scenario, path, announce)
+    return path, create_run(scenario, path)
 
 
-def create_run(scenario: Scenario, path: Path, announce: Announce | None = None) -> World:
-    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written.
-
-    Calls `announce` with a line of text before slow steps.
-    """
+def create_run(scenario: Scenario, path: Path) -> World:
+    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written."""
     check_cluster(scenario.reduction.cluster)
-    world, _ = load_parts(scenario, announce)
+    world, _ = load_parts(scenario)
     documents = {"world": world.text, "robot": read_bytes(scenario.robot.model)}
     documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
     _write(scenario, world, path, documents)
@@ -64,6 +73,31 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
         documents |= {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
     check_parts(scenario, world, robot)
     _write(scenario, world, path, documents)
+
+
+def create_inside(run: Path, path: Path) -> World:
+    """Writes a new run file at `path` with what is left of `run`, whose models are opened into their parts; returns its world.
+
+    Raises UserError, with nothing written.
+    """
+    with RunFile(run) as file:
+        scenario, whole, robot = read_parts(file)
+        state, documents, stored = fold(file.events()), file.documents(""), Resources(file.documents(RESOURCE))
+    if scenario.reading.inside:
+        raise UserError(f"{run}: is a reduction inside models already")
+    removed = frozenset(state.elements) - frozenset(state.environment)
+    documents["world"] = without(whole, removed)
+    reading = scenario.reading.model_copy(update={"inside": True})
+    world = parse_world(documents["world"], scenario.world, reading, stored)
+    update = {
+        "reading": reading,
+        "whole": whole_of(whole, scenario),
+        "protected": renamed(scenario.protected, whole, removed, world),
+    }
+    scenario = scenario.model_copy(update=update)
+    check_parts(scenario, world, robot)
+    _write(scenario, world, path, documents)
+    return world
 
 
 def _write(scenario: Scenario, world: World, path: Path, documents: dict[str, bytes]) -> None:

@@ -67,7 +67,8 @@ def export_world(
         raise UserError(f"{run}: damaged run file: its world has {error}") from None
     write_file(sdf, text)
     asked = Resources(documents)
-    minimal = parse_world(text, scenario.world, scenario.reading, asked)
+    # What is left of a model is a whole model there.
+    minimal = parse_world(text, scenario.world, scenario.reading.model_copy(update={"inside": False}), asked)
     needs = list(dict.fromkeys(uri for uri, base in asked.asked if base == scenario.world.parent))
     if scenario_file is None:
         return Exported([sdf], needs)
@@ -78,9 +79,10 @@ def export_world(
     data = keys_in(folder, scenario)
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
     data["whole"] = whole_of(world, scenario).model_dump(mode="json")
-    data["protected"] = _renamed(scenario.protected, world, removed, minimal)
+    data["protected"] = renamed(scenario.protected, world, removed, minimal)
     needed = (*_folders(scenario, asked, robot, documents), *_packages(scenario.robot.model, robot))
     model_path = (*scenario.reading.model_path, *needed)
+    data["reading"]["inside"] = False
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
     return Exported([sdf, model, scenario_file], needs)
@@ -134,11 +136,13 @@ def _packages(file: Path, robot: bytes) -> list[Path]:
     return [folder for folder in around if f"package://{folder.name}/".encode() in robot]
 
 
-def _renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> list[str]:
-    """The names of protected models in the minimal world, where copies of one name are numbered anew."""
-    kept = [model.name for model in world.models if model.name not in removed]
-    names = dict(zip(kept, (model.name for model in minimal.models), strict=True))
-    return [names[name] for name in protected]
+def renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> tuple[str, ...]:
+    """The names of protected models in the minimal world, where copies of one name are numbered anew; a part's is its model's."""
+    wholes = {model.name: model.inside or model.name for model in world.models}
+    kept = dict.fromkeys(whole for name, whole in wholes.items() if name not in removed)
+    now = dict.fromkeys(model.inside or model.name for model in minimal.models)
+    names = dict(zip(kept, now, strict=True))
+    return tuple(dict.fromkeys(names[wholes.get(name, name)] for name in protected))
 
 
 def _folders(scenario: Scenario, asked: Resources, robot: bytes, documents: Mapping[str, bytes]) -> list[Path]:

@@ -1,34 +1,19 @@
-"""The nearest world that passes, beside the whole world that fails: in words, and as two runs with one seed from where they part.
+"""The nearest world that passes, beside the whole world that fails.
 
 `nearest(file, state)` is all that a view shows of it; `state.isolated` has the numbers alone, without a trajectory.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_nearest
 from ddenv.runfile.state import RunState, Test
-from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_words
 from ddenv.text import first_of
 from ddenv.words.claims import of_passing
-
-# Instants at which the two runs are compared, from where they part to the end of the shorter one.
-INSTANTS = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Instant:
-    """Where the robots of two runs are after `seconds`, x and y, m, and how far from each other, m."""
-
-    seconds: float
-    failing: tuple[float, float]
-    passing: tuple[float, float]
-    apart: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +23,6 @@ class Nearest:
     `words` say what fresh runs show of it, in one sentence. `shown`: they show that it passes, and that it does not with any one of
     `gone` put back. `parting` compares a run of the whole world, `with_test`, with one without `gone`; None where no pair of runs
     with one seed shows it; `lacks` says why, if the run file does not have what it takes. `first` of `gone` took part first there.
-    `instants` are side by side from where the runs part.
     """
 
     gone: tuple[str, ...]
@@ -46,7 +30,6 @@ class Nearest:
     shown: bool
     parting: Parting | None = None
     first: str = ""
-    instants: tuple[Instant, ...] = ()
     lacks: str = ""
 
     @property
@@ -67,8 +50,7 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
         return Nearest((), words, shown)
     gone = state.removals[one.found - 1].models
     parting, first, lacks = parting_of(file, _pair(state, one.found), gone)
-    instants = () if parting is None else tuple(_side_by_side(file, parting))
-    return Nearest(gone, words, shown, parting, first, instants, lacks)
+    return Nearest(gone, words, shown, parting, first, lacks)
 
 
 def _pair(state: RunState, found: int) -> tuple[Test, Test] | None:
@@ -78,19 +60,6 @@ def _pair(state: RunState, found: int) -> tuple[Test, Test] | None:
     failing = [test for test in whole if test.outcome in (F, "other")]
     chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
     return None if chosen is None else (chosen, passing[chosen.run])
-
-
-def _side_by_side(file: RunFile, parting: Parting) -> Iterable[Instant]:
-    """`INSTANTS` of both runs, evenly from where they part to the end of the shorter one."""
-    first, second = file.trajectory(parting.with_test), file.trajectory(parting.without_test)
-    rows = min(len(first), len(second)) // COLUMNS
-    start = next((row for row in range(rows) if first[row * COLUMNS] >= parting.equal), None)
-    if start is None:
-        return
-    for row in sorted({start + (rows - 1 - start) * number // (INSTANTS - 1) for number in range(INSTANTS)}):
-        seconds, x, y = first[row * COLUMNS : row * COLUMNS + 3]
-        other = second[row * COLUMNS + 1], second[row * COLUMNS + 2]
-        yield Instant(seconds, (x, y), other, math.dist((x, y), other))
 
 
 def removed_in_passing(state: RunState, where: object) -> tuple[str, ...]:

@@ -110,8 +110,8 @@ def last_words(run: Path) -> str:
 def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
     """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
 
-    It shows what its standard input asks for (`ddenv.runs.wanted`), and ends with its parent. An empty first line means that it
-    could not start; its log says why.
+    It shows what its standard input asks for (`Wanted`), and ends with its parent. An empty first line means that it could not
+    start; its log says why.
     """
     words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port), "--pointed"]
     try:

@@ -30,8 +30,6 @@ DOES = {
 }
 # Runs that end within this distance of one place end near it, m.
 NEAR = 0.5
-# A robot that ends so much lower or higher than in f, m, stands on something else.
-LEVEL = 0.25
 # Two runs have visibly parted when the robots are this far from each other, m.
 APART = 0.1
 
@@ -40,8 +38,7 @@ APART = 0.1
 class End:
     """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
 
-    None of them ended farther than `reach`, m, from there. They ended so far `away` from f's end, and `above` it, m (medians;
-    negative: below it).
+    None of them ended farther than `reach`, m, from there. They ended so far `away` from f's end, m (median).
     `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
     """
 
@@ -49,7 +46,6 @@ class End:
     number: int
     seconds: float
     place: tuple[float, float]
-    above: float = 0.0
     reach: float = 0.0
     away: float = math.nan
 
@@ -113,7 +109,7 @@ def no_reasons(certificate: Certificate) -> str:
 def _reason(
     file: RunFile, state: RunState, certificate: Certificate, name: str, mine: Sequence[Test], left: dict[int, Test]
 ) -> Reason:
-    ends = _ends(mine, math.nan if state.f_position is None else state.f_position[2])
+    ends = _ends(mine)
     gone = tuple(stack_with(state, state.nodes[certificate.node].environment, name))
     # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
     shown = next((end.kind for end in ends if end.kind != F), None)
@@ -126,21 +122,19 @@ def _kind(test: Test) -> str:
     return test.outcome if test.outcome in (F, GOAL) else test.failure
 
 
-def _ends(tests: Sequence[Test], height: float) -> tuple[End, ...]:
-    """The ends of tests, where f's end is at `height`, m."""
+def _ends(tests: Sequence[Test]) -> tuple[End, ...]:
     kinds: dict[str, list[Test]] = {}
     for test in tests:
         kinds.setdefault(_kind(test), []).append(test)
-    return tuple(sorted((_end(kind, them, height) for kind, them in kinds.items()), key=lambda end: -end.number))
+    return tuple(sorted((_end(kind, them) for kind, them in kinds.items()), key=lambda end: -end.number))
 
 
-def _end(kind: str, tests: Sequence[Test], height: float) -> End:
-    places = [test.end_pose for test in tests if test.end_pose is not None] or [(math.nan, math.nan, math.nan)]
-    x, y, z = (median(place[axis] for place in places) for axis in range(3))
-    above = 0.0 if math.isnan(z - height) else z - height
-    reach = max(math.dist((x, y), place[:2]) for place in places)
+def _end(kind: str, tests: Sequence[Test]) -> End:
+    places = [test.end_pose[:2] for test in tests if test.end_pose is not None] or [(math.nan, math.nan)]
+    x, y = (median(place[axis] for place in places) for axis in range(2))
+    reach = max(math.dist((x, y), place) for place in places)
     away = median([test.distance for test in tests if test.distance is not None] or [math.nan])
-    return End(kind, len(tests), median(test.simulated_seconds for test in tests), (x, y), above, reach, away)
+    return End(kind, len(tests), median(test.simulated_seconds for test in tests), (x, y), reach, away)
 
 
 def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]) -> tuple[Parting | None, str, str]:
@@ -194,12 +188,10 @@ def _does(end: End) -> str:
         return f"reaches its goal after {end.seconds:.0f} s"
     if end.kind == F:
         return "still fails as in f"
-    height = f", {abs(end.above):.1f} m {'higher' if end.above > 0 else 'lower'} than in f"
-    level = "" if abs(end.above) < LEVEL else height
     # Rounded up: no run ends farther away than is said.
     near = "near" if end.reach <= NEAR else f"at most {math.ceil(10 * end.reach) / 10:.1f} m from"
     away = "elsewhere" if math.isnan(end.away) else f"{end.away:.1f} m from f's end"
-    return f"{DOES.get(end.kind, 'fails')} {away}, {near} {_point(end.place)}{level}"
+    return f"{DOES.get(end.kind, 'fails')} {away}, {near} {_point(end.place)}"
 
 
 def _point(place: tuple[float, float]) -> str:

@@ -33,7 +33,7 @@ SCENARIO_FILES = (".yaml", ".yml")
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
-READING = ("model_path", "stand_in", "ignore")
+READING = ("model_path", "stand_in", "ignore", "inside")
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,15 @@ class Subject:
 def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
     """What `name` stands for: a run if there is one of that name, else a scenario or a world with the options `given`.
 
-    Calls `announce` with a line before slow steps. Raises UserError.
+    `announce` gets a line on what is remembered. Raises UserError.
     """
     kind, path = named(name) or ("scenario", Path(name))
     if kind != "run":
         scenario = scenario_named(name, given, announce)
-        return Subject(scenario, *load_parts(scenario, announce))
+        return Subject(scenario, *load_parts(scenario))
     if any(value is not None and value != () for option, value in given.items() if option != "remembered"):
         raise UserError(
-            "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore are only for scenarios; "
+            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
             "a run keeps its own"
         )
     with RunFile(path) as file:
@@ -102,13 +102,13 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     """
     others = dict(given)
     remembered = others.pop("remembered", False)
-    reading = {option: others.pop(option) for option in READING}
+    reading = {option: others.pop(option) for option in READING if option in others}
     spawn, goal = given["spawn"], given["goal"]
     if not is_world(Path(name)):
         scenario = load_scenario(find_scenario(name))
     elif spawn is None or goal is None:
         # A file that is no world needs no places either.
-        read_world(Path(name), reading_of(**reading), announce)
+        read_world(Path(name), reading_of(**reading))
         example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
         raise UserError(f"{name}: a world needs a start and a goal, such as {example}")
     elif given["world"] is not None:
@@ -126,15 +126,17 @@ def reading_of(
     model_path: Sequence[Path] = (),
     stand_in: Sequence[str] = (),
     ignore: Sequence[Ignorable] = (),
+    inside: bool | None = None,
 ) -> Reading:
-    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`) and ignored kinds of elements. Raises UserError."""
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements and `inside`. Raises UserError."""
     for folder in model_path:
         if not folder.is_dir():
             raise UserError(f"--model-path: there is no folder {folder}")
     folders = (*(folder.resolve() for folder in model_path), *reading.model_path)
     stand_ins = reading.stand_ins | dict(parse_option(option) for option in stand_in)
     ignored = dict.fromkeys((*reading.ignore, *ignore))
-    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored))
+    within = reading.inside or bool(inside)
+    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored), inside=within)
 
 
 def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
@@ -196,16 +198,16 @@ def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, 
     return data
 
 
-def load_parts(scenario: Scenario, announce: Announce | None = None) -> tuple[World, Model]:
+def load_parts(scenario: Scenario) -> tuple[World, Model]:
     """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
 
-    Calls `announce` with a line before slow steps. Raises UserError.
+    Raises UserError.
     """
     if scenario.oracle is not None:
         command_words(scenario)
     reading, robot_file = scenario.reading, scenario.robot.model
-    world = read_world(scenario.world, reading, announce)
-    around_robot = disk_of(robot_file, reading, announce)
+    world = read_world(scenario.world, reading)
+    around_robot = disk_of(robot_file, reading)
     robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
     world = replace(world, resources={**world.resources, **around_robot.taken})
     check_parts(scenario, world, robot)
@@ -214,12 +216,15 @@ def load_parts(scenario: Scenario, announce: Announce | None = None) -> tuple[Wo
 
 def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     """Whether a scenario fits its world and its robot. Raises UserError."""
-    known = {model.name for model in world.models}
+    known = {name for model in world.models for name in (model.name, model.inside)}
     for name in scenario.protected:
         if name not in known:
             raise UserError(f"protected: the world {scenario.world} has no model '{name}'")
     if not world.elements(frozenset(scenario.protected)):
         raise UserError(f"{scenario.world}: has no model that can be removed")
+    if scenario.reading.inside and not any(model.inside for model in world.models):
+        why = next((note.why for note in world.notes if note.what == "--inside"), "each has one collision at most")
+        raise UserError(f"{scenario.world}: --inside: no model has parts that can be removed: {why}")
     check_spawn(world, robot, scenario.robot.spawn)
 
 

@@ -9,8 +9,7 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from ddenv.evidence.certificate import RUNS_BESIDE
-from ddenv.evidence.certificate_cost import certificate_tests
+from ddenv.evidence.certificate import RUNS_BESIDE, certificate_tests
 from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
@@ -37,9 +36,8 @@ RARER, LEAST_RATE = 1.5, 0.02
 # How many models are left, if nothing is known.
 SURVIVORS = 3
 # How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the rubble 27 to 34 of 36, among 5,000
-# models 31. After that, a test of the search takes so much of the time of a run of the whole world: 0.3 in the rubble, 0.5 in
-# friction, 0.8 in the ditch, where no model moves. A third of a certificate's runs are of the whole world.
-TOOK_PART, SHARE, OF_WHOLE = (5, 20, 35), (0.25, 0.4, 0.6), 0.35
+# models 31.
+TOOK_PART = (5, 20, 35)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +78,10 @@ def left_said(state: RunState, at_work: bool) -> tuple[str, ...]:
 
 
 def _is_overdue(state: RunState) -> bool:
-    """Whether the search takes more tests than were foretold."""
-    forecast = state.forecast
+    """Whether the search, or the certificate, takes more tests than were foretold."""
+    forecast, now = state.forecast, in_the_making(state)
+    if now is not None:
+        return fresh_runs_made(state, now) >= expected_fresh_runs(state, now)[-1]
     searches = not (state.ended or state.confirming or state.isolating is not None)
     return searches and forecast is not None and state.tests_done - forecast.tests_done >= forecast.tests[-1]
 
@@ -92,14 +92,12 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         return None
     if state.confirming:
         now = in_the_making(state)
-        if now is None:
+        if now is None or _is_overdue(state):
             return None
         (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
         return low - done, likely - done, high - done
     forecast, baseline = state.forecast, state.baseline
-    if forecast is None or baseline is None:
-        return None
-    if _is_overdue(state):
+    if forecast is None or baseline is None or _is_overdue(state):
         return None
     done = state.tests_done - forecast.tests_done
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
@@ -121,44 +119,34 @@ def _seconds_of_a_test(state: RunState) -> float | None:
     return sum(times) / len(times) / (1 + BUSY * (max(1, state.jobs) - 1)) if times else None
 
 
-def rough_tests(models: int, algorithm: str, runs: int, as_printed: bool = False) -> tuple[int, int, int]:
-    """Tests of a search in this number of `models`, as (low, likely, high), without the baseline, for an unknown world.
-
-    A candidate without f takes `runs` tests.
+def search_tests(models: int, asked: Reduction, rate: float | None = None) -> tuple[int, int, int]:
+    """Tests of a search in this number of `models`, as (low, likely, high), for an unknown world in which f shows at `rate`, by
+    default always. For every round the engine writes them as its forecast.
     """
-    key = "ddenv as printed" if algorithm == "ddenv" and as_printed else algorithm
+    runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
+        asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
+    )
+    key = "ddenv as printed" if asked.algorithm == "ddenv" and asked.growth == "paper" else asked.algorithm
     factor, power = SCALE.get(key, SCALE["ddenv"])
     likely = factor * models**power * (1 + RERUN * (runs - 1))
     # A few models make few different candidates.
     likely = min(likely, models**1.5 * runs)
+    if asked.accept_rate == "kept" and rate is not None:
+        likely *= max(rate, LEAST_RATE) ** -RARER
     return math.floor(FEWER * likely), round(likely), math.ceil(MORE * likely)
 
 
 @dataclass(frozen=True, slots=True)
 class Rough:
-    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`.
-
-    `share`: how long a test of the search takes, as a share of a run of the whole world.
-    """
+    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`."""
 
     baseline: int
     search: tuple[int, int, int]
     certificate: tuple[int, int, int]
-    share: tuple[float, float, float]
 
     @property
     def tests(self) -> tuple[int, int, int]:
         low, likely, high = (self.baseline + sum(each) for each in zip(self.search, self.certificate, strict=True))
-        return low, likely, high
-
-    @property
-    def worlds(self) -> tuple[float, float, float]:
-        """As long as so many runs of the whole world. Some runs of the certificate are such runs, the others have few models."""
-        parts = zip(self.search, self.certificate, self.share, strict=True)
-        low, likely, high = (
-            self.baseline + search * share + certificate * (OF_WHOLE + (1.0 - OF_WHOLE) * share)
-            for search, certificate, share in parts
-        )
         return low, likely, high
 
 
@@ -167,23 +155,16 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
 
     With `slices`, and if they are asked for, only what took part in the baseline is searched. That has little to do with the size
     of the world: `TOOK_PART` is how many models these were in the bundled worlds of 25 to 43 models and in one of 5,000: few,
-    usual, many. Without slices every model is searched, and each test counts as long as one of the whole world.
+    usual, many. Without slices every model is searched.
     """
-    runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
-        asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
-    )
     slices = slices and asked.slice
     searched = [min(models, most) if slices else models for most in TOOK_PART]
-    few, usual, many = (rough_tests(each, asked.algorithm, runs, asked.growth == "paper") for each in searched)
     # Assumed without a word of earlier runs, the rate is taken as it is.
     seen = asked.baseline_runs
     if rate is None:
         rate, seen = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1), 0
+    few, usual, many = (search_tests(each, asked, rate) for each in searched)
     certificate = certificate_tests(rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
-    search = few[0], usual[1], many[2]
     if asked.accept_rate == "exact":
         certificate = (RUNS_BESIDE,) * 3
-    elif asked.accept_rate == "kept":
-        low, likely, high = (round(each * max(rate, LEAST_RATE) ** -RARER) for each in search)
-        search = low, likely, high
-    return Rough(asked.baseline_runs, search, certificate, SHARE if slices else (1.0, 1.0, 1.0))
+    return Rough(asked.baseline_runs, (few[0], usual[1], many[2]), certificate)

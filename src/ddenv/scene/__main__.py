@@ -11,12 +11,14 @@ import os
 import signal
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
 from ddenv.errors import UserError
+from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.store import RunFile
-from ddenv.runs.wanted import read
+from ddenv.runfile.tested import Wanted
 from ddenv.scene.player import Player
 from ddenv.scene.server import Server, last_address, remember
 from ddenv.scene.stage import Stage
@@ -76,9 +78,8 @@ def _point(player: Player, loop: asyncio.AbstractEventLoop) -> None:
     if not said:
         loop.remove_reader(sys.stdin.fileno())
         return
-    wanted = read(said.decode(errors="replace").splitlines()[-1])
-    if wanted is not None:
-        player.show(wanted)
+    with suppress(Invalid):
+        player.show(read(Wanted, said.decode(errors="replace").splitlines()[-1]))
 
 
 if __name__ == "__main__":

@@ -44,7 +44,6 @@ def _polar(distance: float, azimuth: float, elevation: float) -> Vector:
 
 
 def set_up(stage: Stage, view: View) -> None:
-    """Sets camera, light and background."""
     # The viewer's camera orbits the scene's origin, so the world is moved instead of the camera.
     x, y, z = view.center
     stage.move(WORLD, Pose((-x, -y, -z)))

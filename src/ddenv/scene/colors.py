@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from ddenv.world.model import Model
 
 Color = tuple[float, float, float, float]
 
-_BY_WORD: tuple[tuple[tuple[str, ...], Color], ...] = (
-    (("asphalt", "road", "street", "platform"), (0.30, 0.31, 0.33, 1.0)),
-    (("wood", "board", "plank", "pallet", "tile", "lumber"), (0.72, 0.53, 0.33, 1.0)),
-    (("grass", "tree", "bush", "plant"), (0.38, 0.55, 0.30, 1.0)),
-    (("brick", "cinder", "concrete", "block", "rock", "stone"), (0.58, 0.57, 0.55, 1.0)),
-    (("ice", "water", "wet"), (0.60, 0.78, 0.88, 1.0)),
-    (("patch", "friction"), (0.36, 0.50, 0.66, 1.0)),
-)
 STILL: Color = (0.62, 0.62, 0.64, 1.0)
 MOVABLE: Color = (0.76, 0.56, 0.34, 1.0)
 
@@ -34,20 +24,8 @@ SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
 
 
 def default_color(model: Model) -> Color:
-    """The colour for a word in the model's name, else for whether it can move."""
-    name = model.name.lower()
-    for words, color in _BY_WORD:
-        if any(word in name for word in words):
-            return color
+    """The colour for whether the model can move."""
     return STILL if model.static else MOVABLE
-
-
-def varied(color: Color, number: int) -> Color:
-    """`color` slightly brighter or darker, to distinguish neighbouring shapes of one colour."""
-    # The fractions of multiples of the golden ratio are evenly spread and never repeat.
-    factor = 0.92 + 0.16 * math.modf(number * 0.6180339887)[0]
-    red, green, blue = (min(1.0, part * factor) for part in color[:3])
-    return red, green, blue, color[3]
 
 
 def of_bytes(color: tuple[int, int, int]) -> Color:

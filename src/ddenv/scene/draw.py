@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 from meshcat.geometry import Object
@@ -17,8 +16,6 @@ from ddenv.scene.wheels import Wheels
 from ddenv.world.model import Model, Plane, World, is_ground
 from ddenv.world.pose import Pose, Vector
 
-# With more elements than this, those that never move are drawn together. A browser takes some 10 ms for each object of its own.
-MOST_SINGLE = 300
 WORLD: Path = ("world",)
 MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
 ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
@@ -47,37 +44,26 @@ def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
     return samples[:, 1:4] + (lowest + ABOVE) * up
 
 
-class Letter(NamedTuple):
-    """The letter of a partition over a model: its colour as in CSS, where it belongs, m, and what the browser calls the model.
-
-    `key` is empty where the model cannot move.
-    """
-
-    letter: str
-    color: str
-    x: float
-    y: float
-    z: float
-    key: str
+# The letter of a partition over a model: the letter, its colour as in CSS, where it belongs, x, y, z in m, and what the browser
+# calls the model, "" where it cannot move.
+Letter = tuple[str, str, float, float, float, str]
 
 
 class Scenery:
-    """The objects of one run. Every element is drawn once; a change of environment only shows and hides elements.
+    """The objects of one run: elements that can move one by one, all others together, anew for each environment.
 
-    In a large world those that never move are drawn together, anew for each environment.
+    A browser takes some 10 ms for each object of its own.
     """
 
     def __init__(self, stage: Stage, world: World, wheels: Wheels, elements: Iterable[str]) -> None:
         """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
         self._first = {model.name: model.links[0].pose for model in world.models}
-        # What the browser calls the elements that are drawn one by one.
+        # What the browser calls the elements that can move.
         self.keys: dict[str, str] = {}
         self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
-        self._movable = {model.name for model in world.models if not model.static and model.name in elements}
-        self._is_large = len(elements) > MOST_SINGLE
         # The surfaces of elements that are drawn together, and the edges of all elements.
         self._painted: dict[str, list[Surface]] = {}
         self._edges: dict[str, np.ndarray] = {}
@@ -103,19 +89,13 @@ class Scenery:
         return max(heights, default=0.0)
 
     def show(self, shot: Shot) -> None:
-        """Shows the environment of `shot`."""
         for name, key in self.keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
-            if not self._is_large:
-                self._stage.show((*LEFT_OUT, key), name in shot.left_out)
-                self._stage.show((*REMOVED, key), name in shot.removed)
         for path, thing in self._together(shot):
             self._stage.draw(path, thing, shadow=path[: len(MODELS)] == MODELS)
 
     def _together(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
-        """What shows the environment of `shot` in a large world; None where nothing is left to show."""
-        if not self._is_large:
-            return
+        """What shows the elements that never move, and the edges of those that are gone; None where nothing is left to show."""
         items = [item for name, items in self._painted.items() if name in shot.models for item in items]
         for name, solid in (("still", True), ("still clear", False)):
             some = [item for item in items if (item.alpha == 1) == solid]
@@ -164,21 +144,20 @@ class Scenery:
         for letter, color, names in groups:
             for name, (low, high) in [(name, box) for name in names if (box := self._boxes.get(name)) is not None]:
                 ends, (x, y), listed = edges_of(low, high), ((low + high) / 2)[:2], len(places) < MOST_LETTERS
-                key = self.keys[name] if listed and name in self._movable else ""
+                key = self.keys.get(name, "") if listed else ""
                 if key:
                     self._stage.draw((*PARTS, key), lines(ends, color), shadow=False)
                 else:
                     edges.setdefault(color, []).append(ends)
                 if listed:
                     css = f"#{colors.hexadecimal(color):06x}"
-                    places.append(Letter(letter, css, float(x), float(y), float(high[2]), key))
+                    places.append((letter, css, float(x), float(y), float(high[2]), key))
         # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
         for number, (color, all_ends) in enumerate(edges.items()):
             self._stage.draw((*PARTS, str(number)), lines(np.concatenate(all_ends), color), shadow=False)
         return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
-        """Draws the robot's path in the run that shows f."""
         tube = None if samples is None else _tube(path_on_ground(samples, self._lowest), colors.EVIDENCE)
         self._stage.draw(EVIDENCE, tube, shadow=False)
 
@@ -199,7 +178,7 @@ class Scenery:
         shape = merge(painted)
         if element and len(shape.vertices):
             self._edges[model.name] = outline(model, shape)
-        if self._is_large and element and model.static:
+        if element and model.static:
             self._painted[model.name] = painted
             return shape
         key = safe_name(number, model.name)
@@ -207,9 +186,6 @@ class Scenery:
             self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
         if element:
             self.keys[model.name] = key
-        if model.name in self._edges and not self._is_large:
-            for group, color in ((LEFT_OUT, colors.LEFT_OUT), (REMOVED, colors.REMOVED)):
-                self._stage.draw((*group, key), lines(self._edges[model.name], color), shadow=False)
         return shape
 
     def _draw_ground(self) -> None:

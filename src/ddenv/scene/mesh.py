@@ -42,7 +42,6 @@ class Surface:
         return replace(self, vertices=self.vertices @ pose.rotation().T + pose.position)
 
     def painted(self, color: Sequence[float]) -> Surface:
-        """This surface in one colour."""
         *tint, alpha = color
         return replace(self, tints=np.tile(tint, (len(self.vertices), 1)), alpha=alpha)
 
@@ -218,11 +217,10 @@ def paint(model: Model) -> list[Surface]:
     groups: dict[float, list[Surface]] = {}
     default = colors.default_color(model)
     shown: list[Visual | Collision] = [item for link in model.links for item in link.visuals or link.collisions]
-    vary = len(shown) > 20
-    for number, item in enumerate(shown):
+    for item in shown:
         color = (item.color if isinstance(item, Visual) else None) or default
         if not isinstance(item.shape, Plane):
-            surface = of_shape(item.shape).at(item.pose).painted(colors.varied(color, number) if vary else color)
+            surface = of_shape(item.shape).at(item.pose).painted(color)
             groups.setdefault(surface.alpha, []).append(surface)
     return [merge(parts) for alpha, parts in groups.items() if alpha > 0]
 

@@ -184,9 +184,9 @@ async function load(number, other = null) {
     if (turn !== asked) return;
     reset();
     [play, ghost, pair] = [first, second, other];
-    for (const [kind, group] of !own ? [] : [["models", "models"], ["leftOut", "left-out"], ["removed", "removed"]]) {
-      for (const others of Object.values(play.there)) for (const key of others) node(group, key).visible = false;
-      for (const key of play.there[kind]) node(group, key).visible = true;
+    if (own) {
+      for (const key of play.gone) node("models", key).visible = false;
+      for (const key of play.there) node("models", key).visible = true;
     }
     for (const gone of ["trail", "ghost-trail"]) viewer.scene_tree.find(["world"]).delete([gone]);
     for (const messages of [still, drawn, ghostly]) obey(messages);

@@ -16,11 +16,11 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
+from ddenv.runfile.tested import Wanted, made_for
 from ddenv.runs.nearest import nearest
 from ddenv.runs.playback import played
 from ddenv.runs.reasons import Parting, reasons
 from ddenv.runs.subject import read_parts
-from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
@@ -100,7 +100,6 @@ class Player:
             for name, rows in one.moving.items()
             if (key := scenery.keys.get(name)) is not None
         }
-        sets = {"models": shot.models, "leftOut": shot.left_out, "removed": shot.removed}
         return {
             "test": test,
             "title": shot.title,
@@ -109,9 +108,8 @@ class Player:
             "wheels": scenery.wheels.data(),
             "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
             "moving": moving,
-            "there": {
-                kind: [key for name in sorted(names) if (key := scenery.keys.get(name))] for kind, names in sets.items()
-            },
+            "there": [key for name in sorted(shot.models) if (key := scenery.keys.get(name))],
+            "gone": [key for name in sorted(shot.left_out | shot.removed) if (key := scenery.keys.get(name))],
             "lacks": " ".join(one.lacks),
         }
 
@@ -163,7 +161,7 @@ class Player:
         # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
         self._live = self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
         self._position.catch_up()
-        row = row_of(self._state, self._wanted)
+        row = made_for(self._state, self._wanted)
         idle = now - self._ran_at
         following = shot_of(self._state, row, self._live) if row else shot(self._state, self._live, self._shot, idle)
         if any(row.test == following.test for row in self._live):

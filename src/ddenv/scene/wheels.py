@@ -65,7 +65,6 @@ class Wheels:
         return np.zeros((len(rows), 2)) if self._drive is None else rolled(self._robot, self._drive, self._skid, rows)
 
     def data(self) -> list[dict[str, Any]]:
-        """The wheels for a browser."""
         return [{"key": each.key, "axis": list(each.axis), "side": each.side} for each in self.all]
 
     def _made(self, drive: Drive) -> Iterator[Wheel]:

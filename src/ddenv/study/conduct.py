@@ -12,10 +12,9 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from statistics import mean
-from typing import NamedTuple, TextIO
+from typing import TextIO
 
-from rich.cells import cell_len, set_cell_size
+from rich.cells import set_cell_size
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
@@ -26,29 +25,21 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
 from ddenv.runs.subject import load_parts
-from ddenv.runs.tests_left import remaining, rough_run
 from ddenv.study.folder import Session, machine, opened, sessions, versions, write_sessions
 from ddenv.study.plan import Cell, Plan, run_path
 from ddenv.study.results import difference, read_cell
 from ddenv.study.study_page import write_study
 from ddenv.text import count, duration, printable
 
-# The cost of a dynamic model in a test, relative to a static one: about what piles of boards cost when measured.
-MOVES = 4
-# Equal spans of time put most of a world into one part, which takes many rounds to split.
-SLOW = ("timeseg/", "trajectoryseg/")
 # With more workers for a cell, most of the additional tests are not needed.
 PER_CELL = 2
 POLL = 0.2
-# Time between two estimates of the time left, which are slow, and two records of the time so far, s: a killed study loses the time
-# since the last one.
-LOOK_PERIOD = 2.0
+# Time between two records of the time so far, s: a killed study loses the time since the last one.
+RECORD_PERIOD = 2.0
 # To the start of the line, and clears it.
 CLEAR = "\r\x1b[K"
 # Time between two lines of progress in logs and pipes, s.
 QUIET = 60.0
-# A shorter time left is not shown, s.
-LEAST = 5.0
 
 
 @dataclass
@@ -73,7 +64,6 @@ class Work:
         return _made(self.state) - _made(self.before)
 
     def catch_up(self) -> None:
-        """Reads the new events."""
         self.state = fold(self.file.events(self.state.revision), self.state)
 
     def has_ended(self) -> bool:
@@ -139,77 +129,20 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
     return Work(cell, path, workers, file, state, state, engine)
 
 
-class Size(NamedTuple):
-    """A scenario's world: how many models can be removed, and the cost of a test, in static models."""
-
-    models: int
-    cost: int
-
-
-def sizes(plan: Plan) -> dict[str, Size]:
-    """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
-    known: dict[str, Size] = {}
-    for scenario in plan.scenarios:
-        world, _ = load_parts(scenario)
-        elements = set(world.elements(frozenset(scenario.protected)))
-        moving = sum(not model.static for model in world.models if model.name in elements)
-        known[scenario.name] = Size(len(elements), len(elements) + MOVES * moving)
-    return known
-
-
-def seconds_left(
-    running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
-) -> float | None:
-    """Time until the last cell ends, s; None if unknown."""
-    tested = [work for work in (*running, *ended) if work.state.finished_tests]
-    alone: list[float] = []
-    for work in running:
-        left = remaining(work.state, True)
-        if left is None or left.seconds is None:
-            return None
-        alone.append(left.seconds[1] * max(1, work.state.jobs))
-    if waiting and not tested:
-        return None
-    rest = sum(_of_waiting(cell, tested, worlds) for cell in waiting)
-    return max((sum(alone) + rest) / jobs, *(time / work.workers for time, work in zip(alone, running, strict=True)), 0)
-
-
-def _of_waiting(cell: Cell, tested: Sequence[Work], worlds: dict[str, Size]) -> float:
-    """What one worker would need, s: the time of other cells of the scenario, or an estimate by the time of a test."""
-    same = [work for work in tested if work.cell.scenario.name == cell.scenario.name]
-    # Tests reused from another cell cost nothing.
-    over = [
-        sum(test.wall_seconds for test in work.state.finished_tests if not test.taken)
-        for work in same
-        if work.state.status == "finished"
-    ]
-    if over:
-        return mean(over)
-    size = worlds[cell.scenario.name]
-    a_test = mean(
-        mean(test.wall_seconds for test in work.state.finished_tests) * size.cost / worlds[work.cell.scenario.name].cost
-        for work in same or tested
-    )
-    return a_test * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
-
-
 class Runner:
     """One session of work on the study `plan` in `folder`: makes `cells` with `jobs` workers in all, and says and records how far
-    it is; those that take long should come first. Raises UserError if earlier sessions cannot be read.
+    it is. Raises UserError if earlier sessions cannot be read.
     """
 
-    def __init__(
-        self, plan: Plan, folder: Path, cells: Sequence[Cell], worlds: dict[str, Size], jobs: int, out: TextIO
-    ) -> None:
-        self._plan, self._folder, self._worlds, self._jobs = plan, folder, worlds, jobs
+    def __init__(self, plan: Plan, folder: Path, cells: Sequence[Cell], jobs: int, out: TextIO) -> None:
+        self._plan, self._folder, self._jobs = plan, folder, jobs
         self._waiting = list(cells)
         self.running: list[Work] = []
         self._ended: list[Work] = []
         self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
         self._earlier, self._session = sessions(folder), Session(time.time(), 0.0, jobs, 0, versions(), machine())
-        self._began = self._next_look = time.monotonic()
+        self._began = self._next_record = time.monotonic()
         self._next_line = self._began + QUIET
-        self._left: float | None = None
 
     def run(self) -> None:
         """Makes the cells.
@@ -243,7 +176,6 @@ class Runner:
             self._record()
 
     def _collect(self) -> None:
-        """Says what has ended."""
         for work in tuple(self.running):
             if work.has_ended():
                 self.running.remove(work)
@@ -255,12 +187,11 @@ class Runner:
     def look(self) -> None:
         """Says how far it is, and records it from time to time."""
         now = time.monotonic()
-        if now >= self._next_look:
-            self._left = seconds_left(self.running, self._waiting, self._ended, self._worlds, self._jobs)
+        if now >= self._next_record:
             self._record()
-            self._next_look = now + LOOK_PERIOD
+            self._next_record = now + RECORD_PERIOD
         if self._live:
-            line = self._now(shutil.get_terminal_size().columns - 1)
+            line = set_cell_size(self._now(), shutil.get_terminal_size().columns - 1).rstrip()
             print(f"{CLEAR}{printable(line)}", end="", file=self._out, flush=True)
         elif now >= self._next_line and self.running:
             self._next_line = now + QUIET
@@ -278,21 +209,10 @@ class Runner:
     def _say(self, line: str) -> None:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
 
-    def _now(self, columns: int = 200) -> str:
-        """The current state, as detailed as fits."""
-        if not self.running:
-            return ""
-        left = "" if self._left is None or self._left < LEAST else f" · about {duration(self._left)} left"
-        line = ""
-        for names in ([work.cell.label for work in self.running], [work.cell.scenario.name for work in self.running]):
-            doing = (f"{name}: {_doing(work)}" for name, work in zip(names, self.running, strict=True))
-            line = " · ".join((f"{self._share}{left}", *doing))
-            if cell_len(line) <= columns:
-                break
-        return set_cell_size(line, columns).rstrip()
+    def _now(self) -> str:
+        return " · ".join((self._share, *(f"{work.cell.label}: {_doing(work)}" for work in self.running)))
 
     def _ending(self, work: Work) -> str:
-        """How a cell ended, in one line."""
         if work.problem:
             return work.problem
         result = read_cell(self._folder, work.cell)
@@ -336,16 +256,16 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
 
     0 means that every cell is certified to be minimal, 1 that not all are, 130 that it was interrupted. Raises UserError.
     """
-    worlds, interrupted = sizes(plan), False
+    for scenario in plan.scenarios:
+        # A world or a robot that cannot be read is said before anything is made.
+        load_parts(scenario)
+    interrupted = False
     with opened(folder):
         done = {cell.name for cell in plan.cells if is_done(folder, cell)}
         cells = [cell for cell in plan.cells if cell.name not in done]
-        if jobs > PER_CELL:
-            # The cells that take longest come first.
-            cells.sort(key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW)))
         try:
             if cells:
-                Runner(plan, folder, cells, worlds, jobs, out).run()
+                Runner(plan, folder, cells, jobs, out).run()
         except KeyboardInterrupt:
             interrupted = True
         page, results = write_study(plan, folder, sessions(folder))

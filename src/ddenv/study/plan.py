@@ -49,7 +49,6 @@ class Method:
 
     @property
     def used(self) -> tuple[str, ...]:
-        """The names of the parts that it uses."""
         return tuple(filter(None, self.parts))
 
     @property
@@ -85,7 +84,6 @@ class Cell:
 
 
 def run_path(folder: Path, cell: Cell) -> Path:
-    """The run file of a cell."""
     return folder / RUNS / f"{cell.name}{SUFFIX}"
 
 

@@ -215,7 +215,6 @@ class Row:
 
     @property
     def paper(self) -> Paper | None:
-        """The paper's numbers for this method."""
         return paper_row(self.results[0].cell)
 
     @property

@@ -99,10 +99,8 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         ours, more = (duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES)
         yield say(
             f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
-            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, one test after another, and "
-            f"the certificates, which the paper does not have, {more}. The worlds follow the paper's descriptions but are not "
-            "its worlds, and the simulator differs: compare the methods with each other, and the minutes only roughly with the "
-            "paper's."
+            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, and the certificates {more}. "
+            "The worlds and the simulator differ from the paper's: compare the methods with each other."
         )
     if missing := len(results) - len(minimal):
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
@@ -187,7 +185,6 @@ def _row(folder: Path, result: Result) -> dict[str, object]:
 
 
 def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path) -> Section:
-    """The section on how the study was made."""
     # A name that begins with a dash would be an option.
     start = f"./{folder}" if str(folder).startswith("-") else folder
     example = shlex.quote(plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv"))

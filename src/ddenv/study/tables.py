@@ -6,7 +6,6 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from html import escape
-from operator import itemgetter
 from pathlib import Path
 from statistics import geometric_mean
 
@@ -123,13 +122,12 @@ def _map(folder: Path, result: Result, name: str) -> Block:
 
 
 def section(folder: Path, rows: Sequence[Row]) -> Section:
-    """The section on one scenario."""
     scenario = rows[0].scenario
     file, table = file_name(scenario), next((row.paper.table for row in rows if row.paper), "")
     title = plain(scenario.name) + (f", {count(models(rows), 'model')}" if models(rows) else "")
     title += f" (Table {table} of the paper)" if table else ""
     blocks: list[Block] = [say(plain(scenario.description))] if scenario.description else []
-    blocks += [numbers(rows), *_slices(rows), *_problems(rows)]
+    blocks += [numbers(rows), *_problems(rows)]
     if over(rows):
         caption = "Models left after each test of the search, a line for each method (the paper's Figure 2):"
         blocks += [behind(rows), say(caption), Picture(f"figure-2-{file}", chart(rows), caption)]
@@ -138,7 +136,6 @@ def section(folder: Path, rows: Sequence[Row]) -> Section:
 
 
 def _table(rows: Sequence[Sequence[tuple[str, Cell]]], right: Collection[int]) -> Table:
-    """A table of rows whose cells have titles."""
     head = tuple(title for title, _ in rows[0])
     return Table(head, tuple(tuple(cell for _, cell in row) for row in rows), right)
 
@@ -151,7 +148,6 @@ def numbers(rows: Sequence[Row]) -> Table:
 
 
 def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]:
-    """The titles and cells of a row."""
     results, paper = row.over, row.paper
     sliced = [result for result in row.sliced if result.certificate is not None]
     certified = f"{len(row.minimal)} of {len(row.results)}"
@@ -174,19 +170,6 @@ def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]
     if beside:
         yield "paper", str(paper.minutes) if paper else "–"
     yield "certificate minutes", spread([result.certificate_seconds / 60 for result in results], "{:.1f}".format)
-
-
-def _slices(rows: Sequence[Row]) -> Iterator[Paragraph]:
-    """What the cells with slices came to, beside those without."""
-    pairs = [pair for row in rows if row.sliced for pair in zip(row.results, row.sliced, strict=True)]
-    ended = [(without, sliced) for without, sliced in pairs if without.certificate and sliced.certificate]
-    if ended:
-        alike = sum(frozenset(without.left) == frozenset(sliced.left) for without, sliced in ended)
-        certified = sum(sliced.minimal for _, sliced in ended)
-        yield say(
-            f"With slices {alike} of {count(len(ended), 'cell')} end at the same models as without them, and {certified} are "
-            "certified."
-        )
 
 
 def _whole(value: float) -> str:
@@ -237,7 +220,6 @@ def _left(results: Sequence[Result]) -> Cell:
 
 
 def _problems(rows: Sequence[Row]) -> Iterator[Paragraph]:
-    """The cells that are not certified, and why."""
     cells = defaultdict[str, list[str]](list)
     for row in rows:
         for result in (*row.results, *row.sliced):
@@ -266,9 +248,8 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     for times, rows in sorted(methods, key=lambda method: method[0] or math.inf):
         cells = [_cell(row, least) for row, least in zip(rows, fewest, strict=True)]
         table.append((rows[0].method.label, *cells, "–" if times is None else f"{times:.1f}"))
-    words = [paragraph for rows in scenarios for paragraph in _words(rows)]
     ranking = Table(head, tuple(table), range(1, len(head)))
-    return Section("Which is best where", (*words, ranking, say(BOUNDS)))
+    return Section("Which is best where", (ranking, say(BOUNDS)))
 
 
 def _certain(row: Row) -> float | None:
@@ -294,16 +275,3 @@ def _bound(rows: Sequence[Row], which: int) -> str:
     """One of the bounds as a range, since cells may differ in how many models are left."""
     bounds = [result.bounds[which] for row in rows for result in row.minimal]
     return " to ".join(map(str, sorted({min(bounds), max(bounds)}))) if bounds else "–"
-
-
-def _words(rows: Sequence[Row]) -> Iterator[Paragraph]:
-    """The best and the worst method of a scenario."""
-    known = [(tests, row.method.label) for row in rows if (tests := _certain(row)) is not None]
-    ranked = sorted(known, key=itemgetter(0))
-    if ranked:
-        (fewest, first), most = ranked[0], ranked[-1][0]
-        last = next(label for tests, label in ranked if tests == most)
-        equal = sum(tests == fewest for tests, _ in ranked) - 1
-        also = f" and {count(equal, 'other')}" if equal else ""
-        words = f": {first}{also} with the fewest tests, {fewest:g}; {last} with the most, {most:g}."
-        yield say(Strong(plain(rows[0].scenario.name)), words)

@@ -13,28 +13,14 @@ MOST_FAILURES = 3
 
 
 def baseline(state: RunState) -> str:
-    """The result in a line; "" before it is finished."""
-    found = state.baseline
-    if found is None:
-        return ""
-    x, y, z = found.position
-    broke = f", {count(found.broken, 'more run')} broke" if found.broken else ""
-    others = f"; {also} (--failure reduces another one)" if (also := other_failures(found)) else ""
-    return (
-        f"baseline: f in {how_often(found)}{broke}; f: {state.failure or 'ending'} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
-        f"{others}; {missed(state)}"
-    )
-
-
-def baseline_sentence(state: RunState) -> str:
-    """The same in sentences."""
+    """The result in sentences; "" before it is finished."""
     found = state.baseline
     if found is None:
         return ""
     broke = f"; {count(found.broken, 'more run')} broke" if found.broken else ""
     said = [f"Baseline: the robot {failed_in(state, found)} in {how_often(found)}{broke}."]
     if also := other_failures(found):
-        said.append(as_sentence(also))
+        said.append(as_sentence(f"{also} (--failure reduces another one)"))
     if found.rate < 1.0:
         said.append(as_sentence(missed(state)))
     return " ".join(said)

@@ -140,7 +140,6 @@ def _stayed(pinned: int) -> str:
 
 
 def environment_named(node: int) -> str:
-    """An environment by its number in the history."""
     return "the whole world" if node == 0 else f"the environment of step {node}"
 
 
@@ -255,18 +254,18 @@ def of_passing(state: RunState, one: Isolation) -> str:
             return f"{said}; {start} {first_of(found, MOST_NAMES)} put back"
     most = max(backs, key=lambda claim: claim.high)
     back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
-    if one.chosen:
+    if one.asked.chosen:
         return f"{said}; with {back} put back it misses its goal in a chosen run"
     return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most.reached, most)}"
 
 
 def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
-    stacks = (stack_with(state, state.elements, name) for name in one.suspects)
+    stacks = (stack_with(state, state.elements, state.elements[model]) for model in one.asked.suspects)
     return frozenset(name for stack in stacks for name in stack)
 
 
 def _reaching(one: Isolation, claim: Returned) -> str:
-    chosen = f"each of {count(len(one.chosen), 'chosen run')} and in " if one.chosen else ""
+    chosen = f"each of {count(len(one.asked.chosen), 'chosen run')} and in " if one.asked.chosen else ""
     return f"the robot reaches its goal in {chosen}{_share(claim.reached, claim)}"
 
 
@@ -309,7 +308,6 @@ def instead(state: RunState, certificate: Certificate, claim: Claim) -> str:
 
 
 def short(claim: Claim) -> str:
-    """The verdict of a claim in a word or two."""
     return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
 
 

@@ -24,12 +24,8 @@ CAME_BY = {
     "left_out": ("left out by hand", "left out by hand: by the certificate it only helped"),
     "sliced": ("without a test", "reduced without a test to what took part"),
 }
-_DECIDED = {
-    "adopted": "You adopted {what}",
-    "left_out": "You went on {what}",
-    "accepted": "You accepted the other failure of {what} as f",
-    "instead": "You branched: the failure of {what} is f here",
-}
+# Decisions that change the environment or the search.
+_CHANGES = ("go_back", "undo", "pin", "unpin", "change", "adopt", "leave_out", "accept_other")
 
 
 def to_adopt(state: RunState) -> tuple[str, ...]:
@@ -86,13 +82,7 @@ def arrival(state: RunState) -> str:
     last = state.decisions[-1] if state.decisions else None
     if here is None or last is None or last.tests != state.tests_done:
         return ""
-    if last.kind in ("go_back", "undo", "pin", "unpin"):
-        return as_sentence(plain(last.words))
-    if last.kind == "change":
-        return as_sentence(f"{plain(last.words)}, from this round on")
-    if here.how in _DECIDED and last.kind in ("adopt", "leave_out", "accept_other"):
-        return f"{_DECIDED[here.how].format(what=here.what)}: {_sizes(state, here)}."
-    return ""
+    return as_sentence(plain(last.words)) if last.kind in _CHANGES else ""
 
 
 def _sizes(state: RunState, here: Node) -> str:

@@ -12,11 +12,11 @@ from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.text import as_sentence, count, first_of, plain
-from ddenv.words.baseline import baseline_sentence
+from ddenv.words.baseline import baseline
 from ddenv.words.certifying import certifying
 from ddenv.words.claims import ended, instead, of_passing, of_runs, promise
 from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
-from ddenv.words.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
+from ddenv.words.methods import DDENV, Lines, Step, beginning, follows, fruitless, listing
 from ddenv.words.signs import metres
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
@@ -152,7 +152,7 @@ def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
     arrived = arrival(state)
     if arrived:
         return (arrived, first)
-    then = baseline_sentence(state) if state.round is None else follows(options, state.round)
+    then = baseline(state) if state.round is None else follows(options, state.round)
     return (first, then) if then else (first,)
 
 
@@ -186,7 +186,7 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
         return "nothing", _nothing_found(state, current, options)
     running = [test for test in snapshot.running if test.round == current.number and test.candidate == candidate.index]
     ahead = len({test.candidate for test in snapshot.running if test.round == current.number} - {candidate.index})
-    place = _place(candidate, current, options)
+    place = _place(candidate, current)
     if not running:
         return "next", (*last_reduction(state), _next(state, candidate, place, options))
     # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
@@ -213,14 +213,10 @@ def _next(state: RunState, candidate: Candidate, place: str, options: Settings) 
     return f"Next is re-run {len(candidate.tests)} of {options.most_runs - 1} of {place}: {again}"
 
 
-def _place(candidate: Candidate, current: Round, options: Settings) -> str:
+def _place(candidate: Candidate, current: Round) -> str:
     """A candidate, and its place among the others."""
-    models, gone = count(candidate.size, "model"), len(current.environment) - candidate.size
-    if options.algorithm not in GROUPS:
-        return f"{candidate.label} ({models}), candidate {candidate.index + 1} of {len(current.candidates)}"
-    if not is_sweep(current):
-        return f"{candidate.label} ({models}), which leaves out a group of {gone}"
-    return f"{candidate.label} ({models}), model {candidate.index + 1} of {len(current.candidates)} in the last sweep"
+    place = f"candidate {candidate.index + 1} of {len(current.candidates)}"
+    return f"{candidate.label} ({count(candidate.size, 'model')}), {place}"
 
 
 def _first_run(place: str, options: Settings) -> tuple[str, ...]:
@@ -239,17 +235,13 @@ def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, option
     before = _last(state, candidate)
     return (
         f"Re-run {_number(candidate, test)} of {options.most_runs - 1} of {place}: {_why_again(before)}",
-        f"A failure can be flaky: a candidate is dissimilar {_enough(options)} {count(options.most_runs, 'test')} without f.",
+        f"A failure can be flaky: a candidate is dissimilar after at most {count(options.most_runs, 'test')} without f.",
     )
 
 
 def _number(candidate: Candidate, test: Test) -> int:
     """The place of a test among those of its candidate, from 0. Its run number differs where chosen runs are repeated."""
     return candidate.tests.index(test.id) if test.id in candidate.tests else test.run
-
-
-def _enough(options: Settings) -> str:
-    return "after at most" if options.accept_rate == "kept" else "only after"
 
 
 def _shown_of(state: RunState, candidate: Candidate) -> str:
@@ -296,7 +288,7 @@ def _finished(state: RunState) -> Happening:
     kept = count(len(state.environment), "model")
     if state.baseline is None:
         return None, (_reason(state, "The run ended in the baseline."),)
-    base = baseline_sentence(state)
+    base = baseline(state)
     if not state.certified:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else helping(found)
@@ -358,7 +350,6 @@ def sliced(state: RunState) -> tuple[str, ...]:
 
 
 def implied(state: RunState) -> tuple[str, ...]:
-    """That the last test that ended was not simulated."""
     last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
@@ -366,6 +357,5 @@ def implied(state: RunState) -> tuple[str, ...]:
 
 
 def refuted(state: RunState) -> tuple[str, ...]:
-    """That slices are wrong here."""
     words = refuted_words(state)
     return (as_sentence(words),) if words else ()

@@ -116,7 +116,6 @@ def nearest_fix(margins: Margins) -> str:
 
 
 def sureness(margins: Margins) -> str:
-    """What the table's claims are worth."""
     less = "" if margins.certified else " No certificate has shown yet how often f shows in what is left."
     return (
         "Claims are about the values that were tried, not those between; the chance that any claim of a call is wrong is at most "
@@ -130,7 +129,6 @@ def said(margins: Margins) -> list[str]:
 
 
 def lines(margins: Margins) -> Iterator[str]:
-    """The table as lines of text, with the sentences below it."""
     table = [HEAD, *(one.cells for one in rows(margins))]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     for row in table:
@@ -188,13 +186,11 @@ def ran(_: RunState, after: RunState) -> str:
 
 
 def impossible(_: RunState, after: RunState) -> str:
-    """The line on a value that is not possible."""
     assert after.margins is not None
     last = after.margins.impossible[-1]
     return f"  {last.name} = {last.value:.4g}: not possible: {last.why}"
 
 
 def started(_: RunState, after: RunState) -> str:
-    """The line on the beginning."""
     assert after.margins is not None
     return f"{finding(after)}; how far may each of {count(len(after.margins.wanted), 'number')} change before f goes?"

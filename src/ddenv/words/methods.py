@@ -119,7 +119,6 @@ KINDS: tuple[Kind, ...] = ("algorithm", "partitioning", "prioritization")
 
 
 def chosen(algorithm: str, pair: str) -> dict[Kind, str]:
-    """The three names by kind."""
     partitioning, _, prioritization = pair.partition("/")
     return {"algorithm": algorithm, "partitioning": partitioning, "prioritization": prioritization}
 
@@ -159,7 +158,6 @@ GROUPS = ("probdd", "splitting")
 
 
 def beginning(options: Settings, models: int) -> str:
-    """How the next round is made; E has this many `models`."""
     kept = f"the {count(models, 'model')} of E"
     names = chosen(options.algorithm, options.pair)
     match options.algorithm:
@@ -176,19 +174,11 @@ def beginning(options: Settings, models: int) -> str:
 
 def follows(options: Settings, last: Round) -> str:
     """What the last round means for the next one, or ""."""
-    if last.winner is None:
-        # The user changed something in the middle of the round, perhaps while a reduction waited.
-        if any(one.verdict in ("", "similar") for one in last.candidates):
-            return ""
-        reason = "Nothing showed f in the last round"
-        if options.algorithm not in SMALLER:
-            return f"{reason}."
-        return f"{reason}, so {_smaller(options.algorithm, last)}."
-    if options.algorithm != "ddmin":
+    # The user may have changed something in the middle of the round, perhaps while a reduction waited.
+    if last.winner is not None or any(one.verdict in ("", "similar") for one in last.candidates):
         return ""
-    if last.candidates[last.winner].kind == "partition":
-        return "One part alone showed f, so it is cut in two next."
-    return "One part was removed: the others stay as they are, and n is one less."
+    reason = "Nothing showed f in the last round"
+    return f"{reason}, so {SMALLER[options.algorithm]}." if options.algorithm in SMALLER else f"{reason}."
 
 
 def fruitless(options: Settings, current: Round, models: int) -> str:
@@ -199,7 +189,7 @@ def fruitless(options: Settings, current: Round, models: int) -> str:
         return "E stays as it is."
     if options.algorithm not in GROUPS and current.n_partitions >= models:
         return "The parts were single models already: nothing more can be removed."
-    return f"E stays as it is; {_smaller(options.algorithm, current)}."
+    return f"E stays as it is; {SMALLER[options.algorithm]}."
 
 
 # What that means for the next round.
@@ -207,10 +197,5 @@ SMALLER = {
     "ddenv": "the next round splits E into smaller parts",
     "ddmin": "n doubles, and the parts get smaller",
     "probdd": "each model that was left out is more likely to be needed",
-    "splitting": "at least one of the models left out is needed; half of them are left out next",
+    "splitting": "at least one of the models left out is needed; of several, half are left out next",
 }
-
-
-def _smaller(algorithm: str, last: Round) -> str:
-    only = algorithm in GROUPS and last.candidates and len(last.environment) - last.candidates[0].size == 1
-    return "the model that was left out is needed" if only else SMALLER[algorithm]

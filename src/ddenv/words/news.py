@@ -69,7 +69,7 @@ def isolating(state: RunState) -> str:
         return ISOLATING
     gone = state.removals[last - 1].models
     tried = f"without {count(len(gone), 'model')}" if gone else "whether the whole world still fails"
-    made = sum(test.run >= now.first_run and test.is_finished for test in state.tests if test.phase == ISOLATE)
+    made = sum(test.run >= now.asked.run and test.is_finished for test in state.tests if test.phase == ISOLATE)
     return f"{ISOLATING}: {tried}{f', {made} fresh runs' if made else ''}"
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ddenv.environment import Environment
-from ddenv.evidence.slices import fresh_chance
-from ddenv.evidence.took_part import met_by
+from ddenv.evidence.slices import fresh_chance, met_by
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import RunState
 from ddenv.text import count, first_of, percent

@@ -4,34 +4,31 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from rich.console import RenderableType
 from rich.text import Text
 from textual import events, on
 from textual.app import App, ComposeResult
-from textual.binding import Binding
 from textual.command import Provider
 from textual.geometry import Size
-from textual.notifications import SeverityLevel
-from textual.screen import ModalScreen, Screen
+from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
-from ddenv.workbench.help.bindings import keys
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
-from ddenv.workbench.terminal.written import Written
+
+if TYPE_CHECKING:
+    from ddenv.workbench.map.world_map import WorldMap
 
 BELL = "\x07"
-# New objects until garbage is collected, then how often until older ones are looked through, too.
-THRESHOLDS = (20_000, 20, 20)
-# The keys that move the focus, with Textual's actions for them.
-TABS = {"tab": "app.focus_next", "shift+tab": "app.focus_previous"}
+# Textual's actions that move the focus.
+TABS = {"app.focus_next": Screen.focus_next, "app.focus_previous": Screen.focus_previous}
 
 
 def classes_at(screen: type[Screen[Any]], size: Size) -> str:
@@ -67,17 +64,6 @@ def _commands() -> type[Provider]:
     from ddenv.workbench.help.command_palette import Commands
 
     return Commands
-
-
-def _collect_from_now() -> None:
-    """Collects garbage again, but not in what there is already: looking through it takes longer than to answer a key.
-
-    Python looks through all the rest far too often where most is left out, so it begins with more new objects. Without this the
-    slowest keys (p95) take twice as long.
-    """
-    gc.freeze()
-    gc.set_threshold(*THRESHOLDS)
-    gc.enable()
 
 
 class Workbench(App[int]):
@@ -118,14 +104,12 @@ class Workbench(App[int]):
         first: ShowLessons | ShowLesson | ShowRace | None = None,
     ) -> None:
         super().__init__()
-        self._written = Written()
         self._reading = reading
         for theme in OURS:
             self.register_theme(theme)
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
-        self._held: tuple[str, dict[str, Any]] | None = None
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
@@ -150,22 +134,16 @@ class Workbench(App[int]):
         """
         if isinstance(event, events.Key) and not event.is_forwarded:
             self.clear_notifications()
-        if isinstance(event, events.Key) and event.key in TABS and self.app_focus and not self._is_bound(event.key):
-            (self.screen.focus_next if event.key == "tab" else self.screen.focus_previous)()
+        key = event.key if isinstance(event, events.Key) and self.app_focus else ""
+        bound = self.screen.active_bindings.get(key) if key in ("tab", "shift+tab") else None
+        if bound is not None and bound.binding.action in TABS:
+            TABS[bound.binding.action](self.screen)
         else:
             await super().on_event(event)
 
-    def _is_bound(self, key: str) -> bool:
-        """Whether `tab` or `shift+tab` has another meaning, to the user or where the focus is."""
-        nodes = (self.focused or self.screen).ancestors_with_self
-        bound = (each for node in nodes for each in Binding.make_bindings(node.BINDINGS) if each.key == key)
-        own = any(key in keys.split(",") for keys in self._own_keys.values())
-        return own or any(each.action != TABS[key] for each in bound)
-
     def on_mount(self) -> None:
-        self.screen_change_signal.subscribe(self, lambda _: self._say_held())
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
-        self.app_resume_signal.subscribe(self, lambda _: self._redraw())
+        self.app_resume_signal.subscribe(self, lambda _: self.refresh(layout=True))
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
         if self.is_headless:
@@ -179,41 +157,13 @@ class Workbench(App[int]):
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
         if not self.is_headless:
-            self.call_after_refresh(_collect_from_now)
+            # Looking for garbage in what there is already takes longer than to answer a key.
+            self.call_after_refresh(gc.freeze)
 
-    # Notices: at most one is shown. It would hide the words and the buttons of a dialog, so it waits until that is closed.
-
-    def notify(
-        self,
-        message: str,
-        *,
-        title: str = "",
-        severity: SeverityLevel = "information",
-        timeout: float | None = None,
-        markup: bool = True,
-    ) -> None:
-        """As every app, but while a dialog is open a notice waits; its time begins when it is shown."""
-        options: dict[str, Any] = {"title": title, "severity": severity, "timeout": timeout, "markup": markup}
-        if self._asks:
-            self._held = message, options
-        else:
-            self.clear_notifications()
-            super().notify(message, **options)
-
-    @property
-    def _asks(self) -> bool:
-        return any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:])
-
-    def _say_held(self) -> None:
-        if self._held is not None and not self._asks:
-            (message, options), self._held = self._held, None
-            super().notify(message, **options)
-
-    def action_help_quit(self) -> None:
-        """What ctrl+c says: in a terminal it should end nothing by mistake."""
-        self.notify("ctrl+q quits; an engine keeps running", timeout=3)
-
-    # The screens.
+    def notify(self, message: str, **options: Any) -> None:
+        """As every app, but at most one notice is shown."""
+        self.clear_notifications()
+        super().notify(message, **options)
 
     def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson | ShowRace) -> Screen[Any]:
         if isinstance(asked, ShowRun):
@@ -239,7 +189,6 @@ class Workbench(App[int]):
     @on(ShowRun)
     @on(ShowSetup)
     def _show(self, asked: ShowRun | ShowSetup) -> None:
-        """Another screen, in place of all that are open."""
         try:
             screen = self._screen_for(asked)
         except UserError as error:
@@ -258,26 +207,41 @@ class Workbench(App[int]):
             self.post_message(ShowRun(path))
 
     def action_help(self) -> None:
-        """The keys of the focused pane, of the screen, and of the app."""
         from ddenv.workbench.help.shortcuts import Help, groups
 
         self.push_screen(Help(groups(self.screen)))
 
-    def action_names(self) -> None:
-        """Shows or hides the names on all maps of the screen."""
-        from ddenv.workbench.map.world_map import WorldMap
+    # What all maps of the screen do together.
 
-        for world in self.screen.query(WorldMap):
+    def action_names(self) -> None:
+        for world in self._maps:
             world.toggle_layer("names")
 
+    def action_zoom(self, factor: float) -> None:
+        for world in self._maps:
+            world.zoom(factor)
+
+    def action_fit(self) -> None:
+        for world in self._maps:
+            world.fit()
+
+    @property
+    def _maps(self) -> Iterable[WorldMap]:
+        from ddenv.workbench.map.world_map import WorldMap
+
+        return self.screen.query(WorldMap)
+
+    def action_signs(self) -> None:
+        from ddenv.workbench.help.signs import SignsDialog
+
+        self.push_screen(SignsDialog())
+
     def action_runs(self) -> None:
-        """The list of all runs, above the screen that asks for it."""
         from ddenv.workbench.runs.runs_screen import RunsScreen
 
         self._push_once(RunsScreen)
 
     def action_lessons(self) -> None:
-        """The list of lessons, above the screen that asks for it."""
         from ddenv.workbench.learn.lessons_screen import LessonsScreen
 
         self._push_once(LessonsScreen)
@@ -297,23 +261,10 @@ class Workbench(App[int]):
     async def action_quit(self) -> None:
         self.action_leave()
 
-    # The terminal.
-
-    def _redraw(self) -> None:
-        self._written.forget()
-        self.refresh(layout=True)
-
-    def on_resize(self) -> None:
-        self._written.forget()
-
-    def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
-        super()._display(screen, self._written.fewer(renderable))
-
     def on_unmount(self) -> None:
         self._write("\x1b[23;2t")
 
     def watch_title(self, title: str) -> None:
-        """The terminal's title; saved before and restored after."""
         self._write(f"\x1b]2;{plain(title)}\x07")
 
     @on(Attention)

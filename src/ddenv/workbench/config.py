@@ -9,7 +9,6 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
-from typing import Any
 
 from textual.binding import Binding
 from textual.dom import DOMNode
@@ -21,7 +20,6 @@ from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.help.key_names import shown_key, textual_keys, written
 from ddenv.workbench.terminal.themes import DARK, theme_called, theme_names
 
-KNOWN = ("theme", "notify", "keys")
 # The head of the example.
 INTRODUCTION = """# Settings of the ddenv workbench: {path}
 # Remove the '# ' in front of a line to change it. '?' and other punctuation needs quotes.
@@ -118,88 +116,52 @@ def config_path() -> Path:
 def read_config() -> Config:
     """Reads the file if it exists. Raises UserError with the place of the error."""
     path = config_path()
-    data = _load(path) if path.exists() else {}
-    if not data:
-        if os.environ.get("DDENV_CONFIG") and not path.exists():
+    if not path.exists():
+        if os.environ.get("DDENV_CONFIG"):
             raise UserError(f"{path}: no such file; create it, or unset DDENV_CONFIG")
         return Config()
-    for key in data:
-        if key not in KNOWN:
-            raise UserError(
-                f"{path}: '{key}' is not known here{nearest(str(key), KNOWN)}; known are {', '.join(KNOWN)}"
-            )
-    theme, keys = data.get("theme"), data.get("keys")
-    if theme is not None and not isinstance(theme, str):
-        raise UserError(f"{path}: theme: expected a name, such as ddenv-light; found {theme!r}")
-    notify = data.get("notify", True)
-    if not isinstance(notify, bool):
-        raise UserError(f"{path}: notify: expected yes or no; found {notify!r}")
-    wanted = _wanted(keys, path)
-    chosen = theme_called(theme, f"{path}: theme") if theme else ""
-    return Config(chosen, checked(wanted, str(path)) if wanted else {}, notify)
+    from pydantic import BaseModel, ConfigDict, StrictBool, ValidationError
 
+    from ddenv.world.load import complaint, read_yaml
 
-def _load(path: Path) -> dict[Any, Any]:
-    import yaml
+    class File(BaseModel):
+        # A digit is a number in YAML, and a key here.
+        model_config = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
+        theme: str | None = None
+        notify: StrictBool = True
+        keys: dict[str, str] | None = None
 
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read: {getattr(error, 'strerror', '') or 'is not UTF-8 text'}") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        # An invalid date is a ValueError.
-        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
-        line = f"line {mark.line + 1}: " if mark else ""
-        raise UserError(f"{path}: {line}is no YAML: {problem}; keys such as '?' go in quotes") from None
-    if data is not None and not isinstance(data, dict):
-        raise UserError(f"{path}: expected lines such as 'theme: ddenv-light'; 'ddenv config --example' prints some")
-    return data or {}
-
-
-def _wanted(keys: Any, path: Path) -> dict[str, str]:
-    if keys is None:
-        return {}
-    if not isinstance(keys, dict):
-        raise UserError(f"{path}: keys: expected lines such as 'run.pause: p'; found {keys!r}")
-    for id, value in keys.items():
-        # A digit is a number in YAML, and a key here.
-        if not isinstance(value, str) and (isinstance(value, bool) or not isinstance(value, int)):
-            raise UserError(
-                f"{path}: keys: {id}: expected a key such as p, in quotes if it is punctuation; found {value!r}"
-            )
-    return {str(id): str(value) for id, value in keys.items()}
+        found = File.model_validate(read_yaml(path) or {})
+    except ValidationError as error:
+        key, words = complaint(error.errors()[0], File)
+        raise UserError(f"{path}: {key}: {words}") from None
+    theme = theme_called(found.theme, f"{path}: theme") if found.theme else ""
+    return Config(theme, checked(found.keys, str(path)) if found.keys else {}, found.notify)
 
 
 def lines() -> list[str]:
     """The file, the theme, whether the terminal rings, and every action with its keys. Raises UserError for an invalid file."""
     config, path = read_config(), config_path()
-    chosen = config.theme or f"{DARK.name}, or ansi-dark where the terminal has 16 colours"
     found = [
         f"file    {path}{'' if path.exists() else ' (does not exist; ddenv config --example prints one)'}",
-        f"theme   {chosen}",
+        f"theme   {config.theme or f'{DARK.name}, or ansi-dark where the terminal has 16 colours'}",
         f"themes  {', '.join(theme_names())}",
         f"notify  {'yes' if config.notify else 'no'}",
+        "",
     ]
-    width = max(len(id) for id in actions())
     keys = {id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()}
-    room = max(len(key) for key in keys.values())
-    for _, group in _sections():
-        found.append("")
-        for id, action in group:
-            changed = "*" if id in config.keys else " "
-            found.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
+    width, room = (max(map(len, words)) for words in (keys, keys.values()))
+    for id, action in actions().items():
+        found.append(f"{'*' if id in config.keys else ' '} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
     return [*found, "", "* is your own key"] if config.keys else found
 
 
 def example_lines() -> list[str]:
     """An example file that changes nothing: every action is a comment."""
     begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
-    found = begin.splitlines()
-    for section, group in _sections():
-        found.append(f"  # {section}")
-        for id, action in group:
-            found.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
-    return found
+    keys = {id: _quoted(_written(",".join(action.keys))) for id, action in actions().items()}
+    return [*begin.splitlines(), *(f"  # {id}: {keys[id]}  # {action.words}" for id, action in actions().items())]
 
 
 def _written(keys: str) -> str:
@@ -207,16 +169,4 @@ def _written(keys: str) -> str:
 
 
 def _quoted(keys: str) -> str:
-    """As YAML reads it as text."""
     return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
-
-
-def _sections() -> Iterator[tuple[str, list[tuple[str, Action]]]]:
-    """All actions by section: the app first, then the screens that are used most."""
-    order = ("app", "setup", "run", "map", "runs")
-    groups: dict[str, list[tuple[str, Action]]] = {}
-    for id, action in actions().items():
-        groups.setdefault(id.split(".")[0], []).append((id, action))
-    yield from sorted(
-        groups.items(), key=lambda each: (order.index(each[0]) if each[0] in order else len(order), each[0])
-    )

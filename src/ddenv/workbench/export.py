@@ -12,15 +12,15 @@ from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
-from textual.widget import Widget
 from textual.widgets import Button, Checkbox, Input, Static
 from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
 from ddenv.text import count, first_of, plain, shortened
-from ddenv.workbench.help.bindings import keys
+from ddenv.words.claims import ended
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 
@@ -60,12 +60,7 @@ class ExportScreen(ModalScreen[None]):
     AUTO_FOCUS = "#export-world"
     BINDINGS: ClassVar = [
         *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
-        *keys(
-            "export",
-            ("close", "escape", "dismiss", "close", "close this dialog"),
-            ("previous", "up", "row(-1)", "", "the row above"),
-            ("next", "down", "row(1)", "", "the row below"),
-        ),
+        *keys("export", ("close", "escape", "dismiss", "close", "close this dialog")),
     ]
 
     def __init__(self, run: Path, world: Path = Path()) -> None:
@@ -77,7 +72,7 @@ class ExportScreen(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         names = suggested(self._file, self._world)
-        with Framed("Export", "↑ ↓ rows   space ticks   tab its name   enter writes   escape closes", id="export"):
+        with Framed("Export", "tab moves   space ticks   enter writes   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)
@@ -92,19 +87,9 @@ class ExportScreen(ModalScreen[None]):
                 yield Static("", id="export-wrong", classes="wrong", markup=False)
             with Horizontal(id="export-buttons"):
                 yield Button("Write", id="export-write", variant="primary", compact=True)
-                yield Button("Close", id="export-close", compact=True)
 
     def on_mount(self) -> None:
         self._look()
-
-    def action_row(self, by: int) -> None:
-        """To what stands first in another row: its tick, and not the name, which a key would replace."""
-        rows = [self.query_one("#export-folder"), *self.query(Tick), self.query_one("#export-write")]
-        here = next((number for number, row in enumerate(rows) if self._is_beside(row)), 0)
-        rows[(here + by) % len(rows)].focus()
-
-    def _is_beside(self, first: Widget) -> bool:
-        return self.focused is not None and first.parent is self.focused.parent
 
     @work(thread=True, group="look")
     def _look(self) -> None:
@@ -121,13 +106,8 @@ class ExportScreen(ModalScreen[None]):
 
     @on(Input.Changed)
     def _forget(self) -> None:
-        """Asks again before other files are replaced."""
         self._agreed = frozenset()
         self.query_one("#export-write", Button).label = "Write"
-
-    @on(Button.Pressed, "#export-close")
-    def _close_pressed(self) -> None:
-        self.dismiss()
 
     @on(Input.Submitted)
     @on(Button.Pressed, "#export-write")
@@ -204,7 +184,6 @@ class ExportScreen(ModalScreen[None]):
 
 
 def suggested(run: Path, world: Path = Path()) -> tuple[str, ...]:
-    """Names for what can be written of a run of `world`, in the order of `KINDS`."""
     stem = "".join(char if char.isprintable() else "-" for char in run.stem)
     return (
         f"{stem}.minimal{ending_of(world)}",
@@ -234,20 +213,10 @@ def what_is_left(run: Path) -> str:
     except UserError as error:
         return str(error)
     left = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
-    if state.baseline is None:
-        return f"{left}: no failure is known yet, so this is the whole world."
-    if not state.minimal:
-        return f"{left} so far: not minimal yet."
-    pinned = len(state.pinned.intersection(state.environment))
-    if not pinned:
-        return f"{left}, and no single one can be removed."
-    if pinned == len(state.environment):
-        return f"{left}, all pinned: fewer were not tried."
-    return f"{left}; {pinned} pinned, and none of the others can be removed."
+    return f"{left}: {ended(state)}" if state.ended else f"{left} so far: not minimal yet."
 
 
 def files_of(wanted: Wanted) -> Iterator[Path]:
-    """All files that may be written."""
     from ddenv.report.report import files_of as files_of_report
 
     for id, path in wanted.items():

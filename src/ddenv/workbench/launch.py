@@ -26,25 +26,19 @@ def run_workbench(
     file: Path | None = None,
     first: ShowLessons | ShowLesson | ShowRace | None = None,
 ) -> int:
-    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal.
+    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
+    # With the usual ones the slowest keys take twice as long.
+    gc.set_threshold(20_000, 20, 20)
+    from ddenv.workbench.app import Workbench
+    from ddenv.workbench.config import read_config
+    from ddenv.workbench.terminal.themes import fitting
 
-    It opens on the screen `first`, on `run`, on the setup screen with a scenario's or a world's `file`, or on the setup screen.
-    """
-    # What is made until the first paint stays: looking through it for garbage would only delay that. The app goes on with it.
-    gc.disable()
-    try:
-        from ddenv.workbench.app import Workbench
-        from ddenv.workbench.config import read_config
-        from ddenv.workbench.terminal.themes import fitting
-
-        config = read_config()
-        app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
-        check_terminal()
-        if not config.theme:
-            app.theme = fitting(app.console.color_system)
-        result = app.run()
-    finally:
-        gc.enable()
+    config = read_config()
+    app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
+    check_terminal()
+    if not config.theme:
+        app.theme = fitting(app.console.color_system)
+    result = app.run()
     return result if isinstance(result, int) else app.return_code or 0
 
 

@@ -22,11 +22,9 @@ from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
 from ddenv.runs.tests_left import left_said
 from ddenv.text import count, first_of, plain, printable
-from ddenv.words.baseline import how_often
 from ddenv.words.claims import drift, what_ran
 from ddenv.words.explain import explain
 from ddenv.words.news import headline, news
-from ddenv.workbench.shared.log import NOTHING_DECIDED
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine
 
@@ -59,7 +57,6 @@ WATCHING = "watching only: nothing that you type changes the run"
 
 
 def status(snapshot: Snapshot) -> Iterator[str]:
-    """Where the run is."""
     state = snapshot.state
     yield headline(state)
     if forms := drift(state):
@@ -71,7 +68,6 @@ def status(snapshot: Snapshot) -> Iterator[str]:
 
 
 def table(snapshot: Snapshot) -> Iterator[str]:
-    """The tries and the candidates of the round, or the rows of the certificate."""
     state = snapshot.state
     for trial in state.trials[-TRIES:]:
         yield _said_of(state, trial)
@@ -93,21 +89,9 @@ def _said_of(state: RunState, row: Candidate | Trial) -> str:
 
 
 def models(snapshot: Snapshot) -> Iterator[str]:
-    """The models that are left."""
     state = snapshot.state
     names = [f"{plain(name)}{' (pinned)' if name in state.pinned else ''}" for name in state.environment]
     yield f"{count(len(names), 'model')} left: {first_of(names, NAMED) or 'none'}"
-
-
-def decisions(snapshot: Snapshot) -> Iterator[str]:
-    """What the user decided."""
-    yield from [plain(each.words) for each in snapshot.state.decisions] or [NOTHING_DECIDED]
-
-
-def baseline(snapshot: Snapshot) -> Iterator[str]:
-    """How often the whole world fails."""
-    base = snapshot.state.baseline
-    yield ("the baseline is not finished" if base is None else f"f in {how_often(base)}")
 
 
 QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
@@ -115,8 +99,6 @@ QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
     "why": (lambda snapshot: iter(explain(snapshot).sentences), "what is happening, and why"),
     "table": (table, "the candidates of this round with their verdicts"),
     "models": (models, "the models that are left"),
-    "baseline": (baseline, "how often the whole world fails"),
-    "decisions": (decisions, "what you decided"),
 }
 
 
@@ -200,8 +182,6 @@ class LineMode:
     def _say(self, *lines: str) -> None:
         for words in lines:
             print(printable(words), file=self._out, flush=True)
-
-    # What is typed.
 
     @property
     def _situation(self) -> Situation:

@@ -7,6 +7,7 @@ import stat
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from xml.etree.ElementTree import Element, ParseError
 
 from ddenv.errors import UserError
 
@@ -63,6 +64,22 @@ def read(path: Path, limit: int) -> bytes:
             return file.read(limit)
     except OSError as error:
         raise Unusable(reason(error)) from None
+
+
+def xml_root(data: bytes) -> Element:
+    """The root element of `data`. Raises Unusable for anything but plain, safe XML."""
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        root: Element = fromstring(data, forbid_dtd=True)
+    except ParseError as error:
+        raise Unusable(f"line {error.position[0]}: not well-formed XML") from None
+    except DefusedXmlException:
+        raise Unusable("DOCTYPE is not allowed (its entities can read other files and exhaust memory)") from None
+    except (LookupError, ValueError):
+        raise Unusable("cannot be decoded; save it as UTF-8") from None
+    return root
 
 
 def size_of(path: Path) -> int:

@@ -89,15 +89,12 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     joints = [joint for joint in robot.joints if joint.name in sides]
     across = [robot.pose.inverse().rotate(joint.axis)[1] for joint in joints]
     for joint, part in zip(joints, across, strict=True):
+        where = f"robot '{robot.name}': joint '{joint.name}'"
         if abs(part) < ACROSS:
             hint = "; name the driven wheels in robot.wheels" if wheels is None else ""
-            raise UserError(
-                f"robot '{robot.name}': joint '{joint.name}' is no wheel: its axis is not across the robot{hint}"
-            )
+            raise UserError(f"{where} is no wheel: its axis is not across the robot{hint}")
         if joint.effort == 0.0:
-            raise UserError(
-                f"robot '{robot.name}': wheel joint '{joint.name}' has an effort limit of 0; set one in N m"
-            )
+            raise UserError(f"{where} is a wheel with an effort limit of 0; set one in N m")
     left = [_side(robot, joint) for joint in joints if sides[joint.name]]
     right = [_side(robot, joint) for joint in joints if not sides[joint.name]]
     track = sum(left) / len(left) - sum(right) / len(right)

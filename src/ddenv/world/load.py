@@ -80,9 +80,17 @@ def load_simulator(path: Path) -> Oracle:
 
 def _data(path: Path, expected: str) -> dict[str, Any]:
     """The keys of the YAML file `path`, such as those `expected`. Raises UserError."""
+    data = read_yaml(path)
+    if not isinstance(data, dict):
+        raise UserError(f"{path}: expected keys such as {expected}; found {_shown(data)}")
+    return data
+
+
+def read_yaml(path: Path) -> Any:
+    """What the YAML file `path` says. Raises UserError."""
     content = read_bytes(path)
     try:
-        data = yaml.safe_load(content)
+        return yaml.safe_load(content)
     except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         line = "" if mark is None else f":{mark.line + 1}"
@@ -90,9 +98,6 @@ def _data(path: Path, expected: str) -> dict[str, Any]:
         raise UserError(f"{path}{line}: not valid YAML: {problem}") from None
     except RecursionError:
         raise UserError(f"{path}: not valid YAML: nested too deeply") from None
-    if not isinstance(data, dict):
-        raise UserError(f"{path}: expected keys such as {expected}; found {_shown(data)}")
-    return data
 
 
 def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) -> Scenario:
@@ -155,7 +160,8 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
 
 
 def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
-    for part in location:
+    # Keys of a mapping to sections are no fields.
+    for part in (each for each in location if each in model.model_fields):
         hint = model.model_fields[part].annotation
         # A section that may be missing is a union with None.
         model = next(each for each in (hint, *get_args(hint)) if isinstance(each, type) and issubclass(each, BaseModel))

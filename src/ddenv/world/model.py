@@ -153,7 +153,8 @@ class Model:
     """A model of the world, including the links and joints of its nested models (named `inner::link`).
 
     `name` is unique: the second model of one name is called `name #2`. `spans` are the byte ranges (start, end) of the file
-    that belong to it: its own element first, then its entry in `<state>`. `line` is its first line.
+    that belong to it: its own element first, then its entry in `<state>`. `line` is its first line. `inside` is the model of the
+    file that it is a part of (`ddenv.world.sdf.inside`); "" for a whole model.
     """
 
     name: str
@@ -165,6 +166,7 @@ class Model:
     line: int
     gravity: bool = True
     self_collide: bool = False
+    inside: str = ""
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -204,11 +206,10 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A byte range (start, end) of a world's text that goes when all of `models` are gone, and what is written `instead`."""
+    """A byte range (start, end) of a world's text that goes when all of `models` are gone."""
 
     span: tuple[int, int]
     models: frozenset[str]
-    instead: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,8 +241,9 @@ class World:
         raise KeyError(name)
 
     def elements(self, protected: frozenset[str] = frozenset()) -> tuple[str, ...]:
-        """Names of the models that a reduction may remove, in the file's order."""
-        stay, new = protected | self.anchors, protected | self.anchors
+        """Names of the models that a reduction may remove, in the file's order; a `protected` one stays with all its parts."""
+        parts = {model.name for model in self.models if model.inside in protected}
+        stay = new = protected | self.anchors | parts
         while new:
             new = frozenset(other for model, other in self.ties if model in new) - stay
             stay |= new

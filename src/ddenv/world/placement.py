@@ -30,8 +30,8 @@ from ddenv.world.scenario import Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
-# The steps in which a free place is looked for, and how far, m; and over how many floors at most.
-STEP, FAR, FLOORS = 0.2, 2.0, 3
+# The steps in which a free place is looked for, and how far, m.
+STEP, FAR = 0.2, 2.0
 
 
 def spawn_pose(spawn: Spawn) -> Pose:
@@ -53,8 +53,7 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
 def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn | None] | None:
     """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free.
 
-    That is on a grid of `STEP`, at this height or just above what the robot is inside of, such as floors on the ground; None if
-    there is none within `FAR`.
+    That is on a grid of `STEP`; None if there is none within `FAR`.
     Raises UserError for a robot without collision shapes.
     """
     shapes = [(model, one) for model in world.models for one in model.collisions]
@@ -67,11 +66,8 @@ def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn 
         places = {"x": round(spawn.x + x, 2), "y": round(spawn.y + y, 2), "z": round(spawn.z + z, 2)}
         return spawn.model_copy(update=places)
 
-    heights = [0.0]
-    below: tuple[Model, float, Shape] | None = found
-    while below is not None and len(heights) <= FLOORS:
-        heights.append(heights[-1] + below[1] + 0.01)
-        below = _obstacle(shapes, boxes, robot, moved(0.0, 0.0, heights[-1]))
+    # At this height, or just above what the robot is inside of.
+    heights = [0.0, depth + 0.01]
     sides = [number * STEP for number in range(-round(FAR / STEP), round(FAR / STEP) + 1)]
     moves = sorted(product(sides, sides, heights), key=lambda move: math.hypot(*move))
     free = next((place for place in starmap(moved, moves) if _obstacle(shapes, boxes, robot, place) is None), None)

@@ -46,12 +46,13 @@ class Reading(Section):
 
     `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple shape that stands in for what
     cannot be found there, such as `cylinder:0.3,1.0`, or `*`, all that is missing, to `auto`. `ignore` names kinds of elements
-    to leave out instead of refusing the file.
+    to leave out instead of refusing the file. With `inside`, each collision of a model that never moves is a model of its own.
     """
 
     model_path: tuple[Path, ...] = ()
     stand_ins: dict[str, str] = {}
     ignore: tuple[Ignorable, ...] = ()
+    inside: bool = False
 
 
 PLAIN = Reading()

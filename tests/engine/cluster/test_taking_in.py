@@ -31,8 +31,12 @@ def test_the_same_bits_are_taken_in_whatever_the_versions():
 @pytest.mark.parametrize(
     ("hello", "there", "why"),
     [
-        (SAME, nudged(), "other bits than here; it says that it has the same versions"),
-        (replace(SAME, simulator="drake 0.1"), nudged(), "it has drake 0.1, here is drake "),
+        (
+            SAME,
+            nudged(),
+            f"other bits than here; it has {simulator()}, {machine()}; here is {simulator()}, {machine()}",
+        ),
+        (replace(SAME, simulator="drake 0.1"), nudged(), "it has drake 0.1, "),
         (SAME, replace(HERE, took_part=frozenset({"wall"})), "other bits"),
         (SAME, replace(HERE, motions={"ball": HERE.trajectory}), "other bits"),
         (SAME, Broken("error", "no memory"), "broke: no memory"),

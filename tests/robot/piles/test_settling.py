@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from ddenv.robot.piles import settling
-from ddenv.robot.piles.motion import Motion
-from ddenv.robot.piles.rehearsal import Rehearsals, Script
+from ddenv.robot.piles.rehearsal import Rehearsals
 from ddenv.robot.settled import Settled, moved, notes_on
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, World
@@ -30,7 +27,7 @@ def test_what_falls_and_what_rests_is_told_apart(world_of, add, template):
     assert ways["rests"] < 0.005
     assert ways["falls"] == pytest.approx(1.0, abs=0.01)
     assert settled.places["falls"][0].position == pytest.approx((3, 3, 0.15), abs=0.02)
-    assert (settled.restless, settled.wild, settled.broken) == ((), (), ())
+    assert (settled.restless, settled.broken) == ((), ())
     words = dict(notes_on(world, settled))
     assert words["unrest"].startswith(
         "the world is not at rest at the start: 1 model moves before the robot comes, falls by 1.0"
@@ -46,29 +43,6 @@ def test_it_is_the_same_whatever_ran_before_and_changes_no_run(world_of, add, te
     assert used.supports(everything) == fresh.supports(everything)
     again = used.run(everything, 0)
     assert (again.trajectory == before.trajectory).all()
-
-
-def script_of(heights, speeds) -> Script:
-    """A cube for each column of `heights` (T, N) m, which are as fast as `speeds` (T, N) m/s say."""
-    motions = []
-    for rows in zip(heights, speeds, strict=True):
-        places = np.array([(float(number), 0.0, height) for number, height in enumerate(rows[0])])
-        turns = np.tile(np.eye(3), (len(places), 1, 1))
-        motions.append(Motion(places - 0.1, places + 0.1, np.array(rows[1], dtype=float), places, turns))
-    still = tuple(np.zeros(len(row)) for row in speeds)
-    return Script(
-        tuple("ab"[: len(heights[0])]),
-        np.zeros((len(heights), 1)),
-        tuple(motions),
-        still,
-        resting=np.ones(1, dtype=bool),
-    )
-
-
-def test_what_falls_is_not_wild_and_what_is_thrown_is():
-    falls = [10.0 - 9.81 * time**2 / 2 for time in (0.0, 0.5, 1.0)]
-    script = script_of([(height, 0.1) for height in falls], [(0.0, 0.0), (4.9, 30.0), (9.81, 0.0)])
-    assert settling._wild(script, 9.81).tolist() == [False, True]
 
 
 def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(world_of, add, template, monkeypatch):

@@ -130,7 +130,7 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         pane = pilot.app.screen.query_one(LessonPane)
-        assert pane.parent.border_subtitle == "a to c, or ↑ ↓ and enter; s skips"
+        assert pane.parent.border_subtitle == "a to c answers it, s skips"
         assert footer(pilot)[:3] == ["a to c answer", "s skip", "h hint"] and "enter go on" not in footer(pilot)
         await pilot.press("enter")
         assert not pilot.app._notifications, "it would hide the answers"
@@ -211,17 +211,6 @@ async def test_the_setup_screen_leads_to_the_lessons():
         assert isinstance(pilot.app.screen, LessonsScreen)
         await pilot.press("escape")
         assert not isinstance(pilot.app.screen, LessonsScreen)
-
-
-async def test_arrows_choose_an_answer_and_enter_takes_it():
-    keep_score("what-delta-debugging-is", Score(step=2))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
-        course = pilot.app.screen.course
-        await pilot.press("down", "down", "up", "down")
-        assert f"▸ {'abc'[1]}" in text(pilot)
-        await pilot.press("enter")
-        assert course.page.chosen == 1 and "▸" not in text(pilot)
 
 
 async def test_the_algorithm_is_shown_from_the_step_that_speaks_of_it_on():

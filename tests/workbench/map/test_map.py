@@ -320,7 +320,7 @@ async def test_what_a_trial_leaves_out_has_small_letters(busy):
 async def test_words_about_a_model(busy):
     async with Shown(busy) as (_, world):
         assert world.describe("crate_00").plain == "crate_00 · part A · 1.2 x 0.8 m · 5.9 m from f"
-        assert world.describe("crate_00", 24).plain == "crate_00 · part A"
+        assert world.describe("crate_00", 24).plain == "crate_00 · part A · 1.2…"
         assert "removed" in world.describe("crate_10").plain
         assert "protected" in world.describe("floor").plain
         assert world.describe("nothing").plain == ""

@@ -85,7 +85,7 @@ def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
     ]
     canvas = Canvas(VIEW.rows, VIEW.columns, palette.back)
     fill(canvas, grids[1], how)
-    dotted = ghosts(canvas, *grids, how, palette.faint)
+    dotted = ghosts(canvas, *grids, how, palette.shade(0.35))
     on_floor = dotted & (np.maximum(grids[1][0::2], grids[1][1::2]) >= 0)
     assert on_floor.any() and (canvas.chars[on_floor] == GONE).all()
     assert set(canvas.back[on_floor].tolist()) == {how.looks[how.tones[0]].fill}

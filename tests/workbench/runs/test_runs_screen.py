@@ -8,8 +8,9 @@ from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.runs.compare_runs import CompareRuns, differences, lines
+from ddenv.workbench.runs.compare_runs import differences, lines
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
 from ddenv.workbench.runs.runs_table import RunTable
@@ -83,10 +84,10 @@ async def test_every_run_says_how_it_stands(several, runs):
     async with Listed(several, (200, 60)) as listed:
         states = {name: row[1:4] for name, row in listed.rows().items()}
         assert states == {
-            "crates-1": ["▶ running", "6 of 11", "10"],
-            "done": ["■ minimal", "2 of 11", "83"],
-            "gone [b]x": ["✗ engine is gone", "6 of 11", "10"],
-            "new": ["○ not started", "11 of 11", "0"],
+            "crates-1": ["▶ running", "6/11", "10"],
+            "done": ["■ minimal", "2/11", "83"],
+            "gone [b]x": ["✗ engine is gone", "6/11", "10"],
+            "new": ["○ not started", "11/11", "0"],
             "broken": ["✗ cannot be read", "", ""],
         }
         await listed.choose("broken")
@@ -212,7 +213,7 @@ async def test_two_runs_are_compared(several, runs):
         marked = listed.table.chosen
         await listed.choose("other")
         await listed.press("c")
-        assert isinstance(listed.app.screen, CompareRuns)
+        assert isinstance(listed.app.screen, SideBySide)
         other = next(run for run in RunsFolder(runs).look() if run.path.stem == "other")
     said = {name: values for name, *values in lines(marked, other)}
     assert said["models left"] == ["2 of 11 models", "5 of 11 models"]

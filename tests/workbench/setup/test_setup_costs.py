@@ -4,7 +4,7 @@ import fake_run
 
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.costs import Past, past_of, whole_cost
-from ddenv.workbench.setup.fields import cost, not_used
+from ddenv.workbench.setup.fields import not_used
 from ddenv.world.scenario import Scenario
 
 FIELDS = {field.id: field for field in form.ALL}
@@ -58,15 +58,6 @@ def test_more_iterations_and_more_models_cost_more():
     assert whole_cost(scenario(), 43, 2, Past()) == whole_cost(scenario(), 5000, 2, Past())
     theirs = scenario().model_copy(update={"oracle": object()})
     assert whole_cost(theirs, 5000, 2, Past()) == whole_cost(scenario(slice=False), 5000, 2, Past())
-
-
-def test_costs_follow_what_is_typed(monkeypatch):
-    monkeypatch.setattr("ddenv.runs.processor.usable_cores", lambda: 8)
-    assert cost(FIELDS["iterations"], "0", 1.25) == "A candidate without f costs at most 1 test."
-    assert "about 1.2 s of real time" in cost(FIELDS["timeout"], "30", 1.25)
-    assert "8 processors" in cost(FIELDS["jobs"], "2", 1.25)
-    for text in ("", "many", "inf", "nan", "-1"):
-        assert "candidate without" not in cost(FIELDS["iterations"], text, 1.25)
 
 
 def test_what_is_not_used_is_said():

@@ -198,16 +198,15 @@ def test_only_the_newest_remedies_are_kept():
     assert list(found)[-1] == "model://9"
 
 
-async def test_the_question_for_the_start_says_how_to_come_to_the_map_and_comes_back_to_it(depot):
+async def test_the_question_for_the_start_comes_back_to_the_map(depot):
     async with Opened(size=(80, 24)) as session:
         await session.open(depot)
         assert "the start: move the crosshair" in session.told("picking")
         await session.press("m")
-        assert "the start comes next: s goes to the map" in session.told("picking")
         await session.press("a")
         assert session.screen.focused is session.screen.query_one(WorldMap)
         assert "the start: move the crosshair" in session.told("picking")
-        assert "press s for the start, on the map" in session.told("cost")
+        assert "spawn x m: is missing" in session.told("cost")
 
 
 def test_commands_use_what_the_workbench_remembers_and_say_so(depot):

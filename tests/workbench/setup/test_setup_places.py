@@ -160,23 +160,6 @@ async def test_looking_at_a_world_in_the_list_asks_nothing_before_enter(scenario
         assert session.app.focused is places.map and "the start" in places.says()
 
 
-@pytest.mark.screens
-async def test_start_and_goal_are_remembered_for_each_world(scenarios, tmp_path):
-    worlds = [tmp_path / "one.sdf", tmp_path / "two.sdf"]
-    for number, path in enumerate(worlds):
-        path.write_bytes((scenarios / "crates.sdf").read_bytes())
-        async with Opened() as session:
-            await session.open(path)
-            session.place(spawn_y=str(number))
-            await session.open(scenarios / "crates.yaml")
-    for number, path in enumerate(worlds):
-        async with Opened() as session:
-            await session.open(path)
-            assert Places(session).numbers() == ["-6", str(number), "0.16", "0", "6", "0"]
-            assert not Places(session).map.picking
-            assert session.told("command").startswith("$ ddenv run")
-
-
 LOOSE = fake_run.box("loose", 0, 0).replace("<static>true</static>", "")
 
 

@@ -39,9 +39,6 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started)
         assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
         # What the form does not have comes from the scenario.
         assert not reduction.early_stop
-    # The number of jobs is no part of a scenario: the next form begins with it.
-    async with Opened() as session:
-        assert session.value("jobs") == "3"
 
 
 @pytest.mark.screens
@@ -94,7 +91,7 @@ async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenari
         assert len(title.render().plain) < title.size.width
         options = session.screen.query_one("#run-list", OptionList)
         shown = {str(options.get_option_at_index(index).prompt) for index in range(2)}
-        assert shown == {"■ crates-world-1  2/11", "■ a  2/11 finished"}
+        assert shown == {"■ crates-world-1  2/11", "■ a  2/11"}
         # The keys of panes are written as those of the footer.
         assert session.told("pane-map").strip() == "f3 map"
         # What is too long here is whole on the map's pane.

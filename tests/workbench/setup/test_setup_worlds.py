@@ -1,18 +1,12 @@
 """The setup screen opens worlds without a scenario."""
 
-import json
-from functools import partial
-from pathlib import Path
-
 import pytest
 from textual.widgets import Input, OptionList, Static
 
 from ddenv.runs.remedies import REMEDIES, remembered
 from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.setup import form
 from ddenv.workbench.setup.files import KEPT, RECENT, FileList, OpenFile, recent_files, remember
-from ddenv.workbench.setup.preview import PLACES, places_of, remember_places
 from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
@@ -115,15 +109,11 @@ def test_the_newest_come_first_once_and_not_without_end(files):
     assert recent_files() == [files[0], *found[2:]]
 
 
-PLACE = Path("/one.sdf")
-
-
 @pytest.mark.parametrize("content", ["", "no list", "{", '{"a": 1}', "[1, null, {}]", "[" * 50_000, '["\\u0000"]'])
 def test_what_is_damaged_is_passed_over(content, files):
     for name, read, empty in (
         (RECENT, recent_files, []),
         (REMEDIES, remembered, {}),
-        (PLACES, partial(places_of, PLACE), None),
     ):
         state_file(name).write_text(content)
         assert read() == empty
@@ -131,14 +121,9 @@ def test_what_is_damaged_is_passed_over(content, files):
     assert recent_files() == [files[0]]
 
 
-def test_what_is_damaged_in_a_remedy_or_a_place_is_passed_over():
+def test_what_is_damaged_in_a_remedy_is_passed_over():
     state_file(REMEDIES).write_text('{"a": 1, "b": "tube:1", "c": "/no/where"}')
     assert remembered() == {}
-    for damaged in (3, {"spawn_x": "1e300"}):
-        remember_places(PLACE, dict.fromkeys([field.id for field in form.PLACES], "1"))
-        assert places_of(PLACE)
-        state_file(PLACES).write_text(json.dumps({str(PLACE): damaged}))
-        assert places_of(PLACE) is None
 
 
 def test_where_nothing_can_be_written_nothing_is_remembered(files, monkeypatch, tmp_path):

@@ -59,7 +59,7 @@ def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
     def forbidden(*arguments, **options):
         raise AssertionError("reads a file")
 
-    for name in ("find", "read", "read_parts", "build", "size_of", "is_folder", "model_file"):
+    for name in ("find", "read", "read_parts", "build", "is_folder", "model_file"):
         monkeypatch.setattr(resources, name, forbidden)
     monkeypatch.setattr("os.stat", forbidden)
     monkeypatch.setattr("builtins.open", forbidden)
@@ -103,16 +103,6 @@ def test_limits(world, monkeypatch):
     monkeypatch.setattr(resources, "SDF_LIMIT", 3)
     with pytest.raises(Unusable, match="the maximum is"):
         on_disk(world).sdf("model://box", world)
-
-
-def test_tells_before_something_slow(world):
-    told = []
-    (world / "big.obj").write_text(CUBE + "\n#" + "x" * 3_500_000)
-    disk = on_disk(world, announce=told.append)
-    disk.mesh("cube.obj", world, convex=True)
-    disk.mesh("big.obj", world, convex=True)
-    disk.mesh("big.obj", world, convex=False)
-    assert told == ["reading mesh big.obj (4 MB)"]
 
 
 def damaged(packed: bytes):

@@ -22,7 +22,7 @@ def world_text(inside: str, version: str = "1.9") -> bytes:
 def read(tmp_path: Path) -> Callable[..., World]:
     """Reads what stands inside a `<world>`; other files are looked for in the test's own folder."""
 
-    def make(inside: str, version: str = "1.9", **reading) -> World:
+    def make(inside: str, /, version: str = "1.9", **reading) -> World:
         return parse_world(world_text(inside, version), tmp_path / "here.sdf", Reading(**reading))
 
     return make

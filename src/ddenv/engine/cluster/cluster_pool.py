@@ -1,7 +1,5 @@
-"""Makes tests on the workers of a Dask cluster, as `Pool` does in processes here. Each test goes to one worker that is free.
-
-A worker is asked before it gets a test: it makes the first run of the whole world, and is left out if its bits
-are others than here.
+"""Makes tests on the workers of a Dask cluster, as `Pool` does in processes here. A worker gets tests once its first run of the
+whole world has the bits that it has here.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from queue import Empty, SimpleQueue
@@ -22,11 +20,11 @@ import numpy as np
 from distributed import Client, Future, KilledWorker
 
 from ddenv import __version__
-from ddenv.engine.cluster.link import GOODBYE, Link, in_a_line
-from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
+from ddenv.engine.cluster.link import GOODBYE, Link
+from ddenv.engine.cluster.made_there import Asked, Hello, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Changes, Start
+from ddenv.engine.worker import Broken, Run, Start, reason_of
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -45,8 +43,8 @@ FETCHED = 20.0
 
 @dataclass(eq=False)
 class _Worker:
-    """A Dask worker that can make `threads` tests at the same time; `hello` is None until it has answered. It is `accepted` once it
-    has shown the same bits. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
+    """A Dask worker that can make `threads` tests at a time; `accepted` once it has shown the same bits. `hello` is None until it
+    has answered. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
     """
 
     address: str
@@ -73,7 +71,7 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0)
+        self._whole = Run(frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0))
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.
@@ -84,22 +82,15 @@ class ClusterPool:
         self._said = 0
         self._client: Client | None = None
         self._sent: Future[bytes] | None = None
-        self._compares = scenario.oracle is None
+        # The process here that makes the run to compare with; runs of the user's own simulator are not compared.
+        self._home = Pool(*self._parts, 1) if scenario.oracle is None else None
         self._reference: RunResult | None = None
-        self._home: Pool | None = None
-        self._settling = False
         # What has happened in other threads, to be done in that of the engine.
         self._due: SimpleQueue[Callable[[], None]] = SimpleQueue()
         tell(0, f"asking the Dask scheduler of {cluster}")
         self._link = Link(cluster, self._later(self._attached), self._later(self._there), self._later(self._lost))
-        if self._compares:
-            self._here().submit(REFERENCE, *self._whole)
-
-    def _here(self) -> Pool:
-        """The process on this machine."""
-        if self._home is None:
-            self._home = Pool(*self._parts, 1)
-        return self._home
+        if self._home is not None:
+            self._home.submit(REFERENCE, self._whole)
 
     def _later(self, happened: Callable[..., None]) -> Callable[..., None]:
         return lambda *what: self._due.put(partial(happened, *what))
@@ -123,21 +114,13 @@ class ClusterPool:
     def busy(self) -> int:
         return len(self._tests) + len(self._waiting) + len(self._ready)
 
-    def submit(
-        self,
-        test: int,
-        keep: frozenset[str],
-        seed: int,
-        full: bool = True,
-        limit: float | None = None,
-        changes: Changes = (),
-    ) -> None:
+    def submit(self, test: int, run: Run) -> None:
         """Has a worker make a test, as soon as there is one; as `Pool.submit`."""
-        if self._reference is not None and full and not changes and (keep, seed) == self._whole:
+        if self._reference is not None and replace(run, limit=None) == self._whole:
             # It was made here in any case.
             self._ready.append((test, self._reference))
             return
-        self._waiting.append(Asked(self._run, self._topic, test, keep, seed, full, limit, changes))
+        self._waiting.append(Asked(self._run, self._topic, test, run))
         self._send()
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
@@ -155,16 +138,14 @@ class ClusterPool:
 
     def _look_here(self) -> None:
         """Raises UserError if the run to compare with broke."""
-        if self._home is not None and self._compares and self._reference is None:
-            for _, result in self._home.finished(0.0):
-                if isinstance(result, Broken):
-                    raise UserError(
-                        f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
-                    )
-                self._reference = result
-        if self._home is not None and not self._settling and (self._reference is not None or not self._compares):
-            self._home.close()
-            self._home = None
+        if self._home is None or self._reference is not None:
+            return
+        for _, result in self._home.finished(0.0):
+            if isinstance(result, Broken):
+                raise UserError(
+                    f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
+                )
+            self._reference = result
 
     # What happens to the cluster.
 
@@ -200,7 +181,11 @@ class ClusterPool:
             self._workers[worker.address] = worker
             self._ask(worker)
         if new:
-            first = ": first the whole world once, as it is made here, to compare the bits" if self._compares else ""
+            first = (
+                ": first the whole world once, as it is made here, to compare the bits"
+                if self._home is not None
+                else ""
+            )
             self._news.append(f"{count(len(new), 'worker')} came to the cluster{first}")
 
     def _gone(self, address: str) -> int:
@@ -224,7 +209,7 @@ class ClusterPool:
 
     def _ask(self, worker: _Worker) -> None:
         """Asks a new worker who it is, and what bits it computes."""
-        whole = Asked(self._run, self._topic, REFERENCE, *self._whole, True, None)
+        whole = Asked(self._run, self._topic, REFERENCE, self._whole)
         self._hand_out(worker, greet, whole, None)
 
     def _send(self) -> None:
@@ -262,17 +247,14 @@ class ClusterPool:
         if asked is None:
             self._answered(worker, answer)
             return
-        if isinstance(answer, CancelledError | NotWanted | NotGreeted | KilledWorker | TimeoutError):
+        if isinstance(answer, CancelledError | NotWanted | KilledWorker | TimeoutError):
             self._wait_again([asked])
-            if isinstance(answer, NotGreeted):
-                worker.accepted = False
-                self._ask(worker)
             return
         self._progress.pop(asked.test, None)
         if isinstance(answer, UserError):
             raise answer
         broke = isinstance(answer, BaseException)
-        self._ready.append((asked.test, Broken("error", printable(in_a_line(answer))) if broke else answer))
+        self._ready.append((asked.test, Broken("error", reason_of(answer)) if broke else answer))
 
     # Who may make tests.
 
@@ -280,14 +262,14 @@ class ClusterPool:
         if isinstance(answer, CancelledError | KilledWorker):
             return
         if isinstance(answer, BaseException):
-            self._leave_out(worker, f"it cannot make tests: {printable(in_a_line(answer))}")
+            self._leave_out(worker, f"it cannot make tests: {reason_of(answer)}")
             return
         worker.hello, run = answer
         self._greeted.append((worker, run))
 
     def _take_in(self) -> None:
         """Compares what new workers made, once there is something to compare with."""
-        if self._compares and self._reference is None:
+        if self._home is not None and self._reference is None:
             return
         for worker, run in self._greeted:
             if worker.hello is None or worker is not self._workers.get(worker.address):
@@ -315,18 +297,15 @@ class ClusterPool:
     # As of `Pool`.
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
-        """As `Pool.settle`, on this machine: once the run to compare with is made, since there is one process."""
-        self._settling = True
+        """As `Pool.settle`, in the process here once that has made the run to compare with."""
         asked: list[Callable[[], Start | Broken | None]] = []
 
         def found() -> Start | Broken | None:
+            if self._home is None or self._reference is None:
+                return None
             if not asked:
-                if self._compares and self._reference is None:
-                    return None
-                asked.append(self._here().settle(elements))
-            result = asked[0]()
-            self._settling = result is None
-            return result
+                asked.append(self._home.settle(elements))
+            return asked[0]()
 
         return found
 
@@ -367,18 +346,9 @@ def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | No
     if isinstance(there, Broken):
         return f"its first run of the whole world broke: {there.failure}"
     if there is None or not _same_bits(there, here):
-        return f"its first run of the whole world has other bits than here; {_difference(hello)}"
+        theirs, ours = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
+        return f"its first run of the whole world has other bits than here; it has {theirs}; here is {ours}"
     return ""
-
-
-def _difference(hello: Hello) -> str:
-    there = f"{hello.simulator}, {hello.machine}".split(", ")
-    here = f"{simulator()}, {machine()}".split(", ")
-    theirs = ", ".join(each for each in there if each not in here)
-    ours = ", ".join(each for each in here if each not in there)
-    return (
-        f"it has {theirs}, here is {ours}" if theirs else "it says that it has the same versions and the same processor"
-    )
 
 
 def _same_bits(one: RunResult, other: RunResult) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 
 from distributed import Client, Security, SSHCluster
 
+from ddenv.engine.worker import reason_of
 from ddenv.errors import UserError
 from ddenv.runs.clusters import hosts_of
 from ddenv.world.access import is_file
@@ -25,8 +26,8 @@ GOODBYE = 2.0
 class Link:
     """A connection to the scheduler of `cluster` that is made again when it is lost.
 
-    In its thread it calls `attached` with each new connection: all that was known of an earlier one is void; `there` with the
-    addresses of all workers that are there, and how many tests each can make at the same time; and `lost` with the reason.
+    In its thread it calls `attached` with each new connection, `there` with the addresses of all workers and how many tests each
+    can make at a time, and `lost` with the reason.
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class Link:
         except Exception as error:
             self._end()
             raise UserError(
-                f"{cluster}: no Dask scheduler can be used there ({in_a_line(error)}); start it, or make the tests on this "
+                f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, or make the tests on this "
                 "machine with --cluster here"
             ) from None
         self._thread = threading.Thread(target=self._follow, daemon=True)
@@ -83,7 +84,7 @@ class Link:
             try:
                 threads = dict(self._client.ncores())
             except Exception as error:
-                return in_a_line(error)
+                return reason_of(error)
             if threads != before:
                 before = threads
                 self._there(threads)
@@ -111,9 +112,3 @@ class Link:
         self._closed.set()
         self._end()
         self._thread.join(ANSWER)
-
-
-def in_a_line(error: BaseException) -> str:
-    """An exception in one line."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"[:300]

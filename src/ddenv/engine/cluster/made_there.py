@@ -1,7 +1,4 @@
-"""What runs inside a Dask worker: it makes tests as the engine does here, each in a child process that keeps the simulator.
-
-Dask cannot end a test that hangs, so the child is one of `Pool`: it has a limit of real time, and is replaced when it dies.
-"""
+"""What runs inside a Dask worker: each test in a child process that keeps the simulator: Dask cannot end what hangs."""
 
 from __future__ import annotations
 
@@ -10,10 +7,9 @@ import pickle
 import platform
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 from distributed import Worker, get_worker
@@ -21,7 +17,7 @@ from distributed import Worker, get_worker
 from ddenv import __version__
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Changes
+from ddenv.engine.worker import Broken, Run
 from ddenv.robot.result import RunResult
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
@@ -31,8 +27,6 @@ from ddenv.world.scenario import Scenario
 LOOK = 0.2
 # The time between two reports of a running test, s.
 PERIOD = 0.5
-# A child that nobody has used for so long ends, s: its engine may have been killed.
-UNUSED = 600.0
 
 
 # What a test needs. It is sent once to each worker, as bytes.
@@ -41,16 +35,12 @@ Parts = tuple[Scenario, World, Model]
 
 @dataclass(frozen=True)
 class Asked:
-    """A test to make in the world of `run`, whose progress goes to `topic`. `limit` and `changes` as in `Pool.submit`."""
+    """A test to make in the world of `run`, whose progress goes to `topic`."""
 
     run: str
     topic: str
     test: int
-    keep: frozenset[str]
-    seed: int
-    full: bool
-    limit: float | None
-    changes: Changes = ()
+    task: Run
 
 
 @dataclass(frozen=True)
@@ -67,20 +57,10 @@ class NotWanted(Exception):
     """Nobody waits for the test any more."""
 
 
-class NotGreeted(Exception):
-    """The engine has not compared the bits of this process, which has the address of an earlier one."""
-
-
-# The topics of the engines that this process has greeted.
-_engines: set[str] = set()
-
-
 def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]:
-    """A worker's hello, and the test by which its bits are compared; none in a simulator of the user's own.
-
-    Raises UserError where that cannot be started.
+    """A worker's hello, and the test by which its bits are compared; none in a simulator of the user's own. Raises UserError where
+    that cannot be started.
     """
-    _engines.add(asked.topic)
     hello = Hello(platform.node(), __version__, simulator(), machine())
     # The name of the run begins with the engine's version: another one may understand nothing else.
     if hello.version != asked.run.partition(" ")[0]:
@@ -93,13 +73,11 @@ def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]
 
 
 def make(parts: bytes, asked: Asked) -> RunResult | Broken:
-    """Makes a test in a child process. Raises UserError if the world cannot be simulated, NotWanted, and NotGreeted."""
-    if asked.topic not in _engines:
-        raise NotGreeted
+    """Makes a test in a child process. Raises UserError if the world cannot be simulated, and NotWanted."""
     worker = get_worker()
     key = worker.get_current_task()
     with _child(parts, asked.run) as child:
-        child.submit(asked.test, asked.keep, asked.seed, asked.full, asked.limit, asked.changes)
+        child.submit(asked.test, asked.task)
         due = 0.0
         while not (ended := child.finished(LOOK)):
             if not _is_wanted(worker, key):
@@ -122,66 +100,44 @@ def _report(worker: Worker, child: Pool, asked: Asked) -> None:
         worker.log_event(asked.topic, row)
 
 
-@dataclass(frozen=True)
-class _Idle:
-    run: str
-    child: Pool
-    since: float
-
-
-_idle: list[_Idle] = []
+# The idle children, with the run that each is for.
+_idle: list[tuple[str, Pool]] = []
 _lock = threading.Lock()
 
 
 @contextmanager
 def _child(parts: bytes, run: str) -> Iterator[Pool]:
     """A child process for `run`, kept for the next test unless this one goes wrong."""
-    taken = _taken(lambda idle: idle.run == run, 1)
-    # Those of other runs end where there is none: a worker has memory for one a thread.
-    for other in () if taken else _taken(lambda _: True, 1):
-        other.close()
-    child = taken[0] if taken else _new(parts)
+    with _lock:
+        kept = next((one for one in _idle if one[0] == run), _idle[0] if _idle else None)
+        if kept is not None:
+            _idle.remove(kept)
+    if kept is not None and kept[0] != run:
+        # A worker has memory for one a thread.
+        kept[1].close()
+    child = kept[1] if kept is not None and kept[0] == run else _new(parts)
     try:
         yield child
     except BaseException:
         child.close()
         raise
     with _lock:
-        _idle.append(_Idle(run, child, time.monotonic()))
-
-
-def _taken(which: Callable[[_Idle], bool], most: int | None = None) -> list[Pool]:
-    """The idle children of this kind, at most so many, which are idle no longer."""
-    with _lock:
-        taken = [idle for idle in _idle if which(idle)][:most]
-        for idle in taken:
-            _idle.remove(idle)
-    return [idle.child for idle in taken]
+        _idle.append((run, child))
 
 
 def _new(parts: bytes) -> Pool:
-    _watch()
     # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
     known: Parts = pickle.loads(parts)
     return Pool(*known, 1, at_a_time=get_worker().state.nthreads)
 
 
-@cache
-def _watch() -> None:
-    """Once in this process: a thread ends children that nobody uses."""
-    threading.Thread(target=_end_unused, daemon=True).start()
-
-
-def _end_unused() -> None:
-    while True:
-        time.sleep(UNUSED / 10)
-        for child in _taken(lambda idle: time.monotonic() - idle.since > UNUSED):
-            child.close()
-
-
 def forget(run: str) -> None:
     """Ends the idle children of `run`."""
-    for child in _taken(lambda idle: idle.run == run):
+    with _lock:
+        gone = [one for one in _idle if one[0] == run]
+        for one in gone:
+            _idle.remove(one)
+    for _, child in gone:
         # This is the thread in which the worker talks with the scheduler.
         threading.Thread(target=child.close).start()

@@ -7,7 +7,6 @@ region's edge is given up, and made again from its start in a larger one: as if 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -70,6 +69,12 @@ class Region:
         outside = self._depths((low + high)[:, :2] / 2) + _radii(low, high) < 0
         return frozenset(name for (name, _), out in zip(found, outside, strict=True) if out)
 
+    def watch(self, place: Place, reach: float, models: Bounds) -> None:
+        """As `check` for the boxes `models`, and for the robot, no part of which is farther than `reach` (m) from `place`."""
+        self.check(models)
+        if not float(self._depths(np.array([place]))[0]) >= reach + MARGIN:
+            raise LeftRegion(place)
+
     def check(self, boxes: Bounds) -> None:
         """Raises LeftRegion unless all boxes, between corners (N, 3) m and (N, 3) m, keep their distance from the edge."""
         low, high = boxes
@@ -83,10 +88,6 @@ class Region:
             x, y = places[near.argmax()].tolist()
             raise LeftRegion((x, y))
 
-    def depth(self, place: Place) -> float:
-        """How far inside the edge `place` is, m; below 0 outside."""
-        return float(self._depths(np.array([place]))[0])
-
     def _depths(self, places: Floats) -> Floats:
         """How far inside the edge each of `places` (N, 2) m is."""
         depths = np.full(len(places), -np.inf)
@@ -96,29 +97,6 @@ class Region:
             apart = np.linalg.norm(places - start - along[:, None] * way, axis=1)
             depths = np.maximum(depths, width - apart)
         return depths
-
-
-class Watch:
-    """Watches one run in a region. No part of the robot is more than `reach` (m) away from its first link."""
-
-    def __init__(self, region: Region, reach: float) -> None:
-        self._region = region
-        self._reach = reach
-        # Within `_free` m of `_start` the robot is far enough from the edge.
-        self._start = (math.inf, math.inf)
-        self._free = 0.0
-
-    def look(self, place: Place, models: Bounds) -> None:
-        """Raises LeftRegion if the robot or a model comes near the edge.
-
-        The robot's first link is at `place` (m), the models that are simulated are in the boxes `models`.
-        """
-        self._region.check(models)
-        if math.dist(place, self._start) < self._free:
-            return
-        self._start, self._free = place, self._region.depth(place) - self._reach - MARGIN
-        if not self._free >= 0:
-            raise LeftRegion(place)
 
 
 def _radii(low: Floats, high: Floats) -> Floats:

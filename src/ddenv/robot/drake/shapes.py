@@ -50,11 +50,8 @@ def wheel_friction(robot: Model, drive: Drive) -> float:
 def world_friction(mu: float, wheels: float) -> float:
     """The friction coefficient of a surface of the world in Drake, so that the robot's wheels grip it as in Gazebo.
 
-    Gazebo's ODE takes the smaller of two surfaces' coefficients, m = min(mu, wheels). Drake combines a and b as
-    2 a b / (a + b), which is m for b = wheels and 1 / a = 2 / m - 1 / b. The robot's own surfaces keep their coefficients, so
-    contact with the wheels is exact. Between two surfaces of the world, Drake's result lies between half the smaller coefficient
-    and the smaller one (with both limited to `wheels`); it is the smaller one if the other surface is at least as rough as the
-    wheels. Between the world and another part of the robot it lies between half the smaller and twice the smaller.
+    Gazebo's ODE takes the smaller of two surfaces' coefficients, m = min(mu, wheels). Drake combines a and b as 2 a b / (a + b),
+    which is m for b = wheels and 1 / a = 2 / m - 1 / b. The user guide says what that makes of other contacts.
     """
     grip = min(mu, wheels)
     return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0

@@ -12,13 +12,13 @@ import time
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.robot.controllers import LONGEST_REASON, SEEDS, described, first_on_path, load
-from ddenv.robot.deadline import TooLate, call_within
+from ddenv.robot.controllers import LONGEST_REASON, SEEDS, Answer, BadCode, guarded, load
+from ddenv.robot.deadline import call_within
 from ddenv.robot.external.process import running
 from ddenv.robot.external.protocol import Ended, Row, SimulatorSetup, SubWorld
 from ddenv.robot.external.simulator import EXPECTED, BadLog, PoseLog, scenario_in, temporary_folder, write_files
@@ -38,8 +38,6 @@ KEY, METHOD = "oracle.use", "run(world, seed, timeout)"
 LONGEST_START = 600.0
 ROW = "(time, pose) or (time, pose, poses by model)"
 SHOWN = 80
-
-Answer = TypeVar("Answer")
 
 
 class PythonSimulator:
@@ -126,16 +124,9 @@ class PythonSimulator:
     def _guarded(self, what: str, call: Callable[[], Answer]) -> Answer:
         """Returns `call()`. Raises UserError, in one line, for whatever that raises."""
         try:
-            with first_on_path(self._folder):
-                return call()
-        except TooLate:
-            problem = f"took longer than {LONGEST_START:g} s"
-        except BadLog as error:
-            problem = str(error)
-        # The class may also exit, or interrupt itself.
-        except BaseException as error:
-            problem = f"raised {described(error)}"
-        raise UserError(plain(f"simulator {self._name}: {what} {problem}")[:LONGEST_REASON])
+            return guarded(call, self._folder, f"took longer than {LONGEST_START:g} s")
+        except BadCode as error:
+            raise UserError(plain(f"simulator {self._name}: {what} {error}")[:LONGEST_REASON]) from None
 
 
 def _drained(rows: Generator[Row, None, Ended], poses: Poses) -> Ended:

@@ -20,6 +20,7 @@ import yaml
 
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
+from ddenv.robot.controllers import WrongAnswer
 from ddenv.robot.external.process import BEGIN, Ended, running, watch
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import RECORD_PERIOD, Progress, RunResult
@@ -217,7 +218,7 @@ SHOWN = 60
 Row = tuple[float, float, float, float, float, float, float, float]
 
 
-class BadLog(Exception):
+class BadLog(WrongAnswer):
     """What is wrong with a pose log, in one line."""
 
 

@@ -208,10 +208,6 @@ class Stillness:
         return rest
 
 
-# What an array takes besides its numbers, bytes.
-ARRAY = 128
-
-
 @dataclass(frozen=True)
 class Script:
     """How a pile of K models moves alone, with a row for each tick of the clock.
@@ -231,4 +227,4 @@ class Script:
     def size(self) -> int:
         """About how much memory it takes, bytes."""
         arrays = [self.states, *self.paces, *(part for motion in self.motions for part in vars(motion).values())]
-        return sum(array.nbytes + ARRAY for array in arrays)
+        return sum(array.nbytes + 128 for array in arrays)

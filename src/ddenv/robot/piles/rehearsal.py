@@ -16,7 +16,7 @@ from pydrake.systems.analysis import Simulator
 from ddenv.arrays import Booleans, Floats
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.motion import ARRAY, NEAR, Links, Motion, Script, gaps, spread
+from ddenv.robot.piles.motion import NEAR, Links, Motion, Script, gaps, spread
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import model_bounds
 from ddenv.world.model import World, still_links
@@ -40,24 +40,16 @@ class Known:
     present: frozenset[str]
     script: Script | None
 
-    @property
-    def size(self) -> int:
-        """About how much memory it takes, bytes."""
-        return ARRAY * (1 + len(self.near)) + (0 if self.script is None else self.script.size)
-
 
 class Repertoire:
     """The scripts of one world's piles. `moving` is the number of models that can move in the whole of it.
 
-    They take at most about `MEMORY`: then those go that were not used for the longest time. A script that is rehearsed again is
-    the same to the last bit.
+    They take at most about `MEMORY`: then all go. A script that is rehearsed again is the same to the last bit.
     """
 
     def __init__(self, world: World, moving: int) -> None:
         self.moving = moving
         self._known: dict[tuple[str, ...], list[Known]] = {}
-        # With their sizes; the one that was used last comes last.
-        self._by_use: dict[Known, int] = {}
         self._size = 0
         self._static = {
             model.name: model_bounds(model)
@@ -93,7 +85,6 @@ class Repertoire:
         """The script of the pile `names` in a world that keeps the models `present`; None if it has to be rehearsed."""
         for known in self._known.get(names, ()):
             if known.near & present == known.present:
-                self._by_use[known] = self._by_use.pop(known)
                 return known
         return None
 
@@ -102,12 +93,9 @@ class Repertoire:
         near = frozenset(self._static) if script is None else frozenset(self._near(script.motions, margin))
         known = Known(names, near, near & present, script)
         self._known.setdefault(names, []).append(known)
-        self._by_use[known] = known.size
-        self._size += known.size
-        while self._size > MEMORY:
-            oldest = next(iter(self._by_use))
-            self._size -= self._by_use.pop(oldest)
-            self._known[oldest.names].remove(oldest)
+        self._size += 0 if script is None else script.size
+        if self._size > MEMORY:
+            self._known, self._size = {}, 0
         return known
 
     def _near(self, motions: Iterable[Motion], margin: float) -> Iterable[str]:

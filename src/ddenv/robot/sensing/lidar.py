@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,8 +18,6 @@ from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
 
-# The lidar collects what is near for later scans only if it moved less than this part of near since the last scan.
-CALM = 0.5
 # Random numbers reserved for the noise of each scan.
 DRAWS = 2**40
 
@@ -60,13 +57,9 @@ class Lidar:
         first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
         owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
         self._links = obstacles.links[rows][self._movers] + np.array([first[name] for name in owners], dtype=int)
-        self._poses: tuple[Floats, Floats] | None = None
         # In the frames of their links, which do not change during the run.
         self._centers = self._shapes.centers[:, self._movers]
         self._frames = self._shapes.frames[:, :, self._movers]
-        # The shapes that beams may hit from near the pose at which they were collected.
-        self._near: Near | None = None
-        self._place: Pose | None = None
 
     @property
     def took_part(self) -> dict[str, float]:
@@ -80,13 +73,11 @@ class Lidar:
         moving models, model after model. All are in the world frame.
         """
         place = Pose(pose[:3], pose[3:]) @ self._mount
-        moved, before, self._place = self._move(places, turns), self._place, place
-        if moved or not (self._near and self._near.has(place)):
-            calm = not moved and before is not None and are_near(before, place, CALM)
-            self._near = Near.of(self._fan, self._shapes, self._owners, place, calm)
-        turn = Turn(self._turns, now, place, self._near)
+        self._move(places, turns)
+        rows = in_the_way(self._fan, self._shapes, np.array(place.position), place.rotation().T)
+        turn = Turn(self._turns, now, place, self._shapes.take(rows), self._owners[rows])
         self._turns += 1
-        if self._unseen[turn.near.owners].any():
+        if self._unseen[turn.models].any():
             self._notice(turn, now)
         return LazyScan(now, self._fan.angles, partial(self._ranges, turn), self._mount.position)
 
@@ -109,8 +100,8 @@ class Lidar:
         """The ranges of `turn`, computed when they are needed first."""
         if turn.ranges is None:
             origin, axes = np.array(turn.place.position), turn.place.rotation().T
-            distances, turn.beams, shapes = cast(self._fan, turn.near.shapes, origin, axes)
-            turn.owners = turn.near.owners[shapes]
+            distances, turn.beams, shapes = cast(self._fan, turn.shapes, origin, axes)
+            turn.owners = turn.models[shapes]
             turn.measured = self._noise(turn.number) + distances
             beyond = (turn.measured < self._settings.nearest) | (turn.measured > self._settings.range)
             turn.ranges = np.where(beyond, np.inf, turn.measured)
@@ -123,13 +114,10 @@ class Lidar:
         bits.advance(number * DRAWS)
         return self._settings.noise * self._random.standard_normal(len(self._fan.angles))
 
-    def _move(self, places: Floats, turns: Floats) -> bool:
-        """Moves the shapes to where their links are. Returns whether anything moved."""
+    def _move(self, places: Floats, turns: Floats) -> None:
+        """Moves the shapes to where their links are."""
         if not len(self._movers):
-            return False
-        before, self._poses = self._poses, (places.copy(), turns.copy())
-        if before and np.array_equal(before[0], places) and np.array_equal(before[1], turns):
-            return False
+            return
         turn = turns[self._links].transpose(1, 2, 0)
         first, second, third = (turn[:, axis] for axis in range(3))
         a, b, c = self._centers
@@ -137,7 +125,6 @@ class Lidar:
         a, b, c = self._frames
         frames = first[:, None] * a + second[:, None] * b + third[:, None] * c
         self._shapes.frames[:, :, self._movers] = frames
-        return True
 
     def _notice(self, turn: Turn, now: float) -> None:
         """Notes the models on which a beam ended for the first time, with a measured range."""
@@ -151,7 +138,7 @@ class Lidar:
 
 @dataclass(slots=True, eq=False)
 class Turn:
-    """Scan `number` of a lidar: its time (s), its pose and the shapes that its beams may hit.
+    """Scan `number` of a lidar: its time (s), its pose, and the K shapes that its beams may hit, with their `models` (K,).
 
     Once computed: its ranges, the distances (B,) m that its beams measured, also too small and too large ones, and the models
     `owners` (H,) on which the beams `beams` (H,) ended.
@@ -160,7 +147,8 @@ class Turn:
     number: int
     time: float
     place: Pose
-    near: Near
+    shapes: Shapes
+    models: Integers
     ranges: Floats | None = None
     measured: Floats = field(default_factory=lambda: np.empty(0))
     beams: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
@@ -190,80 +178,23 @@ class LazyScan(Scan):
         return Scan, (self.time, self.angles, self.ranges, self.origin)
 
 
-# Two poses of the lidar are near each other within this distance (m), this much of it upwards (m), and this tilt (rad).
-AROUND = 0.7
-LIFT = 0.04
-TILT = 0.02
+def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Integers:
+    """The numbers (K,) of the shapes that the beams may hit from `origin` (3,).
 
-
-@dataclass(frozen=True, slots=True)
-class Near:
-    """All K shapes that beams may hit from `place` or, with `calm`, from any place near it. `owners` (K,) are their models."""
-
-    place: Pose
-    calm: bool
-    shapes: Shapes
-    owners: Integers
-
-    @classmethod
-    def of(cls, fan: Fan, shapes: Shapes, owners: Integers, place: Pose, calm: bool) -> Near:
-        """Selects from `shapes`, whose models are `owners` (N,)."""
-        rows = in_the_way(fan, shapes, np.array(place.position), place.rotation().T, float(calm))
-        return cls(place, calm, shapes.take(rows), owners[rows])
-
-    def has(self, place: Pose) -> bool:
-        """Whether these include all shapes that beams may hit from `place`."""
-        return self.calm and are_near(self.place, place)
-
-
-def are_near(one: Pose, other: Pose, part: float = 1.0) -> bool:
-    """Whether two poses are near each other; `part` scales all limits."""
-    up = _up(one)
-    if math.dist(one.position, other.position) > part * AROUND or math.dist(up, _up(other)) > part * TILT:
-        return False
-    lift = sum([(to - at) * along for to, at, along in zip(other.position, one.position, up, strict=True)])
-    return abs(lift) <= part * LIFT
-
-
-def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, part: float) -> Integers:
-    """The numbers (K,) of the shapes that the beams may hit from `origin` (3,), or from any place near it.
-
-    `axes` (3, 3) are the lidar's axes, as rows; the beams lie in the plane of the first two. `part` scales what near means: 0 is
-    `origin` alone.
+    `axes` (3, 3) are the lidar's axes, as rows; the beams lie in the plane of the first two.
     """
-    around, lift, tilt = part * AROUND, part * LIFT, part * TILT
-    numbers = _within_reach(fan, shapes, origin, axes, around, lift, tilt)
+    # A matrix product may round differently among more shapes: nothing else is computed from this one.
+    ahead, left, above = axes @ (shapes.centers - origin[:, None])
+    far = shapes.reaches + fan.range
+    numbers: Integers = ((np.abs(above) <= shapes.reaches) & (ahead * ahead + left * left <= far * far)).nonzero()[0]
     frames, away = shapes.frames.take(numbers, axis=2), origin[:, None] - shapes.centers.take(numbers, axis=1)
     local = (away[:, None] * frames).sum(axis=0)
     up = (axes[2][:, None, None] * frames).sum(axis=0)
     # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical axis.
     edges = up * shapes.squares.take(numbers, axis=1)
-    tilted = tilt * (np.sqrt((away * away).sum(axis=0)) + around + 2 * shapes.reaches[numbers])
-    cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + tilted + lift + SPARE
+    cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + SPARE
     # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
-    squares = (frames * frames).sum(axis=0)
-    extents = np.sqrt(np.maximum(squares - up * up, 0.0)) + tilt * np.sqrt(squares)
-    far = extents * (fan.range * (1.0 + SPARE) + around) + lift * np.abs(up) + SPARE
-    met: Booleans = cut & (np.abs(local) - 1.0 <= far).all(axis=0)
+    extents = np.sqrt(np.maximum((frames * frames).sum(axis=0) - up * up, 0.0))
+    met: Booleans = cut & (np.abs(local) - 1.0 <= extents * (fan.range * (1.0 + SPARE)) + SPARE).all(axis=0)
     in_way: Integers = numbers[met]
     return in_way
-
-
-def _within_reach(
-    fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, around: float, lift: float, tilt: float
-) -> Integers:
-    """The numbers of the shapes whose bounding spheres the plane of the beams cuts within their range."""
-    # A matrix product may round differently among more shapes: nothing else is computed from this one.
-    ahead, left, above = axes @ (shapes.centers - origin[:, None])
-    flat, high = ahead * ahead + left * left, np.abs(above)
-    tallest = shapes.reaches + lift + tilt * (np.sqrt(flat + high * high) + around)
-    # A tilt brings what lies above or below nearer in the plane by this much.
-    far = (shapes.reaches + (fan.range + around) + tilt * (high + around)) * (1.0 + tilt * tilt)
-    numbers: Integers = ((high <= tallest) & (flat <= far * far)).nonzero()[0]
-    return numbers
-
-
-def _up(place: Pose) -> Vector:
-    """The vertical axis of `place` in the world frame."""
-    w, x, y, z = place.quaternion
-    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)

@@ -42,19 +42,16 @@ class Notice:
         self._names = np.array([*around.names, *(body.name for body in kept)], dtype=object)
         there = np.array([name in present for name in around.names], dtype=bool)
         solid = [any(body.bounds) for body in kept]
-        self._untouched: Booleans = np.array([*there, *solid], dtype=bool)
         self._unseen: Booleans = np.array([*(there & around.visible), *solid], dtype=bool)
 
-    def feel(self, now: float, place: Vector) -> None:
-        """Notes what the robot touches at the time `now` (s); `place` (m) is the position of its first link.
+    def feel(self, now: float) -> None:
+        """Notes what the robot touches at the time `now` (s).
 
         Call it after the motors got their command: then Drake computes the contacts that the next step needs in any case, once and
         with the same bits. Contacts that begin and end between two calls are missed.
         """
-        if self._may_touch(np.array(place)):
-            for name in self._touched():
-                self.first_touched[name] = now
-                self._untouched &= self._names != name
+        for name in self._touched():
+            self.first_touched[name] = now
 
     def look(self, now: float, place: Vector, heading: float) -> None:
         """Notes what is in view at the time `now` (s) from `place` (m), in the direction `heading` (rad)."""
@@ -80,12 +77,6 @@ class Notice:
         """The lowest and the highest corners, (N, 3) m each, of all boxes now."""
         low, high = self._sleep.boxes()
         return np.vstack([self._around.low, low]), np.vstack([self._around.high, high])
-
-    def _may_touch(self, place: Floats) -> bool:
-        """Whether the robot might touch something that it has not touched yet."""
-        low, high = self._boxes()
-        near = distances(low[self._untouched], high[self._untouched], place) < self._around.reach
-        return bool(near.any())
 
     def _touched(self) -> Iterator[str]:
         """The models that the robot touches for the first time."""
@@ -156,7 +147,7 @@ class Surroundings:
     """One robot in one world.
 
     `contacts` is the plant's port of contacts. `robot` are the ids of the robot's geometry; `owners` maps the ids of all other
-    geometry to the names of its models. The robot touches nothing beyond `reach` (m) from the origin of its first link.
+    geometry to the names of its models.
 
     `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts. A
     ground model has a second, endless box around all that is below its plane, which is not `visible` (N,).
@@ -165,15 +156,14 @@ class Surroundings:
     contacts: OutputPort
     robot: frozenset[int]
     owners: dict[int, str]
-    reach: float
     names: Objects
     low: Floats
     high: Floats
     visible: Booleans
 
     @classmethod
-    def of(cls, boxes: Sequence[Still], reach: float, built: Built) -> Surroundings:
-        """`boxes` are those of `still_boxes`; the robot has no point beyond `reach` (m) from its first link's origin."""
+    def of(cls, boxes: Sequence[Still], built: Built) -> Surroundings:
+        """`boxes` are those of `still_boxes`."""
         geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
         geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
         low, high = stacked((low, high) for _, low, high, _ in boxes)
@@ -181,7 +171,6 @@ class Surroundings:
             contacts=built.plant.get_contact_results_output_port(),
             robot=frozenset(one.get_value() for one in built.robot.geometry),
             owners={one.get_value(): name for name, members in geometry for one in members},
-            reach=reach,
             names=np.array([name for name, *_ in boxes], dtype=object),
             low=low,
             high=high,

@@ -14,7 +14,6 @@ from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.drake.plant import Body
-from ddenv.robot.drake.region import Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
@@ -37,8 +36,9 @@ End = tuple[str, str, bool]
 class Run:
     """One run in a prepared context: start poses are set, removed models are switched off.
 
-    Without `watch` all of the world is in the plant. `kept` are the moving models whose motion is recorded. With `stuck` the run is
-    cut short once the robot is stuck for good. Without `reached` it stays unknown who took part; `unusual` take part in any case.
+    No part of the robot is farther than `reach` (m) from its first link. `kept` are the moving models whose motion is recorded.
+    With `stuck` the run is cut short once the robot is stuck for good. Without `reached` it stays unknown who took part;
+    `unusual` take part in any case.
     """
 
     context: RunContext
@@ -48,7 +48,7 @@ class Run:
     notice: Notice
     autonomy: Autonomy
     lidar: Lidar | None
-    watch: Watch | None
+    reach: float
     stuck: Stuck | None
     reached: Reached | None
     unusual: frozenset[str]
@@ -118,8 +118,8 @@ class Run:
             pose = self._floating(self._place)
             if self.reached:
                 self.reached.look(pose, self._speed(self.reached.radius))
-            if self.watch:
-                self.watch.look(pose[:2], sleep.awake_links()[:2])
+            if self.context.region:
+                self.context.region.watch(pose[:2], self.reach, sleep.awake_links()[:2])
             truth = self._truth(pose)
             end = self._end(pose, tick)
             if end is not None or tick.record:
@@ -130,7 +130,7 @@ class Run:
                 self.autonomy.sense(tick, truth, scan)
                 end = self._command(tick) if tick.command else None
             if end is not None or tick.record:
-                notice.feel(tick.time, pose[:3])
+                notice.feel(tick.time)
             if end is not None:
                 return *end, tick.time
         raise AssertionError("the clock's last tick ends every run")

@@ -22,8 +22,6 @@ from ddenv.world.pose import Pose, Vector, angle_between
 
 # What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
 SLACK = 0.05
-# Shapes this much farther from the models that are simulated are looked at again once those have moved that far, m.
-AROUND = 1.0
 
 
 @dataclass(frozen=True)
@@ -63,9 +61,6 @@ class Reached:
         # From `_place` on the robot may move by `_free` (m) and reach nothing new.
         self._place: PoseRow | None = None
         self._free = 0.0
-        # The shapes within these corners, and their numbers.
-        self._corners = np.full(3, np.inf), np.full(3, -np.inf)
-        self._around: Integers = np.empty(0, dtype=int)
 
     @property
     def radius(self) -> float:
@@ -101,18 +96,10 @@ class Reached:
         margin = (SLACK + speed * self._period)[:, None]
         low, high = low - margin, high + margin
         lowest, highest = low.min(axis=0), high.max(axis=0)
-        if (lowest < self._corners[0]).any() or (highest > self._corners[1]).any():
-            self._corners = lowest - AROUND, highest + AROUND
-            inside = (self._low <= self._corners[1]).all(axis=1) & (self._high >= self._corners[0]).all(axis=1)
-            self._around = np.flatnonzero(inside)
-        if not len(self._around):
-            return
-        meets = (low[:, None] <= self._high[self._around]) & (self._low[self._around] <= high[:, None])
-        met = meets.all(axis=2).any(axis=0)
-        if met.any():
-            near = np.zeros(len(self._owners), dtype=bool)
-            near[self._around[met]] = True
-            self._find(near)
+        near: Booleans = (self._low <= highest).all(axis=1) & (self._high >= lowest).all(axis=1)
+        meets = (low[:, None] <= self._high[near]) & (self._low[near] <= high[:, None])
+        near[near] = meets.all(axis=2).any(axis=0)
+        self._find(near)
 
     def _find(self, near: Booleans) -> None:
         """Notes the models of the shapes `near`, and looks at their shapes no more."""
@@ -121,7 +108,6 @@ class Reached:
         self._found[self._owners[near]] = True
         others = ~self._found[self._owners]
         self._owners, self._low, self._high = self._owners[others], self._low[others], self._high[others]
-        self._corners = np.full(3, np.inf), np.full(3, -np.inf)
 
 
 def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:

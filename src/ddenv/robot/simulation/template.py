@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import BUILT_IN, Listener, controllers
 from ddenv.robot.drake.plant import Body, Built, build
-from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
+from ddenv.robot.drake.region import LeftRegion, Place, Region
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled, supports
@@ -58,7 +58,8 @@ class Template:
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(model.name for model in world.models)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
-        self._always = names & frozenset(scenario.protected) | grounds
+        fixed = set(scenario.protected)
+        self._always = grounds | {model.name for model in world.models if fixed & {model.name, model.inside}}
         self._clock = Clock.of(scenario)
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
@@ -122,7 +123,7 @@ class Template:
         near = tuple(model for model in self._solid.models if model.name in names - self._far)
         built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
         boxes = [box for box in self._boxes if box[0] in names]
-        self._surroundings = Surroundings.of(boxes, self._reach, built)
+        self._surroundings = Surroundings.of(boxes, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         self._context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
         self._rehearsals = Rehearsals(self._repertoire, self._context)
@@ -165,7 +166,7 @@ class Template:
                 ),
                 autonomy=self._autonomy(suite, seed, listener),
                 lidar=lidar,
-                watch=Watch(self._region, self._reach) if self._far else None,
+                reach=self._reach,
                 stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
                 reached=reached,
                 unusual=unusual,

@@ -12,6 +12,8 @@ from textual.screen import Screen
 
 from ddenv.workbench.help.hints import Keys, pressing
 
+LAST = (".help", ".quit", ".close", ".back")
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -28,32 +30,19 @@ class Entry:
 
 
 class KeyFooter(Keys):
-    """Shows bindings by id. `shown` is their order on the screen, `first` their priority if not all fit.
+    """Shows bindings by their ids, those `first` that matter most if not all fit.
 
-    Where `instead` returns ids, these are shown in their place, in this order: a pane with the focus has keys of its own.
-    It is one widget, since the focus moves often and the keys change with it.
+    Where `instead` returns ids, these are shown in their place: a pane with the focus has keys of its own.
     """
 
     ALLOW_SELECT = False
     auto_links = False
-    DEFAULT_CSS = """
-    KeyFooter {
-        dock: bottom;
-        height: 1;
-        color: $footer-description-foreground;
-        background: $footer-background;
-    }
-    """
 
-    def __init__(
-        self, shown: Sequence[str], first: Sequence[str], instead: Callable[[], Sequence[str]] = tuple
-    ) -> None:
+    def __init__(self, first: Sequence[str], instead: Callable[[], Sequence[str]] = tuple) -> None:
         super().__init__()
-        self._instead = instead
-        self._order, self._first = tuple(shown), tuple(first)
+        self._first, self._instead = first, instead
         self._words: dict[str, tuple[str, str]] = {}
         self.entries: tuple[Entry, ...] = ()
-        self._hovered = ""
         self._due = False
 
     def say(self, id: str, words: str, shown: str = "") -> None:
@@ -75,7 +64,6 @@ class KeyFooter(Keys):
         self.renew()
 
     def renew(self) -> None:
-        """Shows the keys that can be pressed now, as many as fit."""
         self._due = False
         if self.is_attached and (entries := self._fitting()) != self.entries:
             self.entries = entries
@@ -85,8 +73,7 @@ class KeyFooter(Keys):
         active = {each.binding.id: each for each in self.screen.active_bindings.values()}
         room = self.screen.size.width
         found: dict[str, Entry] = {}
-        instead = self._instead()
-        for id in instead or self._first:
+        for id in self._instead() or self._first:
             if id not in active:
                 continue
             binding = active[id].binding
@@ -96,8 +83,7 @@ class KeyFooter(Keys):
                 found[id] = entry
                 room -= entry.width
         # Help and the way out stand last.
-        order = sorted(instead, key=lambda id: id.endswith((".help", ".quit"))) or self._order
-        return tuple(found[id] for id in order if id in found)
+        return tuple(found[id] for id in sorted(found, key=lambda id: id.endswith(LAST)))
 
     def render(self) -> Content:
         return Content.assemble(*(part for entry in self.entries for part in (self._drawn(entry), " ")))
@@ -106,12 +92,4 @@ class KeyFooter(Keys):
         drawn = Content.assemble((entry.shown, "bold $footer-key-foreground"), f" {entry.words}")
         if not entry.enabled:
             drawn = drawn.stylize("dim")
-        if entry.key == self._hovered:
-            drawn = drawn.stylize("on $block-hover-background")
         return drawn.stylize(pressing(entry.key, "" if entry.enabled else "app.bell"))
-
-    def _explain(self, key: str) -> None:
-        super()._explain(key)
-        if key != self._hovered:
-            self._hovered = key
-            self.refresh()

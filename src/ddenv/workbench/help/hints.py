@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from rich.text import Text
-from textual import events
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.content import Content
@@ -14,19 +13,15 @@ from textual.widget import Widget
 
 from ddenv.workbench.help.key_names import shown_key
 
-# Keys with names; a single character is a key, too.
-NAMED = {"↑": "up", "↓": "down", "←": "left", "→": "right"} | {
-    name: name for name in ("enter", "escape", "space", "tab")
-}
-# What may stand between the keys of one hint.
-BETWEEN = ("or", "click")
+# Textual's names of keys that are written otherwise.
+NAMED = {"↑": "up", "↓": "down", "←": "left", "→": "right", "^o": "ctrl+o"}
 GAP = "   "
 # What a dialog says of a key stands in place of the keys for so long, s.
 SAID = 3.0
 
 
 class Keys(Widget):
-    """A widget that shows keys as `pressing` marks them: a click presses a key, and a tooltip explains it."""
+    """A widget that shows keys as `pressing` marks them: a click presses a key."""
 
     def action_press(self, key: str) -> None:
         """Presses a key here: a pane without the focus gets it first."""
@@ -37,19 +32,6 @@ class Keys(Widget):
                 self.screen.set_focus(inside)
         # By the app itself: a key that this widget sends would not come further up than to it.
         self.app.call_later(self.app.simulate_key, key)
-
-    def on_mouse_move(self, event: events.MouseMove) -> None:
-        self._explain(event.style.meta.get("key", ""))
-
-    def on_leave(self) -> None:
-        self._explain("")
-
-    def _explain(self, key: str) -> None:
-        """The tooltip of a key. Only another one is set: it is drawn at once."""
-        active = self.screen.active_bindings.get(key) if key else None
-        words = (active.tooltip or None) if active is not None else None
-        if words != self.tooltip:
-            self.tooltip = words
 
 
 def pressing(key: str, action: str = "") -> Style:
@@ -78,7 +60,6 @@ class Framed(Vertical, Keys):
         self.set_timer(SAID, self._show_hints)
 
     def _own_keys(self) -> dict[str, str]:
-        """The user's own keys of this screen, by the usual ones."""
         now: dict[str | None, list[str]] = {}
         for active in self.screen.active_bindings.values():
             now.setdefault(active.binding.id, []).append(active.binding.key)
@@ -87,34 +68,11 @@ class Framed(Vertical, Keys):
 
 
 def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:
-    """Hints with keys to click; `own` has the user's keys by the usual ones."""
-    parts: list[str | tuple[str, Style]] = []
+    """Hints to click, each for the key that it begins with; `own` has the user's keys by the usual ones."""
+    parts = []
     for hint in hints.split(GAP):
-        if parts:
-            parts.append(GAP)
-        for key, words in _by_key(hint, own):
-            said = words.rstrip()
-            parts.append((said, pressing(key)) if key else said)
-            parts.append(words[len(said) :])
-    return Content.assemble(*parts)
-
-
-def _by_key(hint: str, own: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """A hint's words by the key that they are about: from this key to the next one. "" is no key."""
-    key, said, leading = "", "", True
-    for word in hint.split():
-        usual = _key(word) if leading else ""
-        leading = bool(usual) or (leading and word in BETWEEN)
-        if usual and key:
-            yield key, said
-            said = ""
-        key = own.get(usual, usual) or key
-        said += f"{shown_key(own[usual]) if usual in own else word} "
-    yield key, said.rstrip()
-
-
-def _key(word: str) -> str:
-    """Textual's name of the key that a word is, or ""."""
-    if word.startswith(("^", "ctrl+")):
-        return f"ctrl+{word[-1]}"
-    return NAMED.get(word, word if len(word) == 1 else "")
+        word, _, words = hint.partition(" ")
+        key = NAMED.get(word, word)
+        said = f"{shown_key(own[key])} {words}" if key in own else hint
+        parts.append(Content.styled(said, pressing(own.get(key, key))))
+    return Content(GAP).join(parts)

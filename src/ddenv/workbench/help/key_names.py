@@ -30,7 +30,6 @@ def shown(keys: str) -> str:
 
 
 def shown_key(key: str) -> str:
-    """One key as a screen shows it."""
     *modifiers, name = key.split("+")
     return "+".join((*modifiers, _ARROWS[name])) if name in _ARROWS else written(key)
 

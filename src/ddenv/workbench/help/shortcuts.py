@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from rich.table import Table
 from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import ActiveBinding, Binding
+from textual.binding import ActiveBinding
 from textual.containers import VerticalScroll
 from textual.dom import DOMNode
 from textual.screen import ModalScreen, Screen
@@ -18,6 +18,7 @@ from textual.widgets import Static
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.key_names import shown
+from ddenv.workbench.shared.bindings import keys
 
 _FOCUS = "to the next or previous pane, field or button"
 _LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"
@@ -82,12 +83,10 @@ def groups(screen: Screen[Any]) -> list[Group]:
 
 
 def commands(screen: Screen[Any]) -> list[Shortcut]:
-    """The workbench's own actions that can be run now."""
     return [each for group in groups(screen) for each in group.shortcuts if each.id and each.enabled]
 
 
 def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
-    """One for each action, with all its keys."""
     keys: dict[str, list[str]] = {}
     first: dict[str, ActiveBinding] = {}
     for active in found:
@@ -110,7 +109,6 @@ def _words(active: ActiveBinding) -> str:
 
 
 def _pane(focused: DOMNode | None) -> tuple[str, tuple[str, ...]]:
-    """The focused pane's title, and the hints below its keys."""
     if focused is None:
         return "Here", ()
     nodes = focused.ancestors_with_self
@@ -143,9 +141,9 @@ class Reading(ModalScreen[None]):
 class Help(Reading):
     """Every key with what it does: those of the focused pane first."""
 
-    BINDINGS: ClassVar = [
-        Binding("escape,question_mark,q,enter,f1", "dismiss", "close", id="help.close", tooltip="close this dialog"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "help", ("close", "escape,question_mark,q,enter,f1", "dismiss", "close", "close this dialog")
+    )
 
     def __init__(self, groups: Iterable[Group]) -> None:
         self.groups = tuple(groups)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from textual.binding import Binding
-
 from ddenv.runfile import branches
 from ddenv.words.signs import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, OF_WAYS
+from ddenv.workbench.shared.bindings import keys
 
 Signs = tuple[tuple[str, str], ...]
 
 
 def signs() -> dict[str, Signs]:
-    """(sign, meaning) by where they stand."""
     return {
         "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate that is shown"), *MORE_SIGNS[1:], *LEGEND),
         "On the map of tests played back": (*OF_WAYS, ("a", "in one of the two only")),
@@ -25,6 +23,7 @@ def signs() -> dict[str, Signs]:
             ("▾", "touches a model"),
             OF_WAYS[-1],
         ),
+        "On the chart": (("╌", "so many models seem to be needed at least"), ("▲", "you decided something")),
         "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
         "Verdicts of a certificate": _joined(CLAIM),
@@ -46,7 +45,6 @@ def signs() -> dict[str, Signs]:
 
 
 def _split(words: dict[str, str]) -> Signs:
-    """Of words that begin with their sign."""
     return tuple((each[0], each[2:]) for each in words.values())
 
 
@@ -60,9 +58,7 @@ def _joined(meanings: dict[str, str]) -> Signs:
 class SignsDialog(Reading):
     """All signs with their meanings."""
 
-    BINDINGS: ClassVar = [
-        Binding("escape,k,q,enter", "dismiss", "close", id="signs.close", tooltip="close this dialog"),
-    ]
+    BINDINGS: ClassVar = keys("signs", ("close", "escape,k,q,enter", "dismiss", "close", "close this dialog"))
 
     def __init__(self) -> None:
         super().__init__("Signs", signs().items())

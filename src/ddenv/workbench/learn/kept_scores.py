@@ -13,7 +13,6 @@ FILE = "lessons.json"
 
 
 def all_scores() -> dict[str, Score]:
-    """The scores by the lessons' names."""
     kept = read_state(FILE)
     return {str(name): score_of(data) for name, data in kept.items()} if isinstance(kept, dict) else {}
 
@@ -25,7 +24,6 @@ def keep_score(lesson: str, score: Score) -> None:
 
 
 def in_words(score: Score | None) -> str:
-    """How far a student is, for a list."""
     if score is None or not (score.done or score.step or score.answered):
         return "not begun"
     state = "done" if score.done else f"at step {score.step + 1}"

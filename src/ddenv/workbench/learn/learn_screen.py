@@ -15,10 +15,10 @@ from ddenv.learn.race import Turn
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Round
-from ddenv.workbench.help.bindings import ids
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.bindings import ids
 
 SMALLEST = (64, 20)
 # With so many models at most, maps have their names from the start.
@@ -28,33 +28,29 @@ NAMED = 12
 class LearnScreen(Screen[ScreenResultType]):
     """A header, a `body` and the keys; in a terminal that is too small, how large it has to be.
 
-    `NAME` begins the ids of its header and its keys. Its footer has the keys `SHOWN`; those that are `FIRST` go first where there
-    is room for a few only.
+    `NAME` begins the ids of its header and its keys. Its footer has the keys `FIRST`, by priority.
     """
 
     CSS_PATH = "learn.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-tall")]
     NAME: ClassVar = ""
-    SHOWN: ClassVar = ""
     FIRST: ClassVar = ""
 
     def compose(self) -> ComposeResult:
         yield Static("", id=f"{self.NAME}-header", markup=False)
         yield from self.body()
-        yield KeyFooter(ids(self.NAME, self.SHOWN), ids(self.NAME, self.FIRST))
+        yield KeyFooter(ids(self.NAME, self.FIRST))
         yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def body(self) -> ComposeResult:
         yield from ()
 
     def read_world(self, run: Path, maps: Sequence[WorldMap]) -> None:
-        """Shows the world of a run on these maps, once it is read."""
-
         def show(place: Place, notice: str) -> None:
             for each in maps:
                 each.set_place(place, notice)
-                if len(place.elements) <= NAMED and "names" not in each.shown_layers:
+                if len(place.elements) <= NAMED and "names" not in each.shown.layers:
                     each.toggle_layer("names")
 
         read_world(self, run, show)

@@ -24,51 +24,24 @@ WIDTH = 15
 
 
 class LessonPane(VerticalScroll):
-    """Scrolls where a text is longer than its panel. A click on an answer gives it; the arrows put a cursor on one."""
+    """Scrolls where a text is longer than its panel. A click on an answer gives it."""
 
     _page: Page | None = None
-    # The answer under the cursor; None before an arrow was pressed.
-    cursor: int | None = None
 
     def compose(self) -> ComposeResult:
         yield Static("", id="lesson-text", markup=False)
 
     def show(self, page: Page) -> None:
-        """Another page, from its beginning; with a hint or an answer, its end: that is new."""
-        if self._page is None or page.question != self._page.question or page.chosen is not None:
-            self.cursor = None
         self._page = page
-        self._draw(page)
+        room = self.scrollable_content_region.width
+        self.query_one("#lesson-text", Static).update(page_text(page, room))
         if page.chosen is None and not page.hint:
             self.scroll_home(animate=False)
         else:
             self.call_after_refresh(self.scroll_end, animate=False)
         self.call_after_refresh(self._say_what_is_next)
 
-    def _draw(self, page: Page) -> None:
-        room = self.scrollable_content_region.width
-        self.query_one("#lesson-text", Static).update(page_text(page, room, self.cursor))
-
-    def _choose(self, by: int) -> bool:
-        """Moves the cursor from answer to answer, once all is in sight; False if no question is open."""
-        page = self._page
-        if page is None or page.question is None or page.chosen is not None or self.scroll_y < self.max_scroll_y:
-            return False
-        last = len(page.question.answers) - 1
-        self.cursor = (0 if by > 0 else last) if self.cursor is None else max(0, min(self.cursor + by, last))
-        self._draw(page)
-        return True
-
-    def action_scroll_up(self) -> None:
-        if not self._choose(-1):
-            super().action_scroll_up()
-
-    def action_scroll_down(self) -> None:
-        if not self._choose(1):
-            super().action_scroll_down()
-
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
-        """What the frame says, too."""
         super().watch_scroll_y(old_value, new_value)
         self._say_what_is_next()
 
@@ -80,7 +53,7 @@ class LessonPane(VerticalScroll):
         if self.scroll_y < self.max_scroll_y:
             said = "enter shows the rest"
         elif self._page is not None and self._page.question is not None and self._page.chosen is None:
-            said = f"{letters(self._page.question)}, or ↑ ↓ and enter; s skips"
+            said = f"{letters(self._page.question)} answers it, s skips"
         self.parent.border_subtitle = said
 
     def read_on(self) -> bool:
@@ -92,23 +65,20 @@ class LessonPane(VerticalScroll):
 
 
 def letters(question: Question) -> str:
-    """Which letters are its answers."""
     used = LETTERS[: len(question.answers)]
     # After e there are gaps.
     return f"{used[0]} to {used[-1]}" if used[-1] <= "e" else " ".join(used)
 
 
-def page_text(page: Page, room: int = 0, cursor: int | None = None) -> Text:
-    """A page as text, `room` columns wide, with the cursor on an answer; nothing on it depends on colour alone."""
+def page_text(page: Page, room: int = 0) -> Text:
     parts = [_blocks(page.text, room)]
     if page.question is not None:
-        parts.append(_question(page.question, page, room, cursor))
+        parts.append(_question(page.question, page, room))
     parts.append(_blocks(page.after, room))
     return Text("\n\n").join(part for part in parts if part)
 
 
 def _blocks(blocks: Sequence[Block], room: int) -> Text:
-    """Paragraphs with a line between them; the entries of a list stand close together."""
     text = Text()
     for before, block in zip((None, *blocks), blocks, strict=False):
         if before is not None:
@@ -136,10 +106,10 @@ def plain_words(words: str) -> str:
     return f"{' ' if lead else ''}{plain(words)}{' ' if tail and words.strip() else ''}"
 
 
-def _question(question: Question, page: Page, room: int, cursor: int | None) -> Text:
+def _question(question: Question, page: Page, room: int) -> Text:
     text = Text().append(plain(question.text), "bold")
     for place, answer in enumerate(question.answers):
-        mark, style = ("▸", "reverse") if place == cursor else (" ", "")
+        mark, style = " ", ""
         if page.chosen is not None:
             mark = "✓" if answer.right else "✗" if place == page.chosen else " "
             style = "bold" if answer.right or place == page.chosen else "dim"
@@ -156,7 +126,6 @@ def _question(question: Question, page: Page, room: int, cursor: int | None) -> 
 
 
 def _verdict(question: Question, chosen: int, page: Page, room: int) -> Text:
-    """Right or wrong, why, and what is wrong with the other answers."""
     right = f"{LETTERS[question.right]} is right."
     first = f"Skipped. {right}" if chosen < 0 else "✓ Right." if chosen == question.right else f"✗ No: {right}"
     text = Text().append(f"\n\n{first}", "bold")
@@ -166,31 +135,20 @@ def _verdict(question: Question, chosen: int, page: Page, room: int) -> Text:
 
 
 class Variables(Widget):
-    """A line each; the longest values take two where there is room."""
+    """A line each."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._variables: tuple[Variable, ...] = ()
 
     def show(self, variables: tuple[Variable, ...]) -> None:
-        """Other values."""
         self._variables = variables
         self.refresh()
 
     def render(self) -> Text:
-        width, height = self.size
-        room = max(8, width - WIDTH - 3)
-        spare = height - len(self._variables)
-        text = Text(no_wrap=True)
+        text, room = Text(no_wrap=True), max(8, self.size.width - WIDTH - 3)
         for one in self._variables:
-            value = plain(one.value) or "–"
-            lines = [truncated(value, room)]
-            if spare > 0 and len(value) > room:
-                # A second line, indented, from a space on if there is one.
-                spare -= 1
-                cut = max(value.rfind(" ", 0, room + 1), 0) or room
-                lines = [value[:cut].rstrip(), " " * (WIDTH + 3) + truncated(value[cut:].strip(), room)]
             style = "bold" if one.changed else ""
             text.append(f"{CHANGED if one.changed else ' '} {one.name:<{WIDTH}} ", style or "dim")
-            text.append("\n".join(lines), style).append("\n")
+            text.append(f"{truncated(plain(one.value) or '–', room)}\n", style)
         return text

@@ -24,7 +24,6 @@ from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
 from ddenv.text import plain
 from ddenv.words.news import what_happened
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
@@ -36,6 +35,7 @@ from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.snapshot import Moments
+from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.shared.observed import Observed
 
 
@@ -47,7 +47,6 @@ class LessonScreen(LearnScreen[bool]):
 
     AUTO_FOCUS = "LessonPane"
     NAME = "lesson"
-    SHOWN = "on skip hint again back activity run_back run_on next_decision next_reduction predict variables help close"
     FIRST = "help close on skip again activity run_back run_on predict hint variables next_reduction next_decision back"
     BINDINGS: ClassVar = keys(
         "lesson",
@@ -118,8 +117,6 @@ class LessonScreen(LearnScreen[bool]):
     def on_unmount(self) -> None:
         self._file.close()
 
-    # What is shown.
-
     def _show(self) -> None:
         self._show_run()
         course, page = self.course, self.course.page
@@ -159,7 +156,6 @@ class LessonScreen(LearnScreen[bool]):
 
     @property
     def _at_next(self) -> bool:
-        """Whether the lesson is at its end, and another one follows."""
         return bool(self._following) and self.course.step == self.course.last
 
     def _keep_score(self) -> None:
@@ -212,8 +208,6 @@ class LessonScreen(LearnScreen[bool]):
     def on_resize(self) -> None:
         self.call_after_refresh(self._show)
 
-    # What is done.
-
     def action_on(self) -> None:
         if self.query_one(LessonPane).read_on():
             return
@@ -223,13 +217,10 @@ class LessonScreen(LearnScreen[bool]):
             self.dismiss(True)
         elif self.course.go_on():
             self._moved()
-        elif self.course.is_open:
-            # Without a cursor the frame says how to answer.
-            if (place := self.query_one(LessonPane).cursor) is not None:
-                self.action_answer(place)
         elif self._opened is None:
             self.action_move("moment", 1)
-        else:
+        elif not self.course.is_open:
+            # Of an open question the frame says how to answer.
             self.say("this is the end of the lesson: escape leaves it, backspace goes back")
 
     def action_back(self) -> None:

@@ -16,17 +16,17 @@ from ddenv.learn.lesson import Lesson
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, glance, open_lesson
 from ddenv.text import plain, truncated
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, in_words
 from ddenv.workbench.learn.learn_screen import LearnScreen
+from ddenv.workbench.shared.bindings import HELP, keys
 
 
 class LessonsScreen(LearnScreen[None]):
     """Enter opens a lesson where it was left."""
 
     NAME = "lessons"
-    SHOWN = FIRST = "open help back"
+    FIRST = "help back open"
     # It has room for what matters in any terminal.
     HORIZONTAL_BREAKPOINTS = VERTICAL_BREAKPOINTS = []
     BINDINGS: ClassVar = [

@@ -16,10 +16,10 @@ from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import count, plain, shortened, truncated
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.snapshot import Moments
+from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.shared.observed import Observed
 
 IN, OUT, GONE = "■", "□", "·"
@@ -48,7 +48,6 @@ class RacerPane(Vertical):
         yield self._said
 
     def show(self, race: Race) -> None:
-        """The search as far as the race is."""
         play, turn, tests = self.play, race.now(self.play), min(race.at, self.play.tests)
         left, room = play.after(tests), max(8, self.size.width - 2)
         # The map says itself what a panel's lower border has, so the figures stand above.
@@ -80,7 +79,6 @@ def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], r
 
 
 def _signs(turns: tuple[Turn, ...], room: int) -> str:
-    """How the tests ended, the last ones if there are many."""
     signs = "".join(SIGNS.get(turn.outcome, "?") for turn in turns)
     return signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
 
@@ -90,7 +88,6 @@ class RaceScreen(LearnScreen[None]):
 
     AUTO_FOCUS = ""
     NAME = "race"
-    SHOWN = "run back on begin end help close"
     FIRST = "help close run on back end begin"
     BINDINGS: ClassVar = keys(
         "race",
@@ -138,8 +135,6 @@ class RaceScreen(LearnScreen[None]):
         for pane in self._panes:
             pane.map.display = maps
 
-    # What is shown.
-
     def _show(self) -> None:
         race = self.race
         for pane in self._panes:
@@ -155,8 +150,6 @@ class RaceScreen(LearnScreen[None]):
         if race.over:
             said.append("\n").append("\n".join(map(plain, result(race.plays))), "bold not dim")
         self.query_one("#race-said", Static).update(said)
-
-    # What is done.
 
     def _tick(self) -> None:
         if not self.race.go(self.race.at + 1) or self.race.over:

@@ -17,10 +17,10 @@ from ddenv.learn.race import BOUND, Line, Play, comparison, in_one_sentence
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import count, plain, shortened, truncated
-from ddenv.workbench.help.bindings import HELP, keys
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.bindings import HELP, keys
 
 LONGEST_NAME = 16
 SAID = {
@@ -35,7 +35,6 @@ class TryScreen(LearnScreen[None]):
 
     AUTO_FOCUS = "WorldMap"
     NAME = "try"
-    SHOWN = "map.pick map.next without only back done again on help close"
     FIRST = "help close on without done map.pick only map.next back again"
     BINDINGS: ClassVar = keys(
         "try",
@@ -73,8 +72,6 @@ class TryScreen(LearnScreen[None]):
         self._show()
         self.read_world(self._run, [self._map])
 
-    # What is shown.
-
     def _show(self) -> None:
         attempt = self.attempt
         self._map.show(snapshot_of(self._base, attempt.held), None)
@@ -100,7 +97,6 @@ class TryScreen(LearnScreen[None]):
         self.refresh_bindings()
 
     def _say_where(self) -> None:
-        """What happened last, and the models that are held, with the marked ones."""
         said, attempt = self.query_one("#try-said", Static), self.attempt
         if attempt.ended:
             sign = "✓" if attempt.found else "✗"
@@ -133,8 +129,6 @@ class TryScreen(LearnScreen[None]):
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._show)
-
-    # What is done.
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action == "on":
@@ -208,7 +202,6 @@ def _last(attempt: Attempt) -> Text:
 
 
 def _side_by_side(lines: list[Line], room: int) -> Text:
-    """The names of what is left stand where there is room for them."""
     width = max(len(line.name) for line in lines)
     text = Text(f"{'':<{width}}  tests  left\n", "dim")
     for line in lines:

@@ -20,6 +20,8 @@ STRENGTH = {KEPT: 0.74, FLOOR: 0.24, LEFT_OUT: 0.25, FLOOR_OUT: 0.10, PINNED: 0.
 LIGHT_STRENGTH = STRENGTH | {KEPT: 0.88, LEFT_OUT: 0.30, PINNED: 0.80}
 NEUTRAL: RGB = (128, 140, 160)
 YELLOW: RGB = (255, 215, 80)
+# How much of the text's colour removed models, robots beside the foremost one, and the two paths have.
+FAINT, DULL, ORIGINAL, PATH = 0.35, 0.5, 0.55, 0.8
 # Background and text that a theme of the terminal's own colours may have: it does not say which these are.
 OWN: dict[bool, tuple[RGB, RGB]] = {True: ((15, 20, 27), (213, 219, 229)), False: ((246, 248, 251), (28, 35, 45))}
 
@@ -49,22 +51,6 @@ class Palette:
     def shade(self, amount: float) -> int:
         """The text's colour on the background, by this much."""
         return packed(blend(self.ground, self.fore, amount))
-
-    @property
-    def faint(self) -> int:
-        return self.shade(0.35)
-
-    @property
-    def dull(self) -> int:
-        return self.shade(0.5)
-
-    @property
-    def original(self) -> int:
-        return self.shade(0.55)
-
-    @property
-    def path(self) -> int:
-        return self.shade(0.8)
 
     def tone(self, kind: int, part: int) -> Tone:
         """The looks of a model of part number `part`, or of none: -1."""
@@ -108,7 +94,6 @@ def _seen(color: RGB, back: RGB, fore: RGB) -> RGB:
 
 
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
-    """The palette for a widget's background and text colour in the app's theme."""
     if app.native_ansi_color:
         return mixed(*OWN[app.current_theme.dark], own=True)
     names = ("accent", "primary", "success", "error")

@@ -21,7 +21,7 @@ from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.text import plain, shortened
-from ddenv.workbench.map.map_colors import REMOVED, Palette
+from ddenv.workbench.map.map_colors import DULL, FAINT, ORIGINAL, PATH, REMOVED, Palette
 from ddenv.workbench.map.map_words import PARTING
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts, kept, looks
 from ddenv.workbench.map.place import MovedPrints, Point, Shown
@@ -74,7 +74,6 @@ class Picture:
     cells: dict[int, Cell]
 
     def holds(self, cell: Cell) -> bool:
-        """Whether a cell is in the picture."""
         rows, columns = self.canvas.chars.shape
         return cell[0] < int(rows) and cell[1] < int(columns)
 
@@ -129,11 +128,10 @@ class MapDrawing:
         return canvas, still
 
     def _driving(self, shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
-        """The running tests, with the paths behind their robots; those of the candidate in focus stand out."""
         live, ids = shown.snapshot.live, _in_focus(shown.snapshot)
-        colors = {one.test: palette.live if one.test in ids or not ids else palette.dull for one in live}
+        colors = {one.test: palette.live if one.test in ids or not ids else palette.shade(DULL) for one in live}
         trails = self._trails if "path" in shown.layers else {}
-        paths = [(np.array(trail), colors.get(test, palette.dull), 0) for test, trail in trails.items()]
+        paths = [(np.array(trail), colors.get(test, palette.shade(DULL)), 0) for test, trail in trails.items()]
         return paths, [((one.pose[0], one.pose[1], heading(one.pose[3:])), colors[one.test], ARROWS) for one in live]
 
     def _with_live(self, shown: Shown) -> Shown:
@@ -149,7 +147,6 @@ class MapDrawing:
 
 
 def _in_focus(snapshot: Snapshot) -> frozenset[int]:
-    """The running tests of the candidate in focus."""
     focus = snapshot.focus
     return frozenset(test.id for test in snapshot.running if focus is not None and test.candidate == focus.index)
 
@@ -162,14 +159,13 @@ def _foremost(snapshot: Snapshot) -> Live | None:
 
 def _riders(shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
     """The robots on one or two ways with their paths; the second one, a hollow arrow, is below the first one."""
-    looks_of = ((palette.live, 0, ARROWS), (palette.dull, DASH, HOLLOW))
+    looks_of = ((palette.live, 0, ARROWS), (palette.shade(DULL), DASH, HOLLOW))
     both = list(zip(shown.ways, looks_of, strict=False))[::-1]
     paths = [(way.points[: way.gone], color, dash) for way, (color, dash, _) in both]
     return paths, [(way.robot, color, signs) for way, (color, _, signs) in both if way.robot is not None]
 
 
 def _still(shown: Shown, view: View, palette: Palette) -> Picture:
-    """All that does not change while robots drive. Letters cover paths, and marks cover letters."""
     how = looks(shown.place.prints, kept(shown), palette)
     filled, centers = _lying(shown.place.prints, view)
     canvas = Canvas(view.rows, view.columns, palette.back)
@@ -178,7 +174,7 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     fill(canvas, grid, how)
     dotted, written = (np.zeros(canvas.chars.shape, dtype=bool) for _ in range(2))
     if "removed" in shown.layers:
-        dotted = ghosts(canvas, gone, grid, how, palette.faint)
+        dotted = ghosts(canvas, gone, grid, how, palette.shade(FAINT))
     for points, color, dash in _lines(shown, palette):
         canvas.dots(braille(points, view, dash), color)
     marks = {
@@ -224,14 +220,13 @@ def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> N
 
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
-    """The paths below the letters; the first one covers the second one."""
     layers, snapshot = shown.layers, shown.snapshot
     if shown.ways:
-        both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
+        both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
         return [(way.points, color, dash) for way, color, dash in both][::-1]
-    lines = [(_path(snapshot.evidence), palette.path, 0)] if "path" in layers else []
+    lines = [(_path(snapshot.evidence), palette.shade(PATH), 0)] if "path" in layers else []
     if "original" in layers and not shown.same_paths:
-        lines.insert(0, (_path(snapshot.original), palette.original, DASH))
+        lines.insert(0, (_path(snapshot.original), palette.shade(ORIGINAL), DASH))
     return lines
 
 
@@ -250,7 +245,6 @@ def _marks(shown: Shown, palette: Palette) -> Iterator[tuple[Point, str, int]]:
 
 
 def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
-    """Marks a cell by four arms; a letter in it stays readable."""
     rows, columns = canvas.chars.shape
     row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
     for (down, right), sign in ARMS:
@@ -262,7 +256,6 @@ def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette
 
 
 def strip(canvas: Canvas, row: int) -> Strip:
-    """One row of `canvas`."""
     segments = [Segment(run.text, _style(run.fore, run.back, run.bold)) for run in canvas.runs(row)]
     return Strip(segments, canvas.chars.shape[1])
 

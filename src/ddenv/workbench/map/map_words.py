@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.evidence.took_part import in_last
+from ddenv.evidence.slices import in_last
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import Names, drops
 from ddenv.text import count, shortened
@@ -51,7 +51,6 @@ LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
 def legend(shown: Shown, width: int) -> Text:
-    """One line with the meanings of the signs on the map, as many as fit in `width`."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
         PARTS: bool(state.elements) and "partitions" in layers,
@@ -83,7 +82,6 @@ def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
 
 
 def sensed_order(state: RunState) -> dict[str, int]:
-    """The models that the last similar run sensed, numbered from 1 by the first time."""
     return {name: number for number, (name, _) in enumerate(_sensed(state), start=1)}
 
 
@@ -103,10 +101,8 @@ def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
         if name == each.name:
             words.append(f"sensed at {moment:.1f} s (no. {number})")
     text = Text(shortened(each.name, min(LONGEST_NAME, columns or LONGEST_NAME)), "bold", no_wrap=True)
-    for word in filter(None, words):
-        if columns and text.cell_len + len(word) + 3 > columns:
-            break
-        text.append(f" · {word}", "not bold")
+    text.append("".join(f" · {word}" for word in words if word), "not bold")
+    text.truncate(columns or text.cell_len, overflow="ellipsis")
     return text
 
 
@@ -154,13 +150,10 @@ class MapLines(Widget):
         selected, shown, fallen, legend = self._shown
         text, drop = Text(no_wrap=True), dropping(fallen, LONGEST_DROPPED if width > 44 else SHORT_DROPPED)
         if selected:
-            text.append(f"{selected} selected", "bold")
-            text.append(": p pin, w try without, o try only" if width > 44 else ": p, w or o", "dim")
-            text.append(f"  w {drop}" if drop else "", "bold")
+            text.append(f"{selected} selected{f', w {drop}' if drop else ''}", "bold")
+            text.append(": p pin, w try without, o try only", "dim")
         elif shown is not None:
-            # Where there is little room, the table has the number.
-            words = [count(shown.size, "model")] if width > 44 or not drop else []
-            text.append(f"{shown.label}: {', '.join([*words, drop] if drop else words)}", "bold")
-            text.append("  others in small letters" if width > 44 and not drop else "", "dim")
+            text.append(f"{shown.label}: {drop or count(shown.size, 'model')}", "bold")
+            text.append("" if drop else "  others in small letters", "dim")
         text.truncate(width, overflow="ellipsis")
         return text.append("\n").append_text(legend(width))

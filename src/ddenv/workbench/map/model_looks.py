@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ddenv.evidence.took_part import in_last
+from ddenv.evidence.slices import in_last
 from ddenv.map.cells import Signs
 from ddenv.map.colors import HUES
 from ddenv.map.paint import Canvas
@@ -89,7 +89,6 @@ def kept(shown: Shown) -> Kept:
 
 
 def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
-    """The looks of all models in a `palette`."""
     names, floor = _known(tuple(prints))
     kinds = _kinds(names, floor, who)
     parts = np.array([who.parts.get(name, -1) for name in names], dtype=int)
@@ -103,7 +102,6 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[list[str], np.ndarray]:
-    """The names of models, and which are floors: the same in all rounds."""
     areas = np.array([each.area for each in prints])
     return [each.name for each in prints], areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
 
@@ -126,7 +124,6 @@ def _signs(names: Sequence[str], kinds: np.ndarray, parts: np.ndarray, who: Kept
 
 
 def _label(kind: int, part: int) -> str:
-    """The sign of a model of part 1, 2, ... or of none: 0."""
     if kind in (PROTECTED, PINNED, REMOVED):
         return {PROTECTED: "#", PINNED: "+", REMOVED: ""}[kind]
     letter = partition_letter(part - 1) if part else ""
@@ -136,7 +133,6 @@ def _label(kind: int, part: int) -> str:
 
 
 def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
-    """The kind of each model; the last rule that applies counts."""
     kinds = np.where(floor, FLOOR, KEPT)
     if who.shown is not None:
         out = ~_among(names, who.shown)
@@ -177,7 +173,6 @@ def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
 
 
 def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> None:
-    """Lines between neighbours that look alike but are different models."""
     pixels = tone[grid]
     beside, above = np.zeros(grid.shape, dtype=bool), np.zeros(grid.shape, dtype=bool)
     beside[:, :-1] = (pixels[:, :-1] == pixels[:, 1:]) & (grid[:, :-1] != grid[:, 1:])
@@ -199,8 +194,6 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     protected = canvas.chars == ord(SOLID[PROTECTED])
     for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):
         canvas.chars[where & protected] = ord(line)
-    for half, quarter, sides in (("▀", "▘", beside[0::2]), ("▄", "▖", beside[1::2])):
-        canvas.chars[(canvas.chars == ord(half)) & sides & ~full] = ord(quarter)
 
 
 def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int) -> np.ndarray:

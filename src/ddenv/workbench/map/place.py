@@ -77,12 +77,10 @@ class Shown:
 
     @property
     def start(self) -> Point | None:
-        """Where the robot starts, m."""
         return None if self.place.spawn is None else self.place.spawn[:2]
 
     @property
     def failure(self) -> Point | None:
-        """Where the robot ended in f, m."""
         position = self.snapshot.state.f_position
         return None if position is None else position[:2]
 

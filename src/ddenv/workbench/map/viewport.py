@@ -38,22 +38,18 @@ class Viewport:
         self.view = new
 
     def zoom(self, factor: float, about: Cell | None) -> None:
-        """Closer by `factor`, about a cell, or about the middle."""
         if self.view is not None:
             self._look(self.view.zoomed(factor, self.view.point(about) if about else None))
 
     def pan(self, columns: float, rows: float) -> None:
-        """Moves the view by this number of cells to the right and upwards."""
         if self.view is not None:
             self._look(self.view.panned(columns, rows))
 
     def pan_part(self, right: int, up: int) -> None:
-        """An eighth of the map to the right, or a quarter up."""
         if self.view is not None:
             self.pan(right * max(1, self.view.columns // 8), up * max(1, self.view.rows // 4))
 
     def step(self, right: int, up: int) -> None:
-        """Moves the crosshair by a cell; at the border the map moves instead."""
         row, column = self.cursor[0] - up, self.cursor[1] + right
         if self.holds((row, column)):
             self.cursor = row, column
@@ -61,11 +57,9 @@ class Viewport:
             self.pan(right, up)
 
     def holds(self, cell: Cell) -> bool:
-        """Whether a cell is in the view."""
         return self.view is not None and 0 <= cell[0] < self.view.rows and 0 <= cell[1] < self.view.columns
 
     def center_on(self, x: float, y: float) -> None:
-        """Moves the view and the crosshair to a place, m."""
         if self.view is not None:
             self._look(self.view.around(x, y))
             self.cursor = self.view.cell(x, y) or self.cursor

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, ClassVar
 from rich.segment import Segment
 from rich.text import Text
 from textual import events
-from textual.binding import Binding
 from textual.geometry import Region
 from textual.message import Message
 from textual.reactive import var
@@ -24,6 +23,7 @@ from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_words import describe, legend
 from ddenv.workbench.map.place import Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
+from ddenv.workbench.shared.bindings import keys
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
@@ -44,21 +44,20 @@ class WorldMap(Widget, can_focus=True):
     # Whether enter and clicks choose places.
     picking = var(False)
     HELP = "click: select or unselect a model   wheel: zoom   drag: move the map"
-    BINDINGS: ClassVar = [
-        Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
-        Binding("right", "move(1, 0)", "move", show=False, id="map.right", tooltip="crosshair to the right"),
-        Binding("up", "move(0, 1)", "move", show=False, id="map.up", tooltip="crosshair up"),
-        Binding("down", "move(0, -1)", "move", show=False, id="map.down", tooltip="crosshair down"),
-        Binding("shift+left", "pan(-1, 0)", "pan", show=False, id="map.pan_left", tooltip="move the map to the left"),
-        Binding("shift+right", "pan(1, 0)", "pan", show=False, id="map.pan_right", tooltip="move the map to the right"),
-        Binding("shift+up", "pan(0, 1)", "pan", show=False, id="map.pan_up", tooltip="move the map up"),
-        Binding("shift+down", "pan(0, -1)", "pan", show=False, id="map.pan_down", tooltip="move the map down"),
-        Binding("enter", "pick", "select", id="map.pick", tooltip="select or unselect the model under the crosshair"),
-        Binding("left_square_bracket", "neighbour(-1)", show=False, id="map.previous", tooltip="to the previous model"),
-        Binding(
-            "right_square_bracket", "neighbour(1)", "next model", show=False, id="map.next", tooltip="to the next model"
-        ),
-    ]
+    BINDINGS: ClassVar = keys(
+        "map",
+        ("left", "left", "move(-1, 0)", "", "crosshair to the left"),
+        ("right", "right", "move(1, 0)", "", "crosshair to the right"),
+        ("up", "up", "move(0, 1)", "", "crosshair up"),
+        ("down", "down", "move(0, -1)", "", "crosshair down"),
+        ("pan_left", "shift+left", "pan(-1, 0)", "", "move the map to the left"),
+        ("pan_right", "shift+right", "pan(1, 0)", "", "move the map to the right"),
+        ("pan_up", "shift+up", "pan(0, 1)", "", "move the map up"),
+        ("pan_down", "shift+down", "pan(0, -1)", "", "move the map down"),
+        ("pick", "enter", "pick", "select", "select or unselect the model under the crosshair"),
+        ("previous", "[", "neighbour(-1)", "", "to the previous model"),
+        ("next", "]", "neighbour(1)", "next model", "to the next model"),
+    )
 
     @dataclass
     class Pointed(Message):
@@ -117,25 +116,14 @@ class WorldMap(Widget, can_focus=True):
         return self.shown.snapshot
 
     @property
-    def candidate(self) -> Candidate | Trial | None:
-        """The candidate whose models stand out."""
-        return self.shown.candidate
-
-    @property
     def selection(self) -> frozenset[str]:
-        """The names of the models that the user selected."""
         return self.shown.selection
-
-    @property
-    def shown_layers(self) -> frozenset[str]:
-        return self.shown.layers
 
     def watch_picking(self) -> None:
         self.draw()
 
     @property
     def aims(self) -> bool:
-        """Whether the crosshair is shown."""
         return self.has_focus or self.picking or self._unmarked is not None
 
     def set_place(self, place: Place, notice: str = "") -> None:
@@ -148,12 +136,10 @@ class WorldMap(Widget, can_focus=True):
         self.refresh()
 
     def set_marks(self, spawn: tuple[float, float, float] | None, goal: Point | None) -> None:
-        """Changes start (x, y, yaw) and goal in the same world."""
         self.shown = replace(self.shown, place=replace(self.place, spawn=spawn, goal=goal))
         self._refit()
 
     def show(self, snapshot: Snapshot, candidate: Candidate | Trial | None) -> None:
-        """Shows the current state of the run; the models of `candidate` stand out."""
         before = self.snapshot
         if self.selection and snapshot.state.environment is not before.state.environment:
             self.select(self.selection.intersection(snapshot.state.environment))
@@ -176,19 +162,16 @@ class WorldMap(Widget, can_focus=True):
         self.draw() if same or not self.viewport.fitted else self._refit()
 
     def toggle_layer(self, name: str) -> None:
-        """Shows one of `LAYERS`, or hides it."""
-        self.shown = replace(self.shown, layers=self.shown_layers ^ {name})
+        self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
 
     def legend(self, width: int) -> Text:
-        """One line with the meanings of the signs on the map, as many as fit."""
         return legend(self.shown, width)
 
     # Models.
 
     @property
     def model_at_cursor(self) -> str | None:
-        """The name of the model under the crosshair."""
         cursor = self.viewport.cursor
         if self._aim is not None and self._aim[1:] == (cursor, self.viewport.view):
             return self._aim[0]
@@ -198,12 +181,10 @@ class WorldMap(Widget, can_focus=True):
         return None if owner is None else self.place.prints[owner].name
 
     def describe(self, name: str, columns: int = 0) -> Text:
-        """A description of a model in one line of at most `columns`; empty for an unknown name."""
         number = self._numbers.get(name)
         return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
 
     def go_to(self, name: str) -> bool:
-        """Moves the crosshair to a model, and the map if needed; False if there is no such model."""
         number, port = self._numbers.get(name), self.viewport
         if number is None or port.view is None:
             return False
@@ -216,7 +197,6 @@ class WorldMap(Widget, can_focus=True):
         return True
 
     def aim_at(self, x: float, y: float) -> None:
-        """Moves the crosshair to a place, m, and the map if needed."""
         port = self.viewport
         cell = None if port.view is None else port.view.cell(x, y)
         if cell is None:
@@ -236,7 +216,6 @@ class WorldMap(Widget, can_focus=True):
             self.draw()
 
     def select(self, names: Iterable[str]) -> None:
-        """Selects these models instead."""
         selection = frozenset(names)
         if selection != self.selection:
             self.shown = replace(self.shown, selection=selection)
@@ -244,7 +223,6 @@ class WorldMap(Widget, can_focus=True):
             self.draw()
 
     def action_neighbour(self, step: int) -> None:
-        """The model before or after the one under the crosshair, in the order of the world."""
         state = self.snapshot.state
         left = frozenset(state.environment)
         names = [name for name in state.elements if name in left] or list(self._numbers)
@@ -270,17 +248,14 @@ class WorldMap(Widget, can_focus=True):
     # The view.
 
     def zoom(self, factor: float) -> None:
-        """Zooms in by `factor`, about the crosshair if shown, else about the middle."""
         self.viewport.zoom(factor, self.viewport.cursor if self.aims else None)
         self._draw_soon()
 
     def fit(self) -> None:
-        """Shows everything important again."""
         self.viewport.fitted = True
         self._refit()
 
     def _refit(self) -> None:
-        """Changes the size or the important places."""
         columns, rows = self.size
         if columns and rows and self._has_world:
             self.viewport.resize(columns, rows, lambda *size: self._drawing.fitting(self.shown, *size))
@@ -368,7 +343,6 @@ class WorldMap(Widget, can_focus=True):
         self.draw()
 
     def draw(self) -> None:
-        """Draws a new frame, and refreshes only the lines that changed."""
         view = self.viewport.view
         if view is None or not self.is_attached:
             return

@@ -31,7 +31,6 @@ def met(test: Test) -> tuple[tuple[float, str], ...]:
 
 
 def how_it_ended(test: Test) -> str:
-    """Its outcome, with the failure."""
     if test.outcome == "running":
         return "▶ it runs"
     why = f": {plain(test.failure)}" if test.failure else ""
@@ -50,7 +49,6 @@ class Met(Widget):
         self._now = 0
 
     def put(self, tests: tuple[Test, ...], lacks: tuple[str, ...]) -> None:
-        """Other tests."""
         signs = ROBOTS if len(tests) > 1 else ("",)
         lines = ((at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test))
         self._lines, self._lacks, self._now = sorted(lines, key=itemgetter(0)), lacks, 0

@@ -24,7 +24,6 @@ class RobotWay:
 
     @property
     def whole(self) -> Way:
-        """The way without a robot on it."""
         return Way(self._name, self.points)
 
     def at(self, time: float) -> Way:
@@ -36,14 +35,13 @@ class RobotWay:
         return Way(self._name, self.points, (*pose.position[:2], pose.yaw()), gone)
 
     def place(self, time: float) -> tuple[float, float] | None:
-        """Where the robot was at simulated `time`, s: x, y m."""
         pose = self._one.pose(time)
         return None if pose is None else pose.position[:2]
 
 
-def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...], letters: tuple[int, ...] = ()) -> Snapshot:
+def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
     """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
-    round = Round(0, len(groups), Split(there, groups, letters=letters), PersistentTuple()) if groups else None
+    round = Round(0, len(groups), Split(there, groups), PersistentTuple()) if groups else None
     bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
     return Snapshot(bare, past=True)
 

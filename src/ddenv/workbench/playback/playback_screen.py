@@ -12,28 +12,28 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
-from textual.screen import ModalScreen, Screen
-from textual.widgets import OptionList, Static
-from textual.widgets.option_list import Option
+from textual.screen import Screen
+from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
-from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.state import Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import purpose
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
 from ddenv.text import count, padded, plain, shortened
 from ddenv.words.signs import outcome
-from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.signs import SignsDialog
+from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.map.place import MovedPrints, Place, Point, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
+from ddenv.workbench.shared.background import refuse
+from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.world.pose import pose_at
 
 # Simulated seconds in a second.
@@ -55,12 +55,7 @@ class Playing:
     def __init__(self, length: float, speed: float = USUAL) -> None:
         self.length, self.time, self.speed, self.on = length, 0.0, speed, False
 
-    @property
-    def at_end(self) -> bool:
-        return self.time >= self.length
-
     def go(self, time: float) -> None:
-        """To an instant, and stops there."""
         self.on = False
         self.time = min(max(0.0, time), self.length)
 
@@ -71,13 +66,11 @@ class Playing:
         self.go((whole + number) * FRAME)
 
     def toggle(self) -> None:
-        """Plays, or pauses; at the end it begins again."""
-        if not self.on and self.at_end:
+        if not self.on and self.time >= self.length:
             self.time = 0.0
         self.on = not self.on and self.length > 0
 
     def faster(self, steps: int) -> bool:
-        """Another of the `SPEEDS`; False if there is none."""
         place = bisect_left(SPEEDS, self.speed) + steps
         if not 0 <= place < len(SPEEDS):
             return False
@@ -85,18 +78,15 @@ class Playing:
         return True
 
     def advance(self, seconds: float) -> None:
-        """So many seconds of real time pass."""
         if self.on:
             self.time = min(self.length, self.time + seconds * self.speed)
-            self.on = not self.at_end
+            self.on = self.time < self.length
 
 
 def now() -> float:
-    """A clock that only goes on, s."""
     return time.monotonic()
 
 
-SHOWN = ids("playback", "play back on frame_back frame_on slower faster parting beside swap before next help close")
 FIRST = ids("playback", "help close play beside frame_back frame_on parting slower faster swap before next back on")
 
 
@@ -123,10 +113,8 @@ class Playback(Screen[None]):
         ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
         ("before", "up", "test(-1)", "test before", "the finished test before this one"),
         ("next", "down", "test(1)", "next test", "the next finished test"),
-        ("closer", "plus,equals_sign", "zoom(1.25)", "closer", "map: closer", "+"),
-        ("farther", "minus", "zoom(0.8)", "farther", "map: farther away", "-"),
-        ("fit", "0", "fit", "fit", "map: show all that matters"),
-        ("signs", "k", "signs", "signs", "what the signs and letters on the map mean"),
+        *MAP_KEYS,
+        ("signs", "k", "app.signs", "signs", "what the signs and letters on the map mean"),
         HELP,
         ("close", "escape,q", "dismiss", "close", "back to where it was opened", "esc"),
     )
@@ -153,7 +141,7 @@ class Playback(Screen[None]):
                 yield Met(id="met")
         with Framed("", id="playback-time", classes="panel"):
             yield Timeline(id="timeline")
-        yield KeyFooter(SHOWN, FIRST)
+        yield KeyFooter(FIRST)
         yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -173,8 +161,6 @@ class Playback(Screen[None]):
     def on_resize(self) -> None:
         self.call_after_refresh(self._show_legend)
 
-    # The tests.
-
     def _take(self, numbers: Sequence[int]) -> None:
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
@@ -191,7 +177,7 @@ class Playback(Screen[None]):
         try:
             self._take(numbers)
         except UserError as error:
-            self._refuse(str(error))
+            refuse(self, str(error))
             return
         self.playing.go(at)
         self._put()
@@ -218,8 +204,6 @@ class Playback(Screen[None]):
         self.query_one("#playback-header", Static).update(header)
         self._show()
 
-    # The instant.
-
     def _tick(self) -> None:
         at = now()
         passed, self._ticked = at - self._ticked, at
@@ -228,7 +212,6 @@ class Playback(Screen[None]):
             self._show()
 
     def _show(self) -> None:
-        """The robots, the models and the slider at the instant."""
         playing, at = self.playing, self.playing.time
         moving = self._tests[0].moving
         prints = self._prints.at({name: pose_at(samples, at) for name, samples in moving.items()})
@@ -265,8 +248,6 @@ class Playback(Screen[None]):
         self.playing.go(time)
         self._show()
 
-    # The keys.
-
     def action_play(self) -> None:
         self._ticked = now()
         self.playing.toggle()
@@ -284,31 +265,38 @@ class Playback(Screen[None]):
 
     def action_speed(self, steps: int) -> None:
         if not self.playing.faster(steps):
-            self._refuse(f"{SPEEDS[0]:g} to {SPEEDS[-1]:g} × real time")
+            refuse(self, f"{SPEEDS[0]:g} to {SPEEDS[-1]:g} × real time")
         self._show()
 
     def action_parting(self) -> None:
         if self._parting is not None:
             self._go(self._parting[0])
         elif len(self._tests) == 2:
-            self._refuse(f"the robots are never {APART:g} m apart")
+            refuse(self, f"the robots are never {APART:g} m apart")
         else:
-            self._refuse("this is one test; o plays another one over it")
+            refuse(self, "this is one test; o plays another one over it")
 
     def action_beside(self) -> None:
-        first = self._tests[0].test
+        first, state = self._tests[0].test, self._position.end
+        tests = others(state.tests, first)
 
-        def chosen(number: int | None) -> None:
-            if number is not None:
-                self._change([first.id, number] if number else [first.id])
+        def line(test: Test) -> Text:
+            same = "= " if test.seed == first.seed else ""
+            return _line(str(test.id), purpose(state, test), f"{same}{test.seed}", outcome(test))
 
-        self.app.push_screen(Beside(self._position.end, first), chosen)
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._change([first.id, tests[row - 1].id] if row else [first.id])
+
+        lines = [Text(f"test {first.id} alone"), *map(line, tests)]
+        head, at = _line("test", "of", "seed", "end"), min(1, len(tests))
+        self.app.push_screen(Pick(f"Play beside test {first.id}", "plays both", lines, head=head, at=at), chosen)
 
     def action_swap(self) -> None:
         if len(self._tests) == 2:
             self._change([one.test.id for one in reversed(self._tests)])
         else:
-            self._refuse("this is one test; o plays another one over it")
+            refuse(self, "this is one test; o plays another one over it")
 
     def action_test(self, by: int) -> None:
         tests, number = self._position.end.tests, self._tests[0].test.id + by
@@ -317,50 +305,7 @@ class Playback(Screen[None]):
         if 0 < number <= len(tests):
             self._change([number])
         else:
-            self._refuse("there is no finished test after this one" if by > 0 else "there is no test before this one")
-
-    def action_zoom(self, factor: float) -> None:
-        self.map.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.map.fit()
-
-    def action_signs(self) -> None:
-        self.app.push_screen(SignsDialog())
-
-    def _refuse(self, why: str) -> None:
-        self.notify(plain(why), severity="warning", timeout=4, markup=False)
-
-
-class Beside(ModalScreen[int | None]):
-    """Returns the number of the test to play beside `test`; 0 for none, or None if nothing is to change."""
-
-    CSS_PATH = "playback.tcss"
-    BINDINGS: ClassVar = keys("beside", ("close", "escape,o,q", "dismiss", "close", "back to the playback"))
-
-    def __init__(self, state: RunState, test: Test) -> None:
-        super().__init__()
-        self._state, self._test = state, test
-        self._tests = others(state.tests, test)
-
-    def compose(self) -> ComposeResult:
-        with Framed(f"Play beside test {self._test.id}", "enter plays both   escape closes"):
-            yield Static(_line("test", "of", "seed", "end"), id="head", markup=False)
-            alone = Option(Text(f"test {self._test.id} alone"))
-            options = (Option(self._words(test)) for test in self._tests)
-            yield OptionList(alone, *options, id="beside", compact=True, markup=False)
-
-    def on_mount(self) -> None:
-        options = self.query_one(OptionList)
-        options.focus()
-        options.highlighted = min(1, len(self._tests))
-
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        self.dismiss(self._tests[event.option_index - 1].id if event.option_index else 0)
-
-    def _words(self, test: Test) -> Text:
-        same = "= " if test.seed == self._test.seed else ""
-        return _line(str(test.id), purpose(self._state, test), f"{same}{test.seed}", outcome(test))
+            refuse(self, "there is no finished test after this one" if by > 0 else "there is no test before this one")
 
 
 def others(tests: Sequence[Test], one: Test) -> list[Test]:

@@ -54,7 +54,6 @@ class Timeline(Widget):
         self._dragging = False
 
     def show(self, shown: Instant) -> None:
-        """Draws again if anything in it changed."""
         if shown != self.shown:
             taller = len(shown.tests) != len(self.shown.tests)
             self.shown = shown
@@ -89,8 +88,6 @@ class Timeline(Widget):
         text = Text(f"{ROBOTS[number]} ", "bold", no_wrap=True).append("".join(cells), "not bold")
         text.stylize("bold", SIGN, SIGN + now + 1)
         return text.append(f" {outcome(test)[: self._words]}", "not bold")
-
-    # The mouse.
 
     def _time(self, x: int) -> float:
         return max(0.0, min(1.0, (x - SIGN) / (self._room - 1))) * self.shown.length

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from functools import cached_property
 from typing import Any
 
 from textual.screen import Screen
@@ -19,11 +18,10 @@ from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.selections import Accept, Reject
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Trial
 from ddenv.runs import processor
 from ddenv.runs.folder import attach_name
-from ddenv.text import count, duration, plain
-from ddenv.words.decisions import shows_f
+from ddenv.text import duration, plain
+from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine
 
@@ -53,11 +51,8 @@ class Asking:
         if self._sender is not None:
             self._sender.shutdown(wait=False)
 
-    # What is possible.
-
     @property
     def situation(self) -> Situation:
-        """What the rules look at."""
         snapshot, last = self._poll.snapshot, self._last[1]
         pending = last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
         return Situation(snapshot.state, snapshot.engine, self.barred, pending)
@@ -67,22 +62,16 @@ class Asking:
         """Why this screen cannot guide the run, or ""."""
         snapshot = self._poll.snapshot
         if self._poll.watch:
-            return self._watching
+            return f"watching only: to guide it, use 'ddenv open {attach_name(self._poll.path)}' without --watch"
         if snapshot.gone:
             return "the run file is gone: it can no longer be guided; q leaves"
         return "this run file cannot be read" if snapshot.error else ""
 
-    @cached_property
-    def _watching(self) -> str:
-        return f"watching only: to guide it, use 'ddenv open {attach_name(self._poll.path)}' without --watch"
-
     @property
     def trouble(self) -> str:
-        """The error that ended the engine that this screen started, or ""."""
         return self._engine.trouble if self._poll.snapshot.engine == "absent" else ""
 
     def waiting_for(self) -> str:
-        """The command that waits for its answer, in words."""
         (id, command), snapshot = self._last, self._poll.snapshot
         if command is None:
             return ""
@@ -94,32 +83,16 @@ class Asking:
         late = int(time.monotonic() - self._asked_at)
         return words if late < PATIENCE else f"{words}: no answer for {duration(late)}"
 
-    # What is said.
-
     def refuse(self, why: str) -> None:
-        """Shows why something is not possible."""
-        self._screen.notify(plain(why), severity="warning", timeout=4, markup=False)
+        refuse(self._screen, why)
 
     def say(self, what: str) -> None:
         self._screen.notify(plain(what), timeout=4, markup=False)
 
     def show_refusal(self, before: Snapshot) -> None:
-        """Shows why the engine refused a command of this screen."""
         id, why = self._poll.snapshot.state.refusal
         if (id, why) != before.state.refusal and id in self._mine:
             self.refuse(f"{self._mine[id]}: not done, {why}")
-
-    def show_verdicts(self, before: Snapshot) -> None:
-        """Shows the verdicts of tries since `before`."""
-        now = self._poll.snapshot.state.trials
-        if before.state.trials == now:
-            return
-        judged = {trial.number for trial in before.state.trials if trial.verdict}
-        for trial in now:
-            if trial.verdict and trial.number not in judged:
-                self.say(_judged(trial, self._poll.watch))
-
-    # Sending.
 
     def ask(self, command: Command | StartEngine | Isolate, *, sure: bool = False) -> None:
         """Sends a command, after its question unless the user is `sure`, or shows why it is not possible."""
@@ -137,9 +110,9 @@ class Asking:
         elif sure or not (asked := question(command, now.state)):
             self.send(command)
         else:
-            from ddenv.workbench.widgets.question import Question
+            from ddenv.workbench.widgets.question import ask
 
-            self._screen.app.push_screen(Question(asked), lambda yes: self.send(command) if yes else None)
+            ask(self._screen.app, asked, lambda: self.send(command))
 
     def _decide_first(self, command: Command, dropped: str) -> None:
         """Asks what becomes of the reduction that waits, before the new search that `command` begins."""
@@ -208,8 +181,6 @@ class Asking:
             self._sender = ThreadPoolExecutor(1, "send")
         self._sender.submit(write, asyncio.get_running_loop(), contextvars.copy_context())
 
-    # The engine.
-
     def go_on(self) -> None:
         """Starts an engine for the last command if none is running, or if the last one ended without reading it."""
         snapshot = self._poll.snapshot
@@ -237,10 +208,3 @@ class Asking:
             self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, **options)
         except UserError as error:
             self._screen.notify(str(error), severity="error", markup=False)
-
-
-def _judged(trial: Trial, watch: bool) -> str:
-    if trial.verdict == "similar":
-        return f"{shows_f(trial)}{'' if watch else ': a adopts it'}"
-    known = ", known from before" if trial.known and trial.known == len(trial.tests) else ""
-    return f"{trial.label} does not show f in {count(len(trial.tests), 'test')}{known}"

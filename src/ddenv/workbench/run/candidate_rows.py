@@ -23,28 +23,9 @@ from ddenv.words.slices import implied_words
 NAME = 8
 # The latest judged tries that stay in the table.
 TRIALS = 3
-# The verdict where there is little room for it; it is there if it differs.
-IN_SHORT = "in short"
 
 Item = Trial | Candidate | Test | FreshRuns
 Words = Mapping[str, str]
-# What the columns mean, for tooltips.
-MEANINGS = {
-    "#": "the order in which the candidates are tested",
-    "candidate": "a part of the environment, or the environment without a part; a try is your own selection",
-    "models": "how many models it has",
-    "distance": "what the prioritization ranked it by",
-    "tests": "how many of the possible tests were made",
-    "evidence": "how its tests ended; k explains the signs",
-    "to f": "how near to the end of f the nearest of its tests came",
-    "real": "how long its tests took by the clock, or how far the running one is",
-    "verdict": "what its tests add up to; k explains the signs",
-    "environment": "what was run with fresh seeds: what is left, that without one model, or the whole world",
-    "runs": "the runs that did not break",
-    "ended": "how the runs ended; k explains the signs",
-    "f": "the share of the runs that showed f",
-    "shown": "what the runs have shown so far: at least so much of the rate is kept, or without the model f is at most so frequent",
-}
 # Columns that only candidates fill.
 OF_CANDIDATES = ("distance", "evidence")
 # Maximum width of a model's name, in cells.
@@ -94,20 +75,17 @@ class Listed:
         return len(self.trials) + len(self.rest)
 
     def item(self, row: int) -> Item | None:
-        """What stands in a row; None if there is no such row."""
         if not 0 <= row < len(self):
             return None
         return self.trials[row] if row < len(self.trials) else self.rest[row - len(self.trials)]
 
     def row(self, item: Trial | Candidate) -> int | None:
-        """The row of a trial or of a candidate of the round."""
         if isinstance(item, Candidate):
             return len(self.trials) + item.index if self.of[:1] == ("round",) else None
         return next((row for row, each in enumerate(self.trials) if each.number == item.number), None)
 
 
 def listed(snapshot: Snapshot) -> Listed:
-    """What the table lists now."""
     state = snapshot.state
     here = [trial for trial in state.trials if trial.node == state.node]
     judged = {trial.number for trial in [trial for trial in here if trial.verdict][-TRIALS:]}
@@ -121,7 +99,6 @@ def listed(snapshot: Snapshot) -> Listed:
 
 
 def round_title(state: RunState) -> tuple[str, str]:
-    """The table's title, and how much of it is done."""
     if state.certificate is not None:
         return certificate_title(state)
     if state.round is None:
@@ -136,25 +113,21 @@ def round_title(state: RunState) -> tuple[str, str]:
     )
 
 
-def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, ...]:
-    """The columns that fit into `width` cells, each with its width; `narrow` leaves out all that can be spared."""
+def fitting(listing: Listed, width: int) -> tuple[Column, ...]:
     first = listing.rest[0] if listing.rest else None
     if isinstance(first, FreshRuns):
         names = (name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
         longest = Column("environment", max(13, *(cell_len(name) + 1 for name in names)))
-        rest = (each for each in FRESH_COLUMNS if not (narrow and each.name == "ended"))
-        # How often f showed goes only where there is no room for it.
-        return _fitted((longest, *rest), width, narrow=False)
+        return _fitted((longest, *FRESH_COLUMNS), width)
     unused: tuple[str, ...] = () if isinstance(first, Candidate) else OF_CANDIDATES
     if isinstance(first, Candidate) and first.distance is None:
         unused = ("distance",)
     number = Column("#", max(2, len(str(len(listing.rest)))))
-    return _fitted((number, *(each for each in COLUMNS[1:] if each.name not in unused)), width, narrow)
+    return _fitted((number, *(each for each in COLUMNS[1:] if each.name not in unused)), width)
 
 
-def _fitted(wanted: Sequence[Column], width: int, narrow: bool) -> tuple[Column, ...]:
-    """Those of the columns that fit; the last one gets the rest of the width."""
-    columns = [each for each in wanted if not (narrow and each.spare)]
+def _fitted(wanted: Sequence[Column], width: int) -> tuple[Column, ...]:
+    columns = list(wanted)
     while (over := sum(each.width for each in columns) - width) > 0:
         most = max(columns, key=lambda each: each.spare)
         if not most.spare:
@@ -165,7 +138,6 @@ def _fitted(wanted: Sequence[Column], width: int, narrow: bool) -> tuple[Column,
 
 
 def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
-    """The words of a row by column."""
     item = listing.item(row)
     if item is None:
         return {}
@@ -199,7 +171,6 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         "to f": metres(min(distances)) if distances else "",
         "real": brief(seconds) if done else "",
         "verdict": _verdict(snapshot, item, tests) or _fallen(fallen),
-        **_in_short(snapshot.state, item),
     }
 
 
@@ -216,7 +187,6 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
 
 
 def _running(snapshot: Snapshot, tests: Sequence[Test]) -> str:
-    """Which of some tests run, and how far the first of these is."""
     running = [test for test in tests if test.outcome == "running"]
     if not running or snapshot.engine != "alive":
         return ""
@@ -224,18 +194,11 @@ def _running(snapshot: Snapshot, tests: Sequence[Test]) -> str:
     return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)
 
 
-def _in_short(state: RunState, item: Trial | Candidate) -> Words:
-    """The verdict by its sign, with the run that implies it."""
-    implied = implied_words(state, item.tests) if item.verdict in VERDICT else ""
-    return {IN_SHORT: f"{VERDICT[item.verdict][0]} {implied.removeprefix('implied ')}"} if implied else {}
-
-
 def _fallen(models: Sequence[str]) -> str:
     return f"drops {len(models)} models" if len(models) > 1 else dropping(models, NAME)
 
 
 def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
-    """One run of the whole world."""
     return {
         "#": str(number),
         "candidate": f"run {test.run + 1}",
@@ -248,7 +211,6 @@ def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
 
 
 def name_of(one: FreshRuns) -> str:
-    """What ran, in a few words."""
     if one.without is not None:
         return f"- {shortened(one.without, MODEL_WIDTH)}"
     if one.is_left:
@@ -259,7 +221,6 @@ def name_of(one: FreshRuns) -> str:
 
 
 def certificate_title(state: RunState) -> tuple[str, str]:
-    """The table's title, and how much of it is done."""
     certificate = state.certificate
     if certificate is None:
         return "", ""
@@ -273,24 +234,23 @@ def certificate_title(state: RunState) -> tuple[str, str]:
 
 
 def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
-    """The words of a row by column."""
     return {
         "environment": name_of(one),
         "runs": str(one.runs) if one.runs else "",
         "ended": signs(dict(one.outcomes)),
         "f": percent(one.shown / one.runs) if one.runs and not one.is_chosen else "",
         "shown": one.shows_at_least,
-        **_claim(snapshot, one),
+        "verdict": _claim(snapshot, one),
     }
 
 
-def _claim(snapshot: Snapshot, one: FreshRuns) -> Words:
+def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
     """The verdict of a claim, and how the robot fails without a needed model."""
     if one.claim is None:
-        return {"verdict": _running(snapshot, one.running)}
+        return _running(snapshot, one.running)
     words, certificate = f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}", snapshot.state.certificate
     end = None if certificate is None else failing_instead(snapshot.state, certificate, one.claim)
     if end is None:
-        return {"verdict": words}
+        return words
     away = f" {metres(end.away)} away" if metres(end.away) else ""
-    return {"verdict": f"{words}; {end.failure}{away}", IN_SHORT: f"{words}; {end.failure}"}
+    return f"{words}; {end.failure}{away}"

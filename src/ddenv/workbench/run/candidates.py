@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import accumulate
 from typing import ClassVar
 
 from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from rich.style import Style
 from textual import events
-from textual.binding import Binding
 from textual.geometry import Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
@@ -18,16 +16,10 @@ from textual.strip import Strip
 from ddenv.evidence.claims import FreshRuns
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Test, Trial
-from ddenv.text import first_of, plain
-from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
+from ddenv.workbench.run.candidate_rows import Column, Item, Listed, Words, fitting, listed, words
+from ddenv.workbench.shared.bindings import keys
 
-# The maximum number of models that a tooltip names.
-NAMED = 12
 STRONG, WEAK = Style(bold=True), Style(dim=True)
-
-
-def _binding(keys: str, action: str, name: str, tooltip: str) -> Binding:
-    return Binding(keys, action, name, show=False, id=f"candidates.{name}", tooltip=tooltip)
 
 
 class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
@@ -39,30 +31,16 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     HELP = "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long   ↓ drops a model"
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar = {"candidates--header", "candidates--cursor"}
-    DEFAULT_CSS = """
-    Candidates {
-        background: $background;
-        color: $foreground;
-        scrollbar-size: 1 1;
-        overflow-x: hidden;
-        & > .candidates--header { color: $text-muted; }
-        & > .candidates--cursor { background: $primary 25%; color: $foreground; }
-        &:focus > .candidates--cursor { background: $primary 45%; color: $foreground; }
-        &:nocolor > .candidates--cursor { text-style: underline; }
-        &:nocolor:focus > .candidates--cursor { text-style: reverse; }
-        &:ansi > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: underline; }
-        &:ansi:focus > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: reverse; }
-    }
-    """
-    BINDINGS: ClassVar = [
-        _binding("up", "move(-1)", "up", "the candidate above: the map shows its models"),
-        _binding("down", "move(1)", "down", "the candidate below: the map shows its models"),
-        _binding("pageup", "page(-1)", "page_up", "one page of candidates up"),
-        _binding("pagedown", "page(1)", "page_down", "one page of candidates down"),
-        _binding("home,ctrl+home", "first", "first", "the first candidate"),
-        _binding("end,ctrl+end", "last", "last", "the last candidate"),
-        _binding("enter", "choose", "choose", "stay on this candidate"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "candidates",
+        ("up", "up", "move(-1)", "", "the candidate above: the map shows its models"),
+        ("down", "down", "move(1)", "", "the candidate below: the map shows its models"),
+        ("page_up", "pageup", "page(-1)", "", "one page of candidates up"),
+        ("page_down", "pagedown", "page(1)", "", "one page of candidates down"),
+        ("first", "home,ctrl+home", "first", "", "the first candidate"),
+        ("last", "end,ctrl+end", "last", "", "the last candidate"),
+        ("choose", "enter", "move(0)", "", "stay on this candidate"),
+    )
 
     class Chosen(Message):
         """The cursor was moved by hand, or given back to the run."""
@@ -74,9 +52,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self.columns: tuple[Column, ...] = fitting(Listed(), 0)
         self._snapshot = Snapshot()
         self._listed = Listed()
-        self._narrow = False
-
-    # What is listed.
 
     @property
     def item(self) -> Item | None:
@@ -90,20 +65,12 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     @property
     def chosen(self) -> Candidate | Trial | None:
-        """The candidate or trial that was chosen by hand."""
         return None if self.following else self.under_cursor
 
     def words(self, row: int) -> Words:
-        """The words of a row by column."""
         return words(self._snapshot, self._listed, row)
 
-    def set_narrow(self, narrow: bool) -> None:
-        """With little room, drops every column that can be spared."""
-        self._narrow = narrow
-        self._arrange()
-
     def show(self, snapshot: Snapshot) -> None:
-        """Shows the run as it is now."""
         before, self._listed, self._snapshot = self._listed, listed(snapshot), snapshot
         if self._listed.of != before.of:
             self.following, self.cursor_row = True, 0
@@ -120,11 +87,8 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self.refresh()
 
     def follow(self) -> None:
-        """Gives the cursor back to the run."""
         self.following = True
         self.post_message(self.Chosen())
-
-    # Keys and mouse.
 
     def action_move(self, rows: int) -> None:
         self._by_hand(self.cursor_row + rows)
@@ -138,30 +102,11 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def action_last(self) -> None:
         self._by_hand(len(self._listed) - 1)
 
-    def action_choose(self) -> None:
-        self._by_hand(self.cursor_row)
-
     def on_click(self, event: events.Click) -> None:
         row = event.y - 1 + self.scroll_offset.y
         if event.y > 0 and row < len(self._listed):
             event.stop()
             self._by_hand(row)
-
-    def on_mouse_move(self, event: events.MouseMove) -> None:
-        # The same words again would hide what is shown.
-        if (words := self._hint(event.x, event.y)) != self.tooltip:
-            self.tooltip = words
-
-    def _hint(self, x: int, y: int) -> str | None:
-        """What the pointer is on: a column's meaning, or the models of a row."""
-        if y == 0:
-            ends = accumulate(column.width for column in self.columns)
-            column = next((each for each, end in zip(self.columns, ends, strict=True) if x < end), self.columns[-1])
-            return MEANINGS.get(column.name)
-        row = self._listed.item(y - 1 + self.scroll_offset.y)
-        if not isinstance(row, Candidate | Trial):
-            return None
-        return f"{row.label}: {first_of([plain(name) for name in row.models], NAMED) or 'no models'}"
 
     def _by_hand(self, row: int) -> None:
         self.following = False
@@ -176,7 +121,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     @property
     def _in_sight(self) -> bool:
-        """Whether the cursor is."""
         return self.scroll_offset.y <= self.cursor_row < self.scroll_offset.y + self._page
 
     def _put(self, row: int | None, reveal: bool = False) -> None:
@@ -198,8 +142,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._reveal()
 
     def _arrange(self) -> None:
-        """Fits the columns and the scroll area."""
-        self.columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
+        self.columns = fitting(self._listed, max(0, self.container_size.width - 1))
         self.virtual_size = Size(0, len(self._listed) + 1)
         self.refresh()
 
@@ -218,10 +161,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
-        said = cells.get(last.name, "")
-        if cell_len(said) > last.width - 2:
-            said = cells.get(IN_SHORT, said)
-        verdict = _aligned(last, f"  {said}")
+        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
         segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 

@@ -7,7 +7,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Button, Input, Select, Static
@@ -22,6 +21,7 @@ from ddenv.settings import Setting, Value
 from ddenv.text import plain
 from ddenv.words.methods import KINDS, note, paragraph
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.entry import Entry
 
 # Beside the pair and the algorithm, which have lists.
@@ -34,8 +34,8 @@ class Change(ModalScreen[course.Change | None]):
     CSS_PATH = "run_dialogs.tcss"
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (34, "-tall")]
     BINDINGS: ClassVar = [
-        Binding("escape", "cancel", "cancel", id="change.cancel", tooltip="change nothing"),
-        Binding("ctrl+s", "apply", "change", id="change.apply", tooltip="change the settings", priority=True),
+        *keys("change", ("cancel", "escape", "dismiss(None)", "cancel", "change nothing")),
+        *keys("change", ("apply", "ctrl+s", "apply", "change", "change the settings"), priority=True),
     ]
 
     def __init__(self, state: RunState) -> None:
@@ -104,18 +104,10 @@ class Change(ModalScreen[course.Change | None]):
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",
             "algorithm": kinds["algorithm"],
         }
-        wrong = []
-        for one in OTHERS:
-            try:
-                asked[one.name] = course.typed(one.name, self._text(one))
-            except UserError as error:
-                wrong.append(str(error))
+        asked |= {one.name: course.typed(one.name, self._text(one)) for one in OTHERS}
         command = course.Change(course.Change(asked).new(self._state))
-        # Where a field is no number, that nothing else changes is no mistake.
-        if (command.settings or not wrong) and (why := command.refusal(Situation(self._state))):
-            wrong.append(why)
-        if wrong:
-            raise UserError("; ".join(wrong))
+        if why := command.refusal(Situation(self._state)):
+            raise UserError(why)
         return command
 
     @on(Input.Submitted)
@@ -135,6 +127,3 @@ class Change(ModalScreen[course.Change | None]):
             self.action_apply()
         else:
             self.dismiss(None)
-
-    def action_cancel(self) -> None:
-        self.dismiss(None)

@@ -8,7 +8,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
@@ -16,6 +15,7 @@ from textual.widgets.option_list import Option
 from ddenv.text import count, plain, shortened, truncated
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.bindings import keys
 
 # Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
 LISTED, WIDTH = 100, 36
@@ -25,12 +25,13 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     """Returns the chosen names, None if it was cancelled. Beside the list the map marks the model under the cursor."""
 
     CSS_PATH = "run_dialogs.tcss"
-    BINDINGS: ClassVar = [
-        Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
-        Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
-        Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
-        Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "choose",
+        ("cancel", "escape", "cancel", "cancel", "choose nothing"),
+        ("down", "down", "move(1)", "", "next name"),
+        ("up", "up", "move(-1)", "", "previous name"),
+        ("toggle", "tab", "mark", "", "choose this model, too, or no longer"),
+    )
 
     def __init__(
         self,
@@ -81,16 +82,13 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     def _filter(self) -> None:
         """Lists the names with the typed part. Each key calls it first: fast typing is ahead of the message `Changed`."""
         part = self.query_one(Input).value.strip().lstrip("/").casefold()
-        if part != self._part:
-            self._part = part
-            self._list(part)
-
-    def _list(self, part: str) -> None:
+        if part == self._part:
+            return
+        self._part = part
         found = [name for name in self._names if part in name.casefold()]
         self._listed, self._found = found[:LISTED], len(found)
         options = self.query_one(OptionList)
-        options.clear_options()
-        options.add_options([Option(self._prompt(name)) for name in self._listed])
+        options.set_options(Option(self._prompt(name)) for name in self._listed)
         if self._listed:
             options.highlighted = 0
         self._show_found()
@@ -110,10 +108,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     def action_move(self, by: int) -> None:
         self._filter()
         options = self.query_one(OptionList)
-        if by > 0:
-            options.action_cursor_down()
-        else:
-            options.action_cursor_up()
+        (options.action_cursor_down if by > 0 else options.action_cursor_up)()
 
     def action_mark(self) -> None:
         self._filter()
@@ -133,7 +128,6 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
 
     @on(Input.Submitted)
     def _take(self) -> None:
-        """Takes the chosen names, or the one under the cursor."""
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._chosen:
@@ -174,10 +168,11 @@ class Layers(ModalScreen[None]):
     """A list of the map's layers; those that are shown are marked."""
 
     CSS_PATH = "run_dialogs.tcss"
-    BINDINGS: ClassVar = [
-        Binding("space", "switch", "show or hide", id="layers.toggle", tooltip="show this layer or hide it"),
-        Binding("escape,l,q", "dismiss", "close", id="layers.close", tooltip="back to the map"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "layers",
+        ("toggle", "space", "switch", "show or hide", "show this layer or hide it"),
+        ("close", "escape,l,q", "dismiss", "close", "back to the map"),
+    )
 
     def __init__(self, world: WorldMap, names: tuple[str, ...]) -> None:
         super().__init__()
@@ -188,50 +183,18 @@ class Layers(ModalScreen[None]):
             yield OptionList(*(Option(self._prompt(name)) for name in self._names), compact=True, markup=False)
 
     def _prompt(self, name: str) -> Text:
-        mark = "[x]" if name in self._world.shown_layers else "[ ]"
+        mark = "[x]" if name in self._world.shown.layers else "[ ]"
         return Text(f"{mark} {name:<11} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
 
+    @on(OptionList.OptionSelected)
     def action_switch(self) -> None:
-        place = self.query_one(OptionList).highlighted
-        if place is not None:
-            self._toggle(place)
-
-    @on(OptionList.OptionSelected)
-    def _selected(self, event: OptionList.OptionSelected) -> None:
-        self._toggle(event.option_index)
-
-    def _toggle(self, place: int) -> None:
-        name = self._names[place]
-        self._world.toggle_layer(name)
-        self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
+        options = self.query_one(OptionList)
+        if (place := options.highlighted) is not None:
+            self._world.toggle_layer(self._names[place])
+            options.replace_option_prompt_at_index(place, self._prompt(self._names[place]))
 
 
-class Copy(ModalScreen[None]):
-    """A list of texts; enter or a click copies one."""
-
-    CSS_PATH = "run_dialogs.tcss"
-    BINDINGS: ClassVar = [
-        Binding("escape,y,q", "dismiss", "close", id="copy.close", tooltip="copy nothing"),
-    ]
-
-    def __init__(self, texts: Sequence[tuple[str, str]]) -> None:
-        """`texts` are (what it is, the text itself)."""
-        super().__init__()
-        self._texts = tuple(texts)
-
-    def compose(self) -> ComposeResult:
-        with Framed("Copy", "enter or click copies   escape closes"):
-            yield OptionList(*(Option(_prompt(*each)) for each in self._texts), compact=True, markup=False)
-
-    @on(OptionList.OptionSelected)
-    def _chosen(self, event: OptionList.OptionSelected) -> None:
-        what, text = self._texts[event.option_index]
-        self.app.copy_to_clipboard(text)
-        self.notify(f"{what} copied, if the terminal allows it", timeout=3, markup=False)
-        self.dismiss(None)
-
-
-def _prompt(what: str, text: str) -> Text:
+def copied(what: str, text: str) -> Text:
     lines = text.splitlines()
     more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
     shown = truncated(plain(lines[0]), 40) if lines else ""

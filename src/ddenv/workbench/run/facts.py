@@ -8,7 +8,6 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
@@ -21,6 +20,7 @@ from ddenv.text import count, first_of, plain
 from ddenv.words.signs import metres
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.playback.met import how_it_ended, met
+from ddenv.workbench.shared.bindings import keys
 
 # The maximum number of models to name.
 NAMED = 12
@@ -81,7 +81,6 @@ def _names(models: tuple[str, ...] | list[str]) -> str:
 
 
 def _counts(position: Position, state: RunState, test: Test) -> str:
-    """The verdict that the test counts in."""
     if test.trial is not None and 0 < test.trial <= len(state.trials):
         trial = state.trials[test.trial - 1]
         return f"{trial.label}: {trial.verdict or 'not judged yet'}, {count(len(trial.tests), 'test')}"
@@ -100,13 +99,14 @@ class FactsDialog(ModalScreen[None]):
     """Starts at a test; the arrows go to the tests before and after it."""
 
     CSS_PATH = "run_dialogs.tcss"
-    BINDINGS: ClassVar = [
-        Binding("left", "step(-1)", "test before", id="facts.before", tooltip="the test before this one"),
-        Binding("right", "step(1)", "next test", id="facts.next", tooltip="the next test"),
-        Binding("p,P", "play", "play", id="facts.play", tooltip="play this test back on the map"),
-        Binding("c", "copy", "copy", id="facts.copy", tooltip="copy the command that makes it again (OSC 52)"),
-        Binding("escape,F,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
-    ]
+    BINDINGS: ClassVar = keys(
+        "facts",
+        ("before", "left", "step(-1)", "test before", "the test before this one"),
+        ("next", "right", "step(1)", "next test", "the next test"),
+        ("play", "p,P", "play", "play", "play this test back on the map"),
+        ("copy", "c", "copy", "copy", "copy the command that makes it again (OSC 52)"),
+        ("close", "escape,F,q,enter", "dismiss", "close", "back to the run"),
+    )
 
     def __init__(self, position: Position, test: int, run: str, play: Callable[[int], str]) -> None:
         """`run` is what a shell calls the run. `play` plays a test back, or returns why it cannot."""
@@ -145,5 +145,4 @@ class FactsDialog(ModalScreen[None]):
         self.query_one(Framed).say("command copied, if the terminal allows it")
 
     def _command(self, test: int) -> str:
-        """What makes a test again."""
         return f"ddenv test {self._run} --test {test}"

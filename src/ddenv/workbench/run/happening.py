@@ -42,7 +42,6 @@ class Happening(Widget):
             self.refresh()
 
     def render(self) -> Text:
-        """As many lines of the algorithm as there is room for above the sentences."""
         sentences = [Text(sentence) for sentence in self._explanation.sentences]
         if self.trouble:
             sentences.insert(0, Text(self.trouble, self.app.theme_variables["text-error"]))
@@ -54,7 +53,6 @@ class Happening(Widget):
 
 
 def _urgent(snapshot: Snapshot) -> tuple[object, ...]:
-    """What is shown at once when it changes."""
     state = snapshot.state
     number = None if state.round is None else (state.round.number, state.round.done)
     return (
@@ -75,7 +73,6 @@ def _shown(explanation: Explanation, room: int) -> int:
 
 
 def _index(explanation: Explanation) -> int:
-    """The current line's place among the lines."""
     return next((place for place, (number, _) in enumerate(explanation.lines) if number == explanation.line), 0)
 
 
@@ -88,7 +85,6 @@ def _scrolled(explanation: Explanation, room: int, first: int) -> int:
 
 
 def _window(explanation: Explanation, width: int, room: int, first: int, color: str) -> Text:
-    """Lines of the algorithm with the current one marked."""
     text = Text()
     if explanation.line is None:
         return text

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from rich.style import Style
@@ -28,8 +30,8 @@ if TYPE_CHECKING:
 # Columns behind the name: part, distance, first sensed.
 REST = 3 + 9 + 9
 LEVELS = " ▁▂▃▄▅▆▇█"
-NEEDED, DECIDED, FREE = "╌", "▲", "▽"
-PLAIN, DIM = Style.null(), Style(dim=True)
+NEEDED, DECIDED = "╌", "▲"
+DIM = Style(dim=True)
 
 
 class ModelsLeft(Vertical):
@@ -45,7 +47,6 @@ class ModelsLeft(Vertical):
         yield Lines(line, nothing="none", id="models")
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
-        """Shows the run as it is now; `prints` are the footprints of its models."""
         split = None if state.round is None or state.round.done else state.round.split
         made_of = (state.environment, split, state.pinned, state.evidence_test, state.baseline, prints)
         lines = self.query_one("#models", Lines)
@@ -69,7 +70,6 @@ class Row:
 
 
 def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
-    """The models of the environment, those nearest to f first."""
     parts = state.round.split.letter_of if state.round is not None and not state.round.done else {}
     sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
     places = {each.name: each for each in prints}
@@ -90,7 +90,6 @@ def _nearly(row: Row) -> float:
 
 
 def line(row: Row, width: int) -> Text:
-    """A row as text, with the name cut to the room there is."""
     room = max(4, width - REST)
     away = "" if row.stands is None or row.f is None else f"{row.stands.distance(row.f):.1f} m"
     sensed = "never" if row.sensed is None else f"{row.sensed:.1f} s"
@@ -99,30 +98,17 @@ def line(row: Row, width: int) -> Text:
 
 
 def heading(width: int) -> str:
-    """The names of the columns."""
     return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What the chart shows: the size of the environment over `tests`; after how many tests the user `decided` something; and when
-    models went `free`, without a test.
-    """
+    """What the chart shows: the size of the environment over `tests`, and after how many tests the user `decided` something."""
 
     points: Sequence[Point] = ()
     tests: int = 0
     needed: int = 0
     decided: Sequence[int] = ()
-    free: Sequence[int] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """The styles of the tops of the steps, of what is below, and of the line of needed models."""
-
-    top: Style = PLAIN
-    below: Style = PLAIN
-    needed: Style = PLAIN
 
 
 class Chart(Widget):
@@ -131,18 +117,13 @@ class Chart(Widget):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._course = Course()
-        self._shown: tuple[object, ...] = ()
 
     def show(self, snapshot: Snapshot) -> None:
-        """Shows the run as it is now."""
         state = snapshot.state
-        # Unless something was added these are the same objects, which compare fast.
-        shown = (state.history, state.tests_done, state.lower_bound, state.decisions, len(state.nodes))
-        if shown != self._shown:
-            self._shown = shown
-            decided = tuple(decision.tests for decision in state.decisions)
-            free = tuple(node.tests for node in state.nodes if node.how == "sliced")
-            self._course = Course(state.history, state.tests_done, state.lower_bound, decided, free)
+        decided = tuple(decision.tests for decision in state.decisions)
+        course = Course(state.history, state.tests_done, state.lower_bound, decided)
+        if course != self._course:
+            self._course = course
             self.refresh()
 
     def render(self) -> Text:
@@ -150,52 +131,43 @@ class Chart(Widget):
         top = ink(colors, "primary")
         # The terminal's own colours have no darker variants.
         below = top + DIM if self.app.native_ansi_color else ink(colors, "primary-muted")
-        look = Look(top, below, ink(colors, "text-warning", bold=True))
-        return steps(self._course, *self.size, look)
+        return steps(self._course, *self.size, (top, below, ink(colors, "text-warning", bold=True)))
 
 
-def steps(course: Course, width: int, height: int, look: Look | None = None) -> Text:
-    """The chart as text of `height` lines; the last one is the axis of tests."""
+def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, Style] = (Style(),) * 3) -> Text:
+    """The chart as text of `height` lines; the last one is the axis of tests.
+
+    The styles are those of the tops of the steps, of what is below, and of the line of needed models.
+    """
     if not course.points or width < 12 or height < 3:
         return Text("")
-    look = look or Look()
     most = max(1, max(point.models for point in course.points))
     last = max(1, course.tests, course.points[-1].tests)
     margin = len(str(most)) + 1
     columns = width - margin - 1
-    ruled = height >= 6 or (height >= 4 and bool(course.decided or course.free))
+    ruled = height >= 6 or (height >= 4 and bool(course.decided))
     rows = height - 1 - ruled
     at = [_at(course, last * column / max(1, columns - 1)) for column in range(columns)]
     marks = _marks(most, rows)
     levels = [_row_of(needed, most, rows) for _, needed in at]
     if course.needed and at[-1][1]:
         marks.setdefault(levels[-1], str(course.needed))
-    legend = _legend(course, width) if height >= 7 else []
     text = Text(no_wrap=True)
     for row in range(rows):
-        text.append(f"{marks.get(row, ''):>{margin - 1}}┤" if row in marks else f"{'':>{margin - 1}}│", "dim")
-        line = _line(at, levels, most, rows, row)
-        words = legend[row] if row < len(legend) else ""
-        if words and all(char == " " for char, _ in line[-len(words) :]):
-            line = line[: -len(words)]
-        else:
-            words = ""
-        _append(text, line, look)
-        text.append(f"{words}\n", "dim")
+        text.append(f"{marks.get(row, ''):>{margin - 1}}{'┤' if row in marks else '│'}", "dim")
+        for kind, chars in groupby(_line(at, levels, most, rows, row), itemgetter(1)):
+            text.append("".join(char for char, _ in chars), styles[kind])
+        text.append("\n")
     if ruled:
-        text.append_text(_rule(course, margin, columns, last, look))
+        text.append_text(_rule(course, margin, columns, last, styles[2]))
     return text.append_text(_axis(course, margin, columns))
 
 
 def _marks(most: int, rows: int) -> dict[int, str]:
-    """What is written beside the rows: the number of models at their tops."""
     marks = {0: str(most), rows - 1: "0"}
-    parts = 4 if rows >= 12 else 2 if rows >= 5 else 1
-    for part in range(1, parts):
-        row = rows * part // parts
-        words = str(round(most * (1 - row / rows)))
-        if words not in marks.values():
-            marks[row] = words
+    middle = rows // 2
+    if rows >= 5 and (words := str(round(most * (1 - middle / rows)))) not in marks.values():
+        marks[middle] = words
     return marks
 
 
@@ -214,53 +186,27 @@ def _row_of(models: int, most: int, rows: int) -> int:
 
 def _line(
     at: Sequence[tuple[int, int]], levels: Sequence[int], most: int, rows: int, row: int
-) -> list[tuple[str, str]]:
-    """The characters of a row, each with its kind: "top", "below" or "needed"."""
-    line = []
+) -> Iterator[tuple[str, int]]:
     for (models, _), level in zip(at, levels, strict=True):
         eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
         # Where steps and line meet in one row, the steps are drawn.
         if level == row and eighths > 8:
-            line.append((NEEDED, "needed"))
+            yield NEEDED, 2
         else:
-            line.append((LEVELS[min(8, max(0, eighths))], "top" if eighths <= 8 else "below"))
-    return line
+            yield LEVELS[min(8, max(0, eighths))], int(eighths > 8)
 
 
-def _append(text: Text, line: Sequence[tuple[str, str]], look: Look) -> None:
-    styles = {"top": look.top, "below": look.below, "needed": look.needed}
-    begin = 0
-    for place in range(1, len(line) + 1):
-        if place == len(line) or line[place][1] != line[begin][1]:
-            text.append("".join(char for char, _ in line[begin:place]), styles[line[begin][1]])
-            begin = place
-
-
-def _legend(course: Course, width: int) -> list[str]:
-    """What the signs mean, for the corner that falling steps leave free."""
-    words = ["█ models left"]
-    if course.needed:
-        words.append(f"{NEEDED} at least {course.needed} needed")
-    if course.decided:
-        words.append(f"{DECIDED} you decided")
-    if course.free:
-        words.append(f"{FREE} without a test")
-    longest = max(map(len, words)) + 1
-    return [f" {each:<{longest}}" for each in words] if width >= 2 * longest and len(words) > 1 else []
-
-
-def _rule(course: Course, margin: int, columns: int, last: int, look: Look) -> Text:
-    marks = ((DECIDED, course.decided), (FREE, course.free))
-    places = {round(min(tests, last) * (columns - 1) / last): sign for sign, when in marks for tests in when}
+def _rule(course: Course, margin: int, columns: int, last: int, marked: Style) -> Text:
+    places = {round(min(tests, last) * (columns - 1) / last) for tests in course.decided}
     text = Text(f"{'':>{margin - 1}}└", "dim", no_wrap=True)
     for column in range(columns):
-        text.append(places.get(column, "─"), look.needed if column in places else DIM)
+        text.append(*((DECIDED, marked) if column in places else ("─", DIM)))
     return text.append("\n")
 
 
 def _axis(course: Course, margin: int, columns: int) -> Text:
     end, left = count(course.tests, "test"), f"{count(course.points[-1].models, 'model')} left"
     space = columns - 1 - len(end)
-    least = (f"{left}, at least {course.needed} needed", f"{left}, ≥ {course.needed}") if course.needed else ()
-    words = next((each for each in (*least, left) if len(each) + 2 <= space), "")
+    least = f"{left}, at least {course.needed} needed" if course.needed else left
+    words = next((each for each in (least, left) if len(each) + 2 <= space), "")
     return Text(f"{'':>{margin - 1}}0{words.center(space)}{end}", "dim", no_wrap=True)

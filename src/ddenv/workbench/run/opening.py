@@ -13,28 +13,28 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import FreshRuns
 from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
+from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name
-from ddenv.workbench.help.signs import SignsDialog
+from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
-from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
-from ddenv.workbench.run.dialogs import Method, Quit, Rounds, SceneDialog
+from ddenv.workbench.run.choose import ChooseModels, Layers, copied
+from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, failures, rounds
 from ddenv.workbench.run.facts import FactsDialog
-from ddenv.workbench.run.failures_dialog import FailuresMet
 from ddenv.workbench.shared.background import is_open
 
 if TYPE_CHECKING:
     from ddenv.workbench.run.run_screen import RunScreen
 
+# The maximum number of other failures in a list.
+LISTED = 200
+
 
 class Opening:
-    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names.
-
-    Other screens are loaded when they open: the first paint of a run waits for none of them.
-    """
+    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names."""
 
     def __init__(self, screen: RunScreen) -> None:
         self._screen = screen
@@ -48,7 +48,6 @@ class Opening:
         then: Callable[[tuple[str, ...]], None],
         chosen: Sequence[str] = (),
     ) -> None:
-        """Asks for models by their names; those that are `chosen` already come first."""
         if not names:
             self._asking.refuse("there are no models to choose from")
             return
@@ -57,17 +56,14 @@ class Opening:
         self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
 
     def find(self) -> None:
-        """Asks for a model, and shows it on the map."""
         names = [each.name for each in self._screen.world.place.prints]
         self.choose("Find a model on the map", names, False, lambda chosen: self._screen.find(chosen[0]))
 
     def change(self) -> None:
-        """Asks for other settings."""
         dialog = Change(self._poll.snapshot.state)
         self._screen.app.push_screen(dialog, lambda command: self._asking.ask(command) if command else None)
 
     def history(self) -> None:
-        """Shows the tree of reductions, to go back to one of them."""
         from ddenv.workbench.history import History
 
         def chosen(node: int | None) -> None:
@@ -75,26 +71,31 @@ class Opening:
                 # The history asked the question already.
                 self._asking.ask(GoBack(node), sure=True)
 
-        self._screen.app.push_screen(History(lambda: self._asking.situation, self._screen.world.place), chosen)
+        self._screen.app.push_screen(History(lambda: self._asking.situation), chosen)
 
     def failures(self) -> None:
-        """Lists the other failures that the tests met, to reduce one of them in a branch."""
+        found = atlas(self._poll.snapshot.state)[:LISTED]
+        if not found:
+            self._asking.refuse("no test shows a failure other than f")
+            return
 
-        def chosen(test: int | None) -> None:
-            if test is not None:
-                # The list asked the question already.
-                self._asking.ask(AcceptOther(test, instead=True), sure=True)
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._asking.ask(AcceptOther(found[row].smallest, instead=True))
 
-        self._screen.app.push_screen(FailuresMet(lambda: self._asking.situation), chosen)
+        self._screen.app.push_screen(failures(found), chosen)
 
     def rounds(self) -> None:
-        """Lists the rounds so far, to go to the end of one."""
         position = self._screen.browsing.position
-        dialog = Rounds(tuple(position.chapters), position.at)
-        self._screen.app.push_screen(dialog, lambda chapter: self._screen.go(chapter.last) if chapter else None)
+        chapters = tuple(position.chapters)
+
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._screen.go(chapters[row].last)
+
+        self._screen.app.push_screen(rounds(chapters, position.at), chosen)
 
     def facts(self) -> None:
-        """Shows the raw facts of the test that tells most of the row under the cursor, or of the last one of all."""
         position = self._screen.browsing.position
         test, _ = of_row(position.now, self._screen.table.item)
         if test is None:
@@ -103,7 +104,6 @@ class Opening:
             self._screen.app.push_screen(FactsDialog(position, test, attach_name(self._poll.path), self.play_test))
 
     def play(self) -> None:
-        """Plays back the finished test that tells most of the row under the cursor."""
         self.play_row(self._screen.table.item)
 
     def play_row(self, item: Item | None) -> None:
@@ -115,7 +115,6 @@ class Opening:
             self._asking.refuse(why)
 
     def play_test(self, test: int, beside: int | None = None) -> str:
-        """Plays a test back. Returns why it cannot be, or ""."""
         from ddenv.workbench.playback.playback_screen import Playback
 
         position, place = self._screen.browsing.position, self._screen.world.place
@@ -126,7 +125,6 @@ class Opening:
         return ""
 
     def why(self) -> None:
-        """Shows what happens without each model that is left."""
         from ddenv.workbench.why.why_screen import Look, WhyScreen
 
         position, place = self._screen.browsing.position, self._screen.world.place
@@ -136,38 +134,35 @@ class Opening:
 
         self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, look, self._asking.ask))
 
-    def signs(self) -> None:
-        """Shows what the signs mean."""
-        self._screen.app.push_screen(SignsDialog())
-
     def layers(self) -> None:
-        """Asks what the map shows."""
         self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())
 
     def copy(self) -> None:
-        """Lists what can be copied: names, and the commands that come back to this run."""
         path, name = self._poll.path, attach_name(self._poll.path)
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
         if selected := self._screen.keys.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
         texts += [("to come back", f"ddenv open {name}"), ("to go on without screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]
-        self._screen.app.push_screen(Copy(texts))
+
+        def chosen(row: int | None) -> None:
+            if row is not None:
+                self._screen.app.copy_to_clipboard(texts[row][1])
+                self._asking.say(f"{texts[row][0]} copied, if the terminal allows it")
+
+        self._screen.app.push_screen(Pick("Copy", "or click copies", [copied(*each) for each in texts]), chosen)
 
     def export(self) -> None:
-        """Asks what to export."""
         from ddenv.workbench.export import ExportScreen
 
         world = Path(str(self._poll.snapshot.state.scenario.get("world", "")))
         self._screen.app.push_screen(ExportScreen(self._poll.path, world))
 
     def method(self) -> None:
-        """Explains how the run is reduced."""
         options = settings(self._poll.snapshot.state)
         self._screen.app.push_screen(Method(options.algorithm, options.pair))
 
     def scene(self) -> None:
-        """Shows the address of the 3-D scene; starts it if it is not on."""
         dialog = SceneDialog(self._scene)
         if not self._scene.on:
             self._scene.start()
@@ -184,16 +179,12 @@ class Opening:
         elif self._scene.trouble:
             self._screen.notify(self._scene.trouble, severity="error", markup=False)
 
-    # Out of the workbench.
-
     def detach(self) -> None:
-        """Leaves the workbench and says how to come back."""
         works = "The engine goes on" if self._poll.snapshot.engine != "absent" else "No engine is running"
         again = f"{attach_name(self._poll.path)}{' --watch' if self._poll.watch else ''}"
         self._exit(f"{works}. Attach again with: ddenv open {again}")
 
     def quit(self) -> None:
-        """Leaves at once if no engine is running; else asks whether to stop it."""
         snapshot = self._poll.snapshot
         if snapshot.engine == "absent" or snapshot.gone:
             self._screen.app.exit(0)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
-from textual import events, on, work
+from textual import events, on
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.reactive import Reactive
@@ -20,12 +19,12 @@ from ddenv.runfile.position import Step
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
-from ddenv.runs.wanted import Wanted
+from ddenv.runfile.tested import Wanted
 from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
-from ddenv.workbench.map.place import Place, place_of_run
+from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidate_rows import round_title
@@ -33,19 +32,16 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
+from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
-from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
+from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_lines
 from ddenv.workbench.shared.messages import Attention
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
 
-# The time until all that has the focus, or had it, asked to be drawn, s.
-TOGETHER = 0.004
 SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
 # The panes and their words, in the order of the keys 1 to 5.
@@ -76,8 +72,7 @@ class RunScreen(Screen[None]):
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
         self.table, self.world, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
-        shown, first = (LOOKING, LOOKING) if watch else (SHOWN, FIRST)
-        self._footer = KeyFooter(shown, first, self._keys_here)
+        self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
         self.opening, self.keys = Opening(self), KeyOffers(self)
@@ -85,7 +80,6 @@ class RunScreen(Screen[None]):
 
     @property
     def snapshot(self) -> Snapshot:
-        """The run as it was seen last, or at the earlier moment that is shown."""
         return self.browsing.snapshot
 
     def compose(self) -> ComposeResult:
@@ -109,7 +103,7 @@ class RunScreen(Screen[None]):
             with Vertical(id="run-more"):
                 yield ModelsLeft(id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
-                    yield Lines(decision_line, nothing=NOTHING_DECIDED, tail=True, id="decisions")
+                    yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         if self.poll.watch:
             yield Static(WATCHING, id="watching", markup=False)
         yield Status(id="status")
@@ -117,12 +111,9 @@ class RunScreen(Screen[None]):
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
-        for id in TOOLTIPS:
-            self.query_one(f"#{id}").tooltip = TOOLTIPS[id]
         self.query_one(Panes).mark(self._pane)
         self.following.begin()
-        # What it needs takes long to load: the first paint comes before.
-        self.call_after_refresh(self._read_world)
+        read_world(self, self.run, self._placed)
 
     def on_unmount(self) -> None:
         self.scene.stop()
@@ -133,32 +124,11 @@ class RunScreen(Screen[None]):
         width, height = self.size
         words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
         self.query_one("#small", Static).update(words)
-        self.table.set_narrow(width < WIDE and self._pane != "round")
         self.call_after_refresh(self._show_models)
-
-    # The world is read beside the screen, since it can be large.
-
-    @work(thread=True, group="world", exclusive=True)
-    def _read_world(self) -> None:
-        try:
-            place, notice = place_of_run(self.run), ""
-        except UserError as error:
-            place, notice = Place(), str(error)
-        call_if_open(self, self._placed, place, notice)
 
     def _placed(self, place: Place, notice: str) -> None:
         self.world.set_place(place, notice)
         self._show_models()
-
-    def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
-        self.run_worker(self._draw_together(), group="focus")
-        super().set_focus(widget, scroll_visible, from_app_focus)
-
-    async def _draw_together(self) -> None:
-        """What is in the panels would be drawn a frame before their borders: the focus moves in one."""
-        with self.app.batch_update():
-            await asyncio.sleep(TOGETHER)
-        self.check_idle()
 
     # From the run file to the screen.
 
@@ -166,10 +136,8 @@ class RunScreen(Screen[None]):
         if self.poll.snapshot.engine == "alive":
             self.engine.seen_at_work()
         self.asking.show_refusal(before)
-        if live:
-            self.asking.show_verdicts(before)
-            if why := worth_a_look(before, self.poll.snapshot):
-                self.post_message(Attention(plain(self.run.stem), why))
+        if live and (why := worth_a_look(before, self.poll.snapshot)):
+            self.post_message(Attention(plain(self.run.stem), why))
 
     def _show(self, changed: bool) -> None:
         if changed:
@@ -213,7 +181,6 @@ class RunScreen(Screen[None]):
         self._show_scene(self.table.chosen or (focus if snapshot.past else None))
 
     def _show_scene(self, row: Candidate | Trial | None) -> None:
-        """The scene shows the same moment and the row that the user chose."""
         at, round = self.browsing.position.at, self.snapshot.state.round
         if isinstance(row, Trial):
             self.scene.show(Wanted(at, trial=row.number))
@@ -223,8 +190,7 @@ class RunScreen(Screen[None]):
             self.scene.show(Wanted(at))
 
     def show_legend(self) -> None:
-        """Shows what the signs on the map mean."""
-        selection, candidate, state = self.world.selection, self.world.candidate, self.world.snapshot.state
+        selection, candidate, state = self.world.selection, self.world.shown.candidate, self.world.snapshot.state
         fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
         self._legend.show(len(selection), candidate, fallen, self.world.legend)
 
@@ -242,7 +208,6 @@ class RunScreen(Screen[None]):
         self.keys.use(name)
 
     def on_key(self, event: events.Key) -> None:
-        """A key that is not possible now says why."""
         self.keys.pressed(event.key)
 
     @on(WorldMap.Pointed)
@@ -251,7 +216,6 @@ class RunScreen(Screen[None]):
             self.keys.show(self._footer)
 
     def _keys_here(self) -> tuple[str, ...]:
-        """The keys of what has the focus, if the footer shows them in place of the screen's."""
         if self.browsing.is_past:
             return BROWSING
         if self.snapshot.state.status == "finished" and not self.poll.watch:
@@ -268,11 +232,9 @@ class RunScreen(Screen[None]):
         self._browse(lambda: self.browsing.step(what, by))
 
     def go(self, id: int | None) -> None:
-        """Shows the moment of an event, or the end of the run for None."""
         self._browse(lambda: self.browsing.position.go(id))
 
     def _browse(self, move: Callable[[], str | None]) -> None:
-        """Shows another moment, or why there is none."""
         try:
             if why := move():
                 self.asking.refuse(why)
@@ -314,32 +276,26 @@ class RunScreen(Screen[None]):
         self.find(event.item.name)
 
     def find(self, name: str) -> None:
-        """Brings a model into sight, with the crosshair on it."""
-        self._show_pane("map")
+        self.action_pane("map")
         self.world.go_to(name)
         self.world.focus()
 
     @on(Panes.Chosen)
     def _pane_clicked(self, event: Panes.Chosen) -> None:
-        self._show_pane(event.pane)
+        self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
-        self._show_pane(pane)
-
-    def _show_pane(self, pane: str) -> None:
-        """Brings a pane into sight, and the keys to it."""
         if pane != self._pane:
             self.remove_class(f"-pane-{self._pane}")
             self.add_class(f"-pane-{pane}")
         self._pane = pane
         self.query_one(Panes).mark(pane)
-        self.table.set_narrow(self.size.width < WIDE and pane != "round")
         focus = {"map": "#map", "log": "#log"}.get(pane, "#candidates")
         self.query_one(focus).focus()
         self.call_after_refresh(self._show_keys)
 
     def action_next_pane(self) -> None:
-        self._show_pane([*PANES, *PANES][list(PANES).index(self._pane) + 1])
+        self.action_pane([*PANES, *PANES][list(PANES).index(self._pane) + 1])
 
     def action_follow(self) -> None:
         if self.browsing.is_past:
@@ -348,12 +304,6 @@ class RunScreen(Screen[None]):
         self.world.select(())
         self.table.follow()
         self.table.show(self.snapshot)
-
-    def action_zoom(self, factor: float) -> None:
-        self.world.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.world.fit()
 
 
 def _panel(id: str, title: str, hints: str = "") -> Framed:

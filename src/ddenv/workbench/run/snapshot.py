@@ -22,12 +22,6 @@ from ddenv.workbench.shared.poll import Poll
 
 # Why no key guides the run at an earlier moment.
 NOT_NOW = "this is an earlier moment of the run: escape comes back to now"
-NO_MORE = {
-    "moment": "the run begins here",
-    "round": "there is no round before this one",
-    "reduction": "there is no reduction before this moment",
-    "decision": "there is no verdict before this moment",
-}
 # Paths of tests that are kept.
 PATHS = 16
 # How often the run file is read, s.
@@ -49,14 +43,13 @@ class Browsing:
 
     @property
     def is_past(self) -> bool:
-        """Whether an earlier moment is shown."""
         return self.position.at is not None
 
     def step(self, what: Step, by: int) -> str:
         """Goes on or back. Returns why that is not possible, or "". Raises UserError for a damaged file."""
         if self.position.step(what, by):
             return ""
-        return NO_MORE[what] if by < 0 else "this is now already"
+        return f"there is no {what} before this moment" if by < 0 else "this is now already"
 
     @property
     def snapshot(self) -> Snapshot:
@@ -77,7 +70,6 @@ class Moments:
         self._motion = lru_cache(PATHS)(file.motion)
 
     def of(self, moment: Moment, words: str) -> Snapshot:
-        """The snapshot of a moment in which happened what the `words` say."""
         state = moment.after
         return Snapshot(
             state,
@@ -114,12 +106,10 @@ class Following:
         self._stays: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
 
     def begin(self) -> None:
-        """Looks now, and then every `PERIOD`."""
         self.look()
         self._screen.set_interval(PERIOD, self.look)
 
     def look(self) -> None:
-        """Reads what is new in the run file."""
         before, live = self._poll.snapshot, not self._poll.catching_up
         if self._poll.look() is not None:
             self._stale = True

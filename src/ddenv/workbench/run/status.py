@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
 from ddenv import __version__
 from ddenv.evidence.claims import has_dropped
-from ddenv.runfile.branches import path
+from ddenv.runfile.progress import path
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
@@ -33,14 +31,6 @@ WORTH = ("finished", "failed", "lost", "waiting", "stopped")
 STEP = 5
 
 
-@dataclass(frozen=True, slots=True)
-class Heading:
-    """Scenario and method on the left, in the longest of `lefts` that fits; how far the reduction is on the right."""
-
-    lefts: tuple[str, ...] = ()
-    rights: tuple[str, ...] = ("",)
-
-
 # What the status line says, by name, from the longest form to the shortest.
 Facts = dict[str, tuple[str, ...]]
 
@@ -50,26 +40,23 @@ class Header(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._heading = Heading()
+        self._lefts: tuple[str, ...] = ()
+        self._rights: tuple[str, ...] = ("",)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Shows the run as it is now."""
         now = heading(snapshot.state)
-        if now != self._heading:
-            self._heading = now
+        if now != (self._lefts, self._rights):
+            self._lefts, self._rights = now
             self.refresh()
 
     def render(self) -> Text:
-        name, width = "ddenv", self.size.width
-        shortest = len(min(self._heading.lefts, key=len, default=""))
-        rights = self._heading.rights
-        right = next((each for each in rights if len(name) + shortest + len(each) + 6 <= width), rights[-1])
-        room = max(0, width - 2 - len(name) - len(right) - 4)
-        left = next((each for each in self._heading.lefts if len(each) <= room), "")
-        left = left or truncated(next(reversed(self._heading.lefts), ""), room)
-        space = max(1, width - 4 - len(name) - len(left) - len(right))
+        name, room = "ddenv", self.size.width - 9
+        shortest = len(min(self._lefts, key=len, default=""))
+        right = next((each for each in self._rights if shortest + len(each) + 2 <= room), self._rights[-1])
+        room = max(0, room - len(right) - 2)
+        left = next((each for each in self._lefts if len(each) <= room), truncated((self._lefts or ("",))[-1], room))
         text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
-        return text.append(f"  {left}", "bold").append(" " * space).append(right)
+        return text.append(f"  {left:<{room}}  ", "bold").append(right)
 
 
 class Status(Widget):
@@ -114,8 +101,7 @@ class Status(Widget):
         return Style(dim=name in ("time", "left", "mode", "cut"))
 
 
-def heading(state: RunState) -> Heading:
-    """The words of the header, the longest form first."""
+def heading(state: RunState) -> tuple[tuple[str, ...], tuple[str, ...]]:
     options = settings(state)
     lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
     total, kept = len(state.elements), len(state.environment)
@@ -129,7 +115,7 @@ def heading(state: RunState) -> Heading:
         step = [f"round {state.round.number}{n}"]
     rights = ([*branch, *step, size, *pinned, *more], [*branch, *step, size, *pinned], [*branch, size], [size])
     # Without branches and pins there is only one form.
-    return Heading(lefts, tuple(" · ".join(words) for words in (rights if branch or pinned else rights[:1])))
+    return lefts, tuple(" · ".join(words) for words in (rights if branch or pinned else rights[:1]))
 
 
 def branch_of(state: RunState) -> int | None:
@@ -138,15 +124,14 @@ def branch_of(state: RunState) -> int | None:
     None on the newest one: that is where a run usually is.
     """
     nodes = state.nodes
-    if not 0 <= state.node < len(nodes) or state.node in path(nodes, len(nodes) - 1):
+    if not 0 <= state.node < len(nodes) or state.here in path(nodes, len(nodes) - 1):
         return None
     above = {node.parent for node in nodes if not node.rejected}
     leaves = [node.number for node in nodes if node.number not in above and not node.rejected]
-    return next((place for place, leaf in enumerate(leaves, start=1) if state.node in path(nodes, leaf)), None)
+    return next((place for place, leaf in enumerate(leaves, start=1) if state.here in path(nodes, leaf)), None)
 
 
 def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
-    """What the status line says, in its order."""
     state = snapshot.state
     status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
     status = "isolating" if snapshot.status == "running" and state.isolating is not None else status
@@ -165,7 +150,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
         "tests": tests_said(state),
         "drift": drift_said(state),
         "cut": (f"{cut} ended early", "") if (cut := state.cut_tests) else (),
-        "time": _time(snapshot),
+        "time": (duration(snapshot.spent), "") if snapshot.spent else (),
         "left": left_said(state, snapshot.engine == "alive"),
         "mode": ("accept: ask", "") if state.accept_mode == "ask" and not state.ended else (),
         "engine": engine_said(snapshot),
@@ -174,18 +159,13 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
 
 
 def facts_of_past(snapshot: Snapshot, scene: str, moment: int, moments: int) -> Facts:
-    """What the status line says at an earlier moment of the run."""
     return {
         "state": (f"◂ moment {moment} of {moments}",),
         "mode": ("escape: now",),
         "tests": tests_said(snapshot.state),
-        "time": _time(snapshot),
+        "time": (duration(snapshot.spent), "") if snapshot.spent else (),
         "left": ("scene shows it", "") if scene else (),
     }
-
-
-def _time(snapshot: Snapshot) -> tuple[str, ...]:
-    return (duration(snapshot.spent), "") if snapshot.spent else ()
 
 
 def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
@@ -200,7 +180,6 @@ def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
 
 
 def tests_said(state: RunState) -> tuple[str, ...]:
-    """The tests by outcome."""
     counts = state.outcomes()
     total = state.tests_done
     said = count(total, "test") if state.budget is None else f"{state.made} of {count(state.budget, 'test')}"
@@ -230,12 +209,7 @@ def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
     version = plain(state.engine_version)
     if version in ("", __version__):
         return ("engine ●", "")
-    age = "older" if _numbers(version) < _numbers(__version__) else "newer"
-    return (f"engine ● {shortened(version, 12)}, {age}", f"engine {age}")
-
-
-def _numbers(version: str) -> list[int]:
-    return [int("".join(filter(str.isdigit, part)) or 0) for part in version.split(".")]
+    return (f"engine ● {shortened(version, 12)}, not {__version__}", "engine of another version")
 
 
 def title(snapshot: Snapshot) -> str:
@@ -265,9 +239,7 @@ def worth_a_look(before: Snapshot, now: Snapshot) -> str:
     if status == before.status or status not in WORTH or before.behind or now.behind:
         return ""
     state = now.state
-    models = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
-    if status == "finished":
-        return f"{models}; {plain(ended(state))}"
     if status == "waiting":
         return "a reduction waits for you: accept or reject it"
-    return f"{STATUS[status][1]}{f', {plain(state.reason)}' if state.reason else ''}; {models}"
+    said = ended(state) if status == "finished" else ", ".join(filter(None, (STATUS[status][1], state.reason)))
+    return f"{len(state.environment)} of {count(len(state.elements), 'model')} left; {plain(said)}"

@@ -4,19 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import PurePath
-from typing import Any, ClassVar
-
-from rich.table import Table
-from rich.text import Text
-from textual.app import ComposeResult
-from textual.containers import VerticalScroll
-from textual.screen import ModalScreen
-from textual.widgets import Static
+from typing import Any
 
 from ddenv.text import count, first_of, plain, truncated
 from ddenv.words.signs import brief
-from ddenv.workbench.help.bindings import keys
-from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
 
 # The maximum number of models to name, and width of a value.
@@ -26,35 +17,6 @@ NONE = "none"
 ASIDE = ("name", "description")
 # Files are the same if their names are: a run holds its own copy, and its machine has other folders.
 FILES = ("world", "model")
-
-
-class CompareRuns(ModalScreen[None]):
-    """A column for each run; a line is bold where they differ."""
-
-    CSS_PATH = "runs.tcss"
-    BINDINGS: ClassVar = keys(
-        "compare_runs", ("close", "escape,c,q,enter", "dismiss", "close", "back to the list of runs")
-    )
-
-    def __init__(self, first: Recent, second: Recent) -> None:
-        super().__init__()
-        self._sides = (first, second)
-
-    def compose(self) -> ComposeResult:
-        with Framed("Two runs side by side", "↑ ↓ scroll   escape closes"), VerticalScroll():
-            yield Static(self._table(), markup=False)
-
-    def _table(self) -> Table:
-        table = Table.grid(padding=(0, 2), expand=True)
-        table.add_column(style="dim", max_width=28, overflow="fold")
-        table.add_column(ratio=1, overflow="fold")
-        table.add_column(ratio=1, overflow="fold")
-        for name, one, other in lines(*self._sides):
-            style = "" if one == other else "bold"
-            # Not by weight alone: some terminals and all screen readers drop it.
-            sign = "" if one == other or not name else " ≠"
-            table.add_row(f"{name}{sign}", Text(one, style), Text(other, style))
-        return table
 
 
 def lines(first: Recent, second: Recent) -> Iterator[tuple[str, str, str]]:

@@ -29,13 +29,12 @@ ENDED = ("created", "finished", "stopped", "failed")
 class Recent:
     """One run. `status` is the state's, "lost" if its engine has died, or "" if it is not read yet.
 
-    `started` and `changed` are Unix times, s; `size` in bytes. `computed` is the time that its own simulations took, s. `chosen`
+    `changed` is Unix time, s. `computed` is the time that its own simulations took, s. `chosen`
     is its scenario as it is now. `trouble` says why it cannot be opened.
     """
 
     path: Path
     changed: float
-    size: int
     status: str = ""
     scenario: str = ""
     algorithm: str = ""
@@ -44,7 +43,6 @@ class Recent:
     kept: tuple[str, ...] = ()
     tests: int = 0
     decisions: int = 0
-    started: float = 0.0
     minimal: bool = False
     reason: str = ""
     trouble: str = ""
@@ -57,7 +55,6 @@ class Recent:
 
     @property
     def state_words(self) -> str:
-        """Its state, in a word or two."""
         if self.trouble:
             return "cannot be read"
         if self.status == "finished":
@@ -65,14 +62,8 @@ class Recent:
         return STATUS.get(self.status, ("", self.status or "..."))[1]
 
     @property
-    def words(self) -> str:
-        """Its state, for a list."""
-        word = "cannot be read" if self.trouble else STATUS.get(self.status, ("", self.status))[1]
-        return f"{self.brief} {word}".strip()
-
-    @property
     def brief(self) -> str:
-        """How many models are left, for a list in which its state has no room beside its sign."""
+        """How many models are left, for a list in which its sign is its state."""
         return f"{len(self.kept)}/{self.total}" if self.total else ""
 
     @property
@@ -116,7 +107,7 @@ class RunsFolder:
                 read = last
             self._read[path] = read
         if read is None:
-            return Recent(path, *_age_and_size(stamp))
+            return Recent(path, stamp[0] / 1e9)
         recent = read.recent
         if not recent.trouble and recent.status not in ENDED and not engine_is_alive(path):
             # A run without an engine does not change, so its state is not kept.
@@ -143,36 +134,29 @@ def _stamp(path: Path) -> tuple[int, ...]:
     return (max(file.st_mtime_ns, log.st_mtime_ns), file.st_size, log.st_mtime_ns, log.st_size)
 
 
-def _age_and_size(stamp: tuple[int, ...]) -> tuple[float, int]:
-    return stamp[0] / 1e9, stamp[1] + stamp[3]
-
-
 def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
-    age, size = _age_and_size(stamp)
+    age = stamp[0] / 1e9
     try:
         with Observed(path) as file:
-            first = file.events(0, 1)
             state = fold(file.events(state.revision if state else 0), state)
     except UserError as error:
         # A file that another program has locked is read again at the next call.
         locked = isinstance(error, Busy) or LOCKED in str(error)
-        return _Read(() if locked else stamp, Recent(path, age, size, trouble=str(error)))
+        return _Read(() if locked else stamp, Recent(path, age, trouble=str(error)))
     options = settings(state)
     recent = Recent(
         path,
         state.updated_at or age,
-        size,
-        state.status,
-        options.name,
-        options.algorithm,
-        options.pair,
-        len(state.elements),
-        state.environment,
-        state.tests_done,
-        len(state.decisions),
-        first[0].time if first else 0.0,
-        state.minimal,
-        state.reason,
+        status=state.status,
+        scenario=options.name,
+        algorithm=options.algorithm,
+        pair=options.pair,
+        total=len(state.elements),
+        kept=state.environment,
+        tests=state.tests_done,
+        decisions=len(state.decisions),
+        minimal=state.minimal,
+        reason=state.reason,
         computed=computed(state),
         chosen=state.scenario,
     )
@@ -185,7 +169,6 @@ def computed(state: RunState) -> float:
 
 
 def named(runs: Iterable[Recent], part: str) -> list[Recent]:
-    """Those whose name, scenario, method or state holds `part`."""
     wanted = part.strip().casefold()
     said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in runs)
     return [run for run, words in said if any(wanted in each.casefold() for each in words)]

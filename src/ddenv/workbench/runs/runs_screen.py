@@ -20,12 +20,13 @@ from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
 from ddenv.runs.folder import SUFFIX
 from ddenv.text import count, plain, shortened
-from ddenv.workbench.help.bindings import HELP, ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
-from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
-from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
+from ddenv.workbench.shared.background import call_if_open, is_open, refuse
+from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup
 from ddenv.workbench.widgets.path_entry import PathEntry
 
@@ -36,10 +37,7 @@ BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 KEPT = 7 * 86_400.0
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3
-# From this width on what is said of a run stands beside the table, else below it.
-WIDE = 110
-# The footer's keys in the order of the screen, then by priority.
-SHOWN = ids("runs", "open watch like filter sort mark compare delete undo path help back")
+# The footer's keys by priority.
 FIRST = ids("runs", "help back open sort filter delete undo mark compare path watch like")
 
 
@@ -97,7 +95,7 @@ class RunsScreen(Screen[None]):
     """Reads the folder repeatedly in a thread; writes only on the user's command."""
 
     CSS_PATH = "runs.tcss"
-    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (WIDE, "-wide"), (160, "-huge")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (20, "-low"), (30, "-tall")]
     BINDINGS: ClassVar = keys(
         "runs",
@@ -132,15 +130,13 @@ class RunsScreen(Screen[None]):
             with VerticalScroll(id="preview", classes="panel", can_focus=False) as panel:
                 panel.border_title = "This run"
                 yield Static("", id="about", markup=False)
-        yield KeyFooter(SHOWN, FIRST)
+        yield KeyFooter(FIRST)
         yield Static("Please make the terminal larger: at least 64 x 12.", id="small", markup=False)
 
     def on_mount(self) -> None:
         self.query_one(RunTable).focus()
         self._look()
         self.set_interval(PERIOD, self._look)
-
-    # From the folder to the screen.
 
     def _look(self) -> None:
         if not self._reading:
@@ -191,18 +187,11 @@ class RunsScreen(Screen[None]):
     @on(DataTable.RowHighlighted)
     def _show_title(self) -> None:
         run = self._chosen
-        width = self.query_one("#about").size.width or 30
-        words = Text("") if run is None else about(run, width) if self.size.width >= WIDE else in_few_lines(run)
-        self.query_one("#about", Static).update(words)
-
-    def on_resize(self) -> None:
-        self.call_after_refresh(self._show_title)
+        self.query_one("#about", Static).update("" if run is None else about(run))
 
     @property
     def _chosen(self) -> Recent | None:
         return self.query_one(RunTable).chosen
-
-    # Actions on a run.
 
     @on(DataTable.RowSelected)
     def _selected(self) -> None:
@@ -217,12 +206,11 @@ class RunsScreen(Screen[None]):
             self.post_message(ShowSetup(like=run.path))
 
     def _readable(self) -> Recent | None:
-        """The run under the cursor if it can be read; otherwise shows why not."""
         run = self._chosen
         if run is None:
-            self._complain("there is no run here")
+            refuse(self, "there is no run here")
         elif run.trouble:
-            self._complain(run.trouble)
+            refuse(self, run.trouble)
         else:
             return run
         return None
@@ -230,9 +218,9 @@ class RunsScreen(Screen[None]):
     def action_delete(self) -> None:
         run = self._chosen
         if run is None:
-            self._complain("there is no run here")
+            refuse(self, "there is no run here")
         elif run.is_worked_on:
-            self._complain("its engine is at work: open the run and stop it first")
+            refuse(self, "its engine is at work: open the run and stop it first")
         else:
             self.app.run_worker(self._delete(run.path))
 
@@ -240,7 +228,7 @@ class RunsScreen(Screen[None]):
         try:
             await to_thread(delete_run, path)
         except UserError as error:
-            self._complain(str(error))
+            refuse(self, str(error))
             return
         self.notify(f"{plain(path.stem)} is deleted; u brings it back, for a week", timeout=4, markup=False)
         self._runs = [run for run in self._runs if run.path != path]
@@ -256,16 +244,11 @@ class RunsScreen(Screen[None]):
         try:
             path = await to_thread(bring_back, runs_folder())
         except UserError as error:
-            self._complain(str(error))
+            refuse(self, str(error))
             return
         self.notify(f"{plain(path.stem)} is back", timeout=3, markup=False)
         if is_open(self):
             self._look()
-
-    def _complain(self, why: str) -> None:
-        self.notify(why, severity="warning", timeout=4, markup=False)
-
-    # The order, and two runs side by side.
 
     def action_sort(self) -> None:
         names = list(ORDERS)
@@ -287,16 +270,14 @@ class RunsScreen(Screen[None]):
     def action_compare(self) -> None:
         marked = next((run for run in self._runs if run.path == self._marked), None)
         if marked is None:
-            self._complain("mark a run first (m), then go to another one and press c")
+            refuse(self, "mark a run first (m), then go to another one and press c")
         elif (run := self._readable()) is not None:
             if run.path == marked.path:
-                self._complain("this is the marked run: go to another one")
+                refuse(self, "this is the marked run: go to another one")
             else:
-                from ddenv.workbench.runs.compare_runs import CompareRuns
+                from ddenv.workbench.runs.compare_runs import lines
 
-                self.app.push_screen(CompareRuns(marked, run))
-
-    # A run elsewhere, the filter, and the way back.
+                self.app.push_screen(SideBySide("Two runs side by side", lines(marked, run)))
 
     def action_path(self) -> None:
         self.add_class("-opening")
@@ -311,7 +292,7 @@ class RunsScreen(Screen[None]):
         if words and path.is_file():
             self.post_message(ShowRun(path))
         elif words:
-            self._complain(f"{plain(path)}: no such run file")
+            refuse(self, f"{plain(path)}: no such run file")
 
     def action_filter(self) -> None:
         self.add_class("-filtering")
@@ -327,7 +308,6 @@ class RunsScreen(Screen[None]):
         self.query_one(RunTable).focus()
 
     def action_back(self) -> None:
-        """Closes first what was opened at the foot, then the screen."""
         if self.has_class("-opening"):
             self.remove_class("-opening")
         elif self.has_class("-filtering"):

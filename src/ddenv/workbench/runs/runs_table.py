@@ -14,10 +14,10 @@ from textual.widgets.option_list import Option
 
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.signs import brief
-from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
 from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.bindings import keys
 
 # The maximum number of models to name.
 MOST_NAMES = 40
@@ -32,12 +32,10 @@ class RunList(OptionList):
         self._folder: RunsFolder | None = None
 
     def run_of(self, option_id: str | None) -> Recent:
-        """The run of an option."""
         return self._runs[option_id or ""]
 
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
-        """Reads the folder again."""
         from ddenv.runs.folder import runs_folder
 
         self._folder = self._folder or RunsFolder(runs_folder())
@@ -49,73 +47,32 @@ class RunList(OptionList):
         if self.highlighted is None and self._runs:
             self.highlighted = 0
 
-    def on_resize(self) -> None:
-        at = self.highlighted
-        if self._runs:
-            self._show(list(self._runs.values()))
-            self.highlighted = at
-
     def _show(self, runs: list[Recent]) -> None:
         self._runs = {str(run.path): run for run in runs}
         self.clear_options()
-        width = self.scrollable_content_region.width or self.app.size.width
         for run in runs:
             text = Text(f"{run.sign} {plain(run.path.stem)}", no_wrap=True, overflow="ellipsis")
-            words = run.words if text.cell_len + len(run.words) + 2 <= width else run.brief
-            self.add_option(Option(text.append(f"  {words}" if words else "", "dim"), id=str(run.path)))
+            self.add_option(Option(text.append(f"  {run.brief}", "dim"), id=str(run.path)))
         if not runs:
             self.add_option(Option(Text("none yet", "dim"), disabled=True))
 
 
-def about(run: Recent, width: int) -> Text:
-    """All details of a run, for a column of that `width`."""
-    text = Text(shortened(plain(run.path.stem), width), "bold").append("\n")
-    if run.trouble:
-        return text.append(f"\n{plain(run.trouble)}", "not bold")
-    text.append(f"{run.sign} {run.state_words}\n", "not bold")
-    if run.reason:
-        text.append(f"{plain(run.reason)}\n", "not bold dim")
-    facts = [
-        ("scenario", shortened(run.scenario, max(8, width - 10))),
-        ("algorithm", run.algorithm),
-        ("pair", run.pair if len(run.pair) + 10 <= width else run.pair.replace("/", f"/\n{'':10}")),
-        ("tests", str(run.tests)),
-        ("computing", f"{brief(run.computed)} of simulations"),
-        ("decisions", f"{run.decisions} by hand" if run.decisions else "none by hand"),
-    ]
-    for name, words in facts:
-        text.append(f"\n{name:<10}", "not bold dim").append(words, "not bold")
-    text.append(f"\n\n{len(run.kept)} of {count(run.total, 'model')} left\n", "bold")
-    for name in run.kept[:MOST_NAMES]:
-        text.append(f"  {shortened(plain(name), max(8, width - 2))}\n", "not bold")
-    more = len(run.kept) - MOST_NAMES
-    return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")
-
-
-def in_few_lines(run: Recent) -> Text:
-    """What the table has no room for at 80 columns."""
-    text = Text(plain(run.path.stem), "bold")
-    said = run.trouble or "; ".join(part for part in (f"{run.sign} {run.state_words}", run.reason) if part)
-    text.append(f"\n{plain(said)}", "not bold")
+def about(run: Recent) -> Text:
+    text = Text(plain(run.path.stem), "bold").append(f"\n{plain(run.trouble)}" if run.trouble else "", "not bold")
     if run.trouble:
         return text
+    text.append(f"\n{run.sign} {run.state_words}{f'; {plain(run.reason)}' if run.reason else ''}", "not bold")
     text.append(f"\n{plain(run.scenario)} by {plain(run.algorithm)}, {plain(run.pair)}", "not bold")
-    return text.append(
-        f"\nleft: {first_of([plain(name) for name in run.kept], MOST_NAMES)}" if run.kept else "", "not bold dim"
-    )
-
-
-def left_of(total: int, left: int) -> str:
-    """How many models are left, in a column of 10 cells where they are thousands, too."""
-    words = f"{left} of {total}" if total else ""
-    return words if len(words) <= 10 else f"{left}/{total}"
+    text.append(f"\n{brief(run.computed)} of simulations, {count(run.decisions, 'decision')} by hand", "not bold")
+    left = first_of([plain(name) for name in run.kept], MOST_NAMES)
+    return text.append(f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim")
 
 
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
-    ("left", 10, True, lambda run: left_of(run.total, len(run.kept))),
+    ("left", 10, True, lambda run: run.brief),
     ("tests", 6, True, lambda run: str(run.tests) if run.total else ""),
     ("cost", 7, True, lambda run: brief(run.computed) if run.total else ""),
 )
@@ -123,8 +80,6 @@ FIRST: tuple[_Column, ...] = (
 MORE: tuple[_Column, ...] = (
     ("changed", 11, True, lambda run: moment(run.changed)),
     ("scenario", 16, False, lambda run: plain(run.scenario)),
-    ("started", 11, True, lambda run: moment(run.started)),
-    ("size", 8, True, lambda run: size(run.size)),
 )
 # By what the runs are sorted, in the order in which a key goes through it. Numbers and times begin with the most.
 ORDERS: dict[str, Callable[[Recent], Any]] = {
@@ -135,17 +90,10 @@ ORDERS: dict[str, Callable[[Recent], Any]] = {
     "left": lambda run: len(run.kept) if run.total else math.inf,
     "tests": lambda run: -run.tests,
     "cost": lambda run: -run.computed,
-    "started": lambda run: -run.started,
-    "size": lambda run: -run.size,
 }
 NARROWEST_NAME = 12
 # Each column has a space at both sides of its text.
 AROUND = 2
-
-
-def size(number: int) -> str:
-    """Bytes as 12 kB or 4.7 MB."""
-    return f"{number / 1000:.0f} kB" if number < 1e6 else f"{number / 1e6:.1f} MB"
 
 
 def moment(time: float) -> str:
@@ -178,7 +126,6 @@ class RunTable(DataTable[Text]):
 
     @property
     def chosen(self) -> Recent | None:
-        """The run under the cursor."""
         return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
 
     def show(self, runs: list[Recent], order: str) -> None:
@@ -202,7 +149,6 @@ class RunTable(DataTable[Text]):
         self.show(self._runs, self._order)
 
     def _arrange(self) -> None:
-        """The columns that fit; the name takes the rest."""
         self.clear(columns=True)
         room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
         self._shown = list(FIRST)

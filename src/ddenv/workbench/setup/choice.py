@@ -67,12 +67,10 @@ class Choice:
 
     @property
     def models(self) -> int:
-        """How many models a reduction could remove."""
         return len(self.world.elements(frozenset(self.settings.protected)))
 
     @property
     def about(self) -> str:
-        """The words below the map."""
         from ddenv.world.load import SCENARIOS
 
         words = f"{self.models} models."
@@ -117,9 +115,6 @@ def _read_run(path: Path) -> Choice:
         scenario, world, robot = read_parts(run)
     clearance = _scenario_clearance(world, scenario) or _robot_clearance(robot)
     return Choice(path, world, scenario.reading, scenario, scenario, clearance, run=True)
-
-
-# The height of the spawn.
 
 
 def spawn_height(world: World, clearance: float, x: float, y: float) -> float | None:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 # The maximum number of runs to read, and how many of the same scenario are enough.
 LOOKED_AT, ENOUGH = 30, 3
-# What the numbers assume before the first run of a scenario.
-UNKNOWN_RATE = "if the failure always shows"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +68,6 @@ def _alike(data: Any, scenario: Scenario) -> bool:
 
 
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
-    """The line with the tests and the time of a whole reduction."""
     reduction = scenario.reduction
     # Another simulator does not say what took part.
     rough = rough_run(models, reduction, past.rate, slices=scenario.oracle is None)
@@ -84,7 +81,7 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
         # The certificate may not be reached.
         words, parts = f"{count(budget, 'test')} at most", f"baseline {reduction.baseline_runs}"
     if past.rate is None:
-        words = f"{words} {UNKNOWN_RATE}"
+        words = f"{words} if the failure always shows"
     if past.seconds is None:
         return f"{words}; {parts}"
     spent = about(*(each * past.seconds / jobs for each in (middle, low, high)))

@@ -3,117 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 from textual import events, on
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.message import Message
 from textual.widget import Widget
-from textual.widgets import Button, Input, Label, OptionList, Select, Static
+from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
-from ddenv.schemas import OURS, Kind, names, uses
-from ddenv.text import count, plain
-from ddenv.words.methods import chosen, note, paragraph
+from ddenv.schemas import OURS, names, uses
+from ddenv.text import plain
+from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.form import Field
-from ddenv.workbench.setup.start_run import usual_jobs
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 MARK = "✗ "
-METHOD: dict[Kind, str] = {
-    "algorithm": "how the environment is searched",
-    "partitioning": "how the environment is split",
-    "prioritization": "in which order the parts are tried",
-}
 MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
 FIELDS = {field.id: field for field in form.ALL}
 
 
 def not_used(field: Field, algorithm: str) -> str:
-    """Why a field has no effect, or ""."""
     only = field.setting.used_by if field.setting else ()
     if only and algorithm in OURS["algorithm"] and algorithm not in only:
         return f"Not used by {plain(algorithm)}."
     return ""
 
 
-def cost(field: Field, text: str, seconds: float | None = None) -> str:
-    """The cost of a field's value, or ""; a test takes so many `seconds` of real time, if that is known."""
-    number = -1.0
-    with suppress(ValueError):
-        number = float(text)
-    if 0 <= number < 1e6:
-        match field.id:
-            case "iterations":
-                return f"A candidate without f costs at most {count(1 + int(number), 'test')}."
-            case "baseline_runs":
-                return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
-            case "timeout":
-                real = f", here about {seconds:.1f} s of real time" if seconds else ""
-                return f"A test without success takes {number:g} simulated s{real}."
-    if field.id == "jobs":
-        return f"This machine has {count(processor.usable_cores(), 'processor')}; more jobs save no time."
-    if field.id == "accept":
-        return "Asking costs your time, and no tests."
-    return field.setting.cost if field.setting else ""
-
-
-class SchemaSelect(Select[str]):
-    """All names of a kind; its id is the kind."""
-
-    # These keys are bound here, not on the screen: otherwise the form around it would handle them.
-    BINDINGS: ClassVar = [
-        Binding("pagedown", "screen.scroll(1)", "more", id="schema.more", tooltip="scroll an explanation", show=False),
-        Binding("pageup", "screen.scroll(-1)", "back", id="schema.back", tooltip="scroll it back", show=False),
-    ]
-
-    @dataclass
-    class Looked(Message):
-        """In the open list another name is highlighted."""
-
-        kind: Kind
-        name: str
-
-    def __init__(self, kind: Kind, tooltip: str) -> None:
-        super().__init__([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
-        self.kind: Kind = kind
-        self.tooltip = tooltip
-
-    @property
-    def chosen(self) -> str:
-        return str(self.value)
-
-    def on_mount(self) -> None:
-        self.watch(self.query_one(OptionList), "highlighted", self._highlighted, init=False)
-
-    def _highlighted(self, index: int | None) -> None:
-        if self.expanded and index is not None:
-            self.post_message(self.Looked(self.kind, names(self.kind)[index]))
-
-
 class Explained(VerticalScroll):
     """The meaning of the focused field, in a few lines that scroll."""
 
-    def __init__(self, *, id: str) -> None:
-        super().__init__(id=id, can_focus=False)
-        self.title = ""
+    title = ""
 
     def compose(self) -> ComposeResult:
         yield Static("", markup=False)
 
     def show(self, title: str, words: str, warning: str = "") -> None:
-        """`title` is the name of what is explained, `warning` a sentence that comes first and stands out."""
+        """A `warning` comes first and stands out."""
         self.title = title
         text = Text(title, "bold").append("  ")
         if warning:
@@ -143,15 +78,14 @@ class OptionsForm(Vertical):
         self._message = ""
         # The texts of the rarely used fields, while they are not opened: with these the screen would open 0.15 s later.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
-        self.seconds: float | None = None
         self.border_title = "Settings"
 
     def compose(self) -> ComposeResult:
         with VerticalScroll(id="fields", can_focus=False):
             with Grid(id="method"):
-                for kind, tooltip in METHOD.items():
+                for kind in KINDS:
                     yield Label(kind, markup=False)
-                    yield SchemaSelect(kind, tooltip)
+                    yield Select([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
             yield Grid(*_widgets(form.BASIC), id="basic", classes="grid")
             yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
@@ -165,28 +99,23 @@ class OptionsForm(Vertical):
 
     def on_mount(self) -> None:
         self.watch(self.screen, "focused", self._mark)
-        self.query_one("#jobs", Input).value = str(usual_jobs())
+        self.query_one("#jobs", Input).value = str(processor.usable_cores())
         self.show_message("")
 
     def _mark(self, focused: Widget | None) -> None:
-        """Marks the form while the focus is in it."""
         within = focused is not None and self in focused.ancestors
         if within != self.has_class("-within"):
             # Its fields look the same with it.
             self.set_class(within, "-within", update=False)
             self.app.stylesheet.update_nodes([self])
 
-    # The content.
-
     @property
     def method(self) -> tuple[str, str]:
-        """The chosen pair and algorithm."""
-        names = {select.kind: select.chosen for select in self.query(SchemaSelect)}
-        return f"{names['partitioning']}/{names['prioritization']}", names["algorithm"]
+        algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in KINDS)
+        return f"{partitioning}/{prioritization}", algorithm
 
     @property
     def texts(self) -> dict[str, str]:
-        """The texts of the fields, by id."""
         return self._unopened | {id: str(field.value) for id, field in self._fields()}
 
     def _fields(self) -> Iterator[tuple[str, Input | Select[str]]]:
@@ -196,7 +125,6 @@ class OptionsForm(Vertical):
 
     @property
     def own_name(self) -> str:
-        """The run's name if the user gave one, else ""."""
         name = self.texts["name"].strip()
         return name if self._name_given and name != self._suggested else ""
 
@@ -204,11 +132,11 @@ class OptionsForm(Vertical):
         """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
         texts = form.texts_of(scenario) | dict(places or {})
         if form.problem(form.JOBS_FIELD, self.texts["jobs"]):
-            texts["jobs"] = str(usual_jobs())
+            texts["jobs"] = str(processor.usable_cores())
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
         for kind, name in names.items():
-            select = self.query_one(f"#{kind}", SchemaSelect)
+            select = self.query_one(f"#{kind}", Select)
             with select.prevent(Select.Changed):
                 select.value = name
         self._dim()
@@ -216,7 +144,6 @@ class OptionsForm(Vertical):
         self.post_message(self.Edited(place=True))
 
     def set_texts(self, texts: dict[str, str]) -> None:
-        """Fills in some of the fields."""
         self._unopened |= {id: text for id, text in texts.items() if id in self._unopened}
         for id, field in self._fields():
             if id in texts:
@@ -226,62 +153,45 @@ class OptionsForm(Vertical):
         self._show_problems()
 
     def show_fields(self, show: bool) -> None:
-        """The whole form; without the settings only the cost, the command, the name and Start."""
         self.query_one("#fields").display = self.query_one("#explained").display = show
 
     def suggest_name(self, name: str) -> None:
-        """Fills in a run name, unless the user gave one."""
         self._suggested = name
         if not self._name_given:
             field = self.query_one("#name", Input)
             with field.prevent(Input.Changed):
                 field.value = name
 
-    # The texts.
-
-    @on(SchemaSelect.Looked)
-    def _looked(self, event: SchemaSelect.Looked) -> None:
-        event.stop()
-        algorithm = event.name if event.kind == "algorithm" else self.method[1]
-        self._dim(algorithm)
-        self._explain_name(event.kind, event.name, algorithm)
-
     def on_descendant_focus(self, event: events.DescendantFocus) -> None:
         self._explain(event.widget)
 
     def _explain(self, widget: Widget | None) -> None:
         """The field that has the focus, or else the algorithm, which most depends on."""
-        id = next((each.id for each in (widget, widget and widget.parent) if each and each.id in FIELDS), None)
-        if id is not None:
-            self._explain_field(FIELDS[id])
-        elif isinstance(widget, SchemaSelect):
-            self._explain_name(widget.kind, widget.chosen, self.method[1])
-        else:
-            self._explain_name("algorithm", self.method[1], self.method[1])
+        id, (pair, algorithm) = "" if widget is None else widget.id or "", self.method
+        partitioning, _, prioritization = pair.partition("/")
+        panel = self.query_one(Explained)
+        if id in FIELDS:
+            field = FIELDS[id]
+            words = f"{field.meaning} {field.setting.cost if field.setting else ''}".strip()
+            panel.show(field.label, words, not_used(field, algorithm))
+        elif widget is not panel:
+            kind = next((kind for kind in KINDS if kind == id), KINDS[0])
+            name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
+            panel.show(f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm))
 
-    def _explain_name(self, kind: Kind, name: str, algorithm: str) -> None:
-        unused = note(kind, name if kind == "algorithm" else algorithm)
-        self.query_one(Explained).show(f"{kind} {plain(name)}", paragraph(kind, name), unused)
-
-    def _explain_field(self, field: form.Field) -> None:
-        words = f"{field.meaning} {cost(field, self.texts[field.id], self.seconds)}".strip()
-        self.query_one(Explained).show(field.label, words, not_used(field, self.method[1]))
-
-    def _dim(self, algorithm: str = "") -> None:
+    def _dim(self) -> None:
         """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
-        algorithm = algorithm or self.method[1]
-        used = uses(algorithm)
-        for select in self.query(SchemaSelect):
-            select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
+        algorithm = self.method[1]
+        for kind in KINDS:
+            unused = kind != "algorithm" and kind not in uses(algorithm)
+            self.query_one(f"#{kind}").set_class(unused, "-unused")
         for id, field in self._fields():
             field.set_class(bool(not_used(FIELDS[id], algorithm)), "-unused")
 
     def show_cost(self, words: str) -> None:
-        """Shows the tests and the time that the settings need."""
         self.query_one("#cost", Static).update(Text(words))
 
     def tell_command(self, words: str, typed: bool = True) -> None:
-        """Shows the command that does the same; if it is not `typed`, why there is none."""
         line = Text("$ " if typed and words else "", "bold")
         command = self.query_one("#command", Static)
         command.update(line.append(plain(words), "not bold"))
@@ -289,10 +199,10 @@ class OptionsForm(Vertical):
 
     def complain(self, error: UserError) -> None:
         """Shows an error below the fields, until it is corrected; the wrong field is marked and gets the cursor."""
-        id = form.field_of(error)
-        if id is None:
+        if not isinstance(error, form.FieldError):
             self.show_message(f"{MARK}{error}")
             return
+        id = error.field
         if FIELDS[id] in form.ADVANCED:
             self._show_more(True)
         self._message, self._problems = "", {id: str(error)} | self._problems | {id: str(error)}
@@ -303,7 +213,6 @@ class OptionsForm(Vertical):
         self.query_one(f"#{id}").focus()
 
     def show_message(self, words: str) -> None:
-        """Shows `words` in place of all errors so far."""
         self._message = words
         self._problems.clear()
         self._show_problems()
@@ -325,21 +234,16 @@ class OptionsForm(Vertical):
 
     def _check_again(self, id: str) -> None:
         """An error goes away as soon as its field is right."""
-        spoiled = [each for each in form.together(id) if each in self._problems]
-        for each in spoiled:
-            if wrong := form.problem(FIELDS[each], self.texts[each]):
-                self._problems[each] = wrong
-            else:
-                del self._problems[each]
-        if spoiled or self._message:
+        if id in self._problems or self._message:
             self._message = ""
+            if wrong := form.problem(FIELDS[id], self.texts[id]):
+                self._problems[id] = wrong
+            else:
+                self._problems.pop(id, None)
             self._show_problems()
-
-    # Actions.
 
     @on(Button.Pressed, "#more")
     def toggle_more(self) -> None:
-        """Shows or hides the rarely used settings."""
         self._show_more(not any(grid.display for grid in self.query("#advanced")))
 
     def _show_more(self, show: bool) -> None:
@@ -361,15 +265,13 @@ class OptionsForm(Vertical):
     def _picked(self, event: Select.Changed) -> None:
         event.stop()
         self._dim()
-        if isinstance(event.select, SchemaSelect):
+        if event.select.id in KINDS:
             self._explain(event.select)
         self._edited(event.select)
 
     def _edited(self, widget: Widget) -> None:
         if widget.id in FIELDS:
             self._check_again(widget.id)
-            if widget.has_focus:
-                self._explain_field(FIELDS[widget.id])
         self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
 
 

@@ -29,7 +29,6 @@ SUFFIXES = (*SCENARIO, *SDF_ENDINGS)
 
 
 def recent_files() -> list[Path]:
-    """The recent files that still exist; none if the list is missing or damaged."""
     from ddenv.world.access import is_file
 
     return [path for path in _listed() if is_file(path)]
@@ -66,7 +65,6 @@ class FileList(OptionList):
         self._looked: str | None = None
 
     def offer(self, bundled: list[Path], recent: list[Path], like: Path | None = None) -> None:
-        """Shows all choices; the cursor is on `like`, a run, or else on the first."""
         self._bundled, self._like = bundled, like
         self._recent = [path for path in recent if path not in bundled]
         self._fill()
@@ -162,7 +160,6 @@ def _fits(path: Path) -> bool:
 
 
 def complain_about(path: Path) -> str:
-    """Why a path cannot be opened, or nothing."""
     from ddenv.world.access import is_file, is_folder
 
     if path == Path():

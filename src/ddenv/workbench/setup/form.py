@@ -85,7 +85,7 @@ def value(field: Field, text: str) -> Value:
     if field.empty and text in ("", field.empty):
         return None
     if not text:
-        raise FieldError(field.id, f"{field.label}: is missing; {_wanted(field)}")
+        raise FieldError(field.id, f"{field.label}: is missing")
     try:
         found = str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
@@ -96,15 +96,7 @@ def value(field: Field, text: str) -> Value:
     return found
 
 
-def _wanted(field: Field) -> str:
-    """What an empty field asks for."""
-    if field in PLACES:
-        return f"press {'s for the start' if field in SPAWN else 'g for the goal'}, on the map"
-    return f"type {field.setting.range}" if field.setting is not None and field.setting.range else "type one"
-
-
 def _out_of_range(field: Field, found: Value) -> str:
-    """What is allowed, if `found` is not."""
     if field.setting is not None:
         return "" if field.setting.allows(found) or isinstance(found, str) else field.setting.range
     if isinstance(found, float) and not abs(found) <= field.most:
@@ -113,7 +105,6 @@ def _out_of_range(field: Field, found: Value) -> str:
 
 
 def problem(field: Field, text: str) -> str:
-    """What is wrong with a field's text, in its own name, or ""."""
     try:
         value(field, text)
     except FieldError as error:
@@ -122,19 +113,16 @@ def problem(field: Field, text: str) -> str:
 
 
 def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Value]:
-    """The values of all `fields` by id. Raises FieldError for the first wrong one."""
     return {field.id: value(field, texts.get(field.id, "")) for field in fields}
 
 
 def jobs(text: str) -> int:
-    """The number of tests at the same time. Raises FieldError."""
     number = value(JOBS_FIELD, text)
     assert isinstance(number, int)
     return number
 
 
 def text_of(value: Value) -> str:
-    """A value as the text of a field."""
     if isinstance(value, bool):
         return ON if value else OFF
     if isinstance(value, float):
@@ -152,7 +140,6 @@ def read_key(data: Mapping[str, Any], key: str) -> Any:
 
 
 def texts_of(scenario: Scenario) -> dict[str, str]:
-    """A scenario's settings as texts for the fields."""
     data = scenario.model_dump(mode="json")
     values = {field.id: read(data, field.setting) for field in ALL if field.key and field.setting}
     places = {field.id: read_key(data, field.key) for field in PLACES}
@@ -182,21 +169,3 @@ def numbers(fields: tuple[Field, ...], texts: Mapping[str, str]) -> tuple[float,
         return tuple(float(number) for number in values(fields, texts).values() if number is not None)
     except FieldError:
         return None
-
-
-def field_of(error: UserError) -> str | None:
-    """The field for an error about a scenario's key, if there is one."""
-    if isinstance(error, FieldError):
-        return error.field
-    message = str(error)
-    for field in ALL:
-        if field.key and f" {field.key}:" in f" {message}":
-            return field.id
-    if message.startswith("spawn ("):
-        return "spawn_x"
-    return NAME.id if "exists already" in message else None
-
-
-def together(id: str) -> tuple[str, ...]:
-    """The fields whose errors a change of one field may correct: the robot stands where all numbers of the spawn say."""
-    return tuple(field.id for field in SPAWN) if id.startswith("spawn") else (id,)

@@ -25,8 +25,8 @@ from textual.widgets.option_list import Option
 from ddenv.errors import UserError
 from ddenv.runs.remedies import remedy, remembered, with_remedies
 from ddenv.text import count, plain
-from ddenv.workbench.help.bindings import keys
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 if TYPE_CHECKING:
@@ -104,10 +104,7 @@ def _on_the_map(uri: str, world: World) -> str:
 
 
 class MissingList(OptionList):
-    """A row for each missing file, then for each kind of part that was replaced or ignored; hidden while there is none.
-
-    Once each file has its remedy, the title stands for all rows until the list has the focus.
-    """
+    """A row for each missing file, then for each kind of part that was replaced or ignored; hidden while there is none."""
 
     BINDINGS: ClassVar = keys(
         "missing",
@@ -178,7 +175,6 @@ class MissingList(OptionList):
 
     @property
     def _here(self) -> list[str]:
-        """The URI of the missing file under the cursor."""
         place = self.highlighted
         return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
 

@@ -20,7 +20,6 @@ from textual.worker import get_current_worker
 from ddenv.errors import UserError
 from ddenv.map.raster import arrow
 from ddenv.runs.remedies import remember_remedies
-from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, Point, place_of
@@ -45,10 +44,6 @@ ASKS = {
     "heading": "the heading: pick a place for the robot to look at",
     "goal": "the goal: move the crosshair and press enter, or click",
 }
-# The same while the focus is elsewhere, where the arrows and enter mean something else.
-ASKS_FROM_AFAR = "the {what} comes next: {key} goes to the map, or click there"
-# Start and goal in worlds without a scenario, by the world's file, are kept for so many worlds.
-PLACES, KEPT = "places.json", 200
 
 
 class Preview(Vertical):
@@ -96,14 +91,11 @@ class Preview(Vertical):
             yield Static("", id=id, markup=False)
 
     def on_mount(self) -> None:
-        self.watch(self.screen, "focused", self._show_picking, init=False)
         self.query_one("#start-notes").display = False
 
     def on_resize(self) -> None:
         self._show_picking()
         self.call_after_refresh(self._show_about)
-
-    # Reading.
 
     def read(self, path: Path, *, opened: bool) -> None:
         """Reads a scenario, a world or a run in a thread. A file that the user `opened` is remembered."""
@@ -112,7 +104,6 @@ class Preview(Vertical):
         self._read(path, opened)
 
     def show_nothing(self, why: str) -> None:
-        """Shows `why` the world cannot be shown."""
         self.choice = None
         self.pick("")
         self.workers.cancel_group(self, "notes")
@@ -165,8 +156,6 @@ class Preview(Vertical):
             remember_remedies(event.remedies)
             self._read(self.choice.path, False, again=True)
 
-    # Start and goal.
-
     @property
     def spawn(self) -> tuple[float, ...] | None:
         """The form's start: x, y, z, m, and yaw, rad."""
@@ -179,11 +168,9 @@ class Preview(Vertical):
 
     @property
     def asks(self) -> bool:
-        """Whether the chosen world has no start yet."""
         return self.choice is not None and self.choice.scenario is None and self.spawn is None
 
     def show_places(self) -> None:
-        """Shows the form's start and goal, on the map and in words, and what is wrong with the start."""
         if self.choice is not None:
             self._fill_z(self.choice)
             spawn, goal = self.spawn, self.goal
@@ -200,19 +187,6 @@ class Preview(Vertical):
         z = spawn_height(choice.world, choice.clearance, *at)
         self._ground_z = "" if z is None else _metres(z)
         self._form.set_texts({"spawn_z": self._ground_z, "spawn_yaw": texts["spawn_yaw"] or "0"})
-
-    def places_for(self, keep: bool) -> dict[str, str]:
-        """Start and goal of a world without a scenario: as the last time, or as they are if the user wants to `keep` them."""
-        texts = self._form.texts
-        now = {field.id: texts[field.id] if keep else "" for field in form.PLACES}
-        return now if self.choice is None else places_of(self.choice.path) or now
-
-    def remember_places(self) -> None:
-        """For the next time that this world is chosen."""
-        if self.choice is not None and self.choice.scenario is None and self.spawn and self.goal:
-            remember_places(self.choice.path, self._form.texts)
-
-    # Picking.
 
     def pick(self, what: str) -> None:
         """Starts picking "start", "heading" or "goal" on the map; "" ends it."""
@@ -235,7 +209,6 @@ class Preview(Vertical):
 
     @on(WorldMap.PlacePicked)
     def _place_picked(self, event: WorldMap.PlacePicked) -> None:
-        """Fills in the form, and continues with the next missing place."""
         if self.choice is None or not self.picked_next:
             return
         if self.picked_next == "start":
@@ -247,8 +220,6 @@ class Preview(Vertical):
         if texts:
             self._form.set_texts(texts)
             self.pick(then)
-        # The user may quit before a run begins.
-        self.remember_places()
 
     def _start(self, choice: Choice, x: float, y: float) -> dict[str, str]:
         z = spawn_height(choice.world, choice.clearance, x, y)
@@ -265,16 +236,12 @@ class Preview(Vertical):
             return {}
         return {"spawn_yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
 
-    # The lines below the map.
-
     def _show_picking(self) -> None:
-        """Which place is picked next, or where start and goal are in the longest words that fit, with the keys to pick others."""
         line, what = self.query_one("#picking", Static), self.picked_next
         line.set_class(bool(what), "-on")
         text = Text(no_wrap=True, overflow="ellipsis")
         if what:
-            asked = ASKS[what] if self.screen.focused is self.map else ASKS_FROM_AFAR.format(what=what, key=KEYS[what])
-            line.update(text.append("▶ ", "bold").append(asked).append("   escape stops", "dim"))
+            line.update(text.append("▶ ", "bold").append(ASKS[what]).append("   escape stops", "dim"))
             return
         spawn, goal = self.spawn, self.goal
         if self.choice is None:
@@ -306,7 +273,6 @@ class Preview(Vertical):
             line.tooltip = Text("\n".join(f"{plain(words)}." for _, words in found))
 
     def _show_about(self) -> None:
-        """As much of the description as fits; the tooltip has all of it."""
         line, words = self.query_one("#about", Static), "" if self.choice is None else self.choice.about
         most = line.styles.max_height
         lines = wrap(words, max(3, line.content_size.width), max_lines=most and most.cells, placeholder=" …")
@@ -333,28 +299,6 @@ def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[tuple[
         return others, None
     why, place = inside
     return (("start", why), *others), None if place is None else (place.x, place.y)
-
-
-def places_of(world: Path) -> dict[str, str] | None:
-    """The texts of the fields for start and goal as they were the last time; None for another world, or if one is wrong."""
-    known = _known().get(str(world.absolute()))
-    if not isinstance(known, dict):
-        return None
-    texts = {field.id: str(known.get(field.id, "")) for field in form.PLACES}
-    return None if any(form.problem(field, texts[field.id]) for field in form.PLACES) else texts
-
-
-def remember_places(world: Path, texts: Mapping[str, str]) -> None:
-    """Remembers the start and the goal in `texts`."""
-    name = str(world.absolute())
-    others = {key: each for key, each in _known().items() if key != name}
-    now = {name: {field.id: texts[field.id] for field in form.PLACES}}
-    write_state(PLACES, dict(list((others | now).items())[-KEPT:]))
-
-
-def _known() -> dict[str, object]:
-    found = read_state(PLACES)
-    return found if isinstance(found, dict) else {}
 
 
 def _places(where: Mapping[str, str], named: Collection[str], gap: str = "   ") -> Text:

@@ -20,18 +20,18 @@ from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.text import plain
-from ddenv.workbench.help.bindings import ids, keys
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
-from ddenv.workbench.setup.fields import Explained, OptionsForm
-from ddenv.workbench.setup.files import FileList, recent_files, remember
+from ddenv.workbench.setup.fields import OptionsForm
+from ddenv.workbench.setup.files import FileList, recent_files
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.messages import ShowRun
 from ddenv.workbench.shared.processes import Engine
 from ddenv.workbench.widgets.panes import Panes
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
 SMALLEST = (64, 18)
 # From this size on all panes are shown at once.
 ROOMY = (110, 32)
-# From this size on the rarely used settings are shown, too.
-VAST = (160, 48)
 PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
 BASELINE = "start, and pause after the baseline: it shows how often the whole world fails"
 # Where the focus goes in each pane.
@@ -52,7 +50,7 @@ HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
 # In the footer.
-SHOWN = ids("setup", "start baseline save copy open help quit")
+FIRST = ids("setup", "help quit start baseline save copy open")
 
 
 class SetupScreen(Screen[None]):
@@ -67,9 +65,9 @@ class SetupScreen(Screen[None]):
         (SMALLEST[0], "-slim"),
         (80, "-narrow"),
         (ROOMY[0], "-wide"),
-        (VAST[0], "-vast"),
+        (160, "-vast"),
     ]
-    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (48, "-high")]
     BINDINGS: ClassVar = keys(
         "setup",
         ("start", "ctrl+s,f5", "start", "start", "start the reduction", "^s"),
@@ -82,15 +80,13 @@ class SetupScreen(Screen[None]):
         ("pick_heading", "h", "pick('heading')", "heading", "set the heading on the map"),
         ("pick_goal", "g", "pick('goal')", "goal", "set the goal on the map"),
         ("missing", "m", "missing", "missing", "to the missing files and their remedies"),
-        ("closer", "plus,equals_sign", "zoom(1.25)", "closer", "map: closer"),
-        ("farther", "minus", "zoom(0.8)", "farther", "map: farther away"),
-        ("fit", "0", "fit", "fit", "map: show all of it"),
+        *MAP_KEYS,
         ("choose", "f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
         ("map", "f3", "pane('map')", "map", "to the map"),
         ("settings", "f4", "pane('settings')", "settings", "to the settings"),
         ("runs", "R", "app.runs", "runs", "the list of all runs"),
         ("lessons", "L", "app.lessons", "lessons", "lessons on delta debugging"),
-        ("help", "f1,question_mark", "app.help", "help", "show every key", "?"),
+        HELP,
         ("home", "escape", "home", "back", "stop picking; back to the list of files"),
         ("quit", "q", "app.leave", "quit", "leave"),
     )
@@ -116,8 +112,6 @@ class SetupScreen(Screen[None]):
         # Whether the choice is still being read, as is the first file when the screen opens.
         self._awaited = True
         self._past = Past()
-        # The file that the scenario was saved in, with the scenario in it.
-        self._saved: tuple[Path, Scenario] | None = None
         self._opened_now: Path | None = None
         self._keep_places = False
         self._busy = False
@@ -136,14 +130,12 @@ class SetupScreen(Screen[None]):
                     yield RunList(id="run-list")
             yield self.preview
         yield self.form
-        yield KeyFooter(SHOWN, SHOWN, self._keys_here)
+        yield KeyFooter(FIRST, self._keys_here)
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
         self._list_files()
         self.query_one(FileList).focus()
-        if self.size.width >= VAST[0] and self.size.height >= VAST[1]:
-            self.call_after_refresh(self.form.toggle_more)
 
     def on_screen_resume(self) -> None:
         self.query_one(RunList).read()
@@ -153,8 +145,6 @@ class SetupScreen(Screen[None]):
         self._arrange()
         words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
         self.query_one("#small", Static).update(words)
-
-    # The list of choices.
 
     @work(thread=True, group="recent", exclusive=True)
     def _list_files(self) -> None:
@@ -173,7 +163,6 @@ class SetupScreen(Screen[None]):
 
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
-        """A world without a start is asked for it first."""
         if self.preview.choice is not None and self.preview.asks:
             self.action_pick("start")
         else:
@@ -194,11 +183,8 @@ class SetupScreen(Screen[None]):
             self._show_pane("choose")
             self.query_one(FileList).add(path)
 
-    # The choice.
-
     @on(FileList.Looked)
     def _choose(self, event: FileList.Looked) -> None:
-        self.preview.remember_places()
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
         self.form.show_message("")
@@ -223,18 +209,17 @@ class SetupScreen(Screen[None]):
             self.preview.ask_again()
             self._show_outcome()
             return
-        places = None if choice.scenario else self.preview.places_for(self._keep_places)
-        self.form.show_settings(choice.settings, places)
+        texts = self.form.texts
+        places = {field.id: texts[field.id] if self._keep_places else "" for field in form.PLACES}
+        self.form.show_settings(choice.settings, None if choice.scenario else places)
         if self.preview.asks and choice.path == self._opened_now:
             self.action_pick("start")
 
     @on(Preview.PastRead)
     def _past_was_read(self, event: Preview.PastRead) -> None:
         if event.choice is self.preview.choice:
-            self._past, self.form.seconds = event.past, event.past.seconds
+            self._past = event.past
             self._show_outcome()
-
-    # Places on the map.
 
     def action_pick(self, what: str) -> None:
         if self.preview.choice is None:
@@ -244,17 +229,8 @@ class SetupScreen(Screen[None]):
         self.preview.pick(what)
 
     def action_missing(self) -> None:
-        """To the rows of missing files, if there are any."""
         self._show_pane("map")
         (self.preview.missing if self.preview.missing.display else self.preview.map).focus()
-
-    def action_zoom(self, factor: float) -> None:
-        self.preview.map.zoom(factor)
-
-    def action_fit(self) -> None:
-        self.preview.map.fit()
-
-    # Cost and command.
 
     @on(OptionsForm.Edited)
     def _edited(self, event: OptionsForm.Edited) -> None:
@@ -263,28 +239,16 @@ class SetupScreen(Screen[None]):
         self._show_outcome()
 
     def _show_outcome(self) -> None:
-        """Shows the cost and the command for the form, or its error."""
-        self.workers.cancel_group(self, "cost")
         cost, words, typed = "", "", True
         if self.preview.choice is not None or not self._awaited:
             try:
                 scenario, command = self._scenario(), self._command()
                 words, typed = shlex.join(command) or NO_COMMAND, bool(command)
-                self._reckon(scenario, self._chosen().models, form.jobs(self.form.texts["jobs"]), self._past)
+                cost = whole_cost(scenario, self._chosen().models, form.jobs(self.form.texts["jobs"]), self._past)
             except UserError as error:
                 cost = f"not ready: {error}"
-        if cost or not words:
-            self.form.show_cost(cost)
+        self.form.show_cost(cost)
         self.form.tell_command(words, typed)
-
-    @work(thread=True, group="cost", exclusive=True)
-    def _reckon(self, scenario: Scenario, models: int, jobs: int, past: Past) -> None:
-        from textual.worker import get_current_worker
-
-        worker = get_current_worker()
-        cost = whole_cost(scenario, models, jobs, past)
-        if not worker.is_cancelled:
-            call_if_open(self, self.form.show_cost, cost)
 
     def _scenario(self) -> Scenario:
         choice, (pair, algorithm) = self._chosen(), self.form.method
@@ -302,14 +266,14 @@ class SetupScreen(Screen[None]):
     def _command(self) -> list[str]:
         """The words of the command that does the same, empty if there is none. Raises UserError."""
         choice, jobs = self._chosen(), form.jobs(self.form.texts["jobs"])
-        source = self._saved if choice.run else (choice.path, choice.settings)
-        if source is None:
+        if choice.run:
             return []
-        bare, name = choice.scenario is None, self.form.own_name
-        return command_words(*source, self._scenario(), bare=bare, jobs=jobs, reading=choice.options, name=name)
+        own, bare, name = choice.settings, choice.scenario is None, self.form.own_name
+        return command_words(
+            choice.path, own, self._scenario(), bare=bare, jobs=jobs, reading=choice.options, name=name
+        )
 
     def action_copy(self) -> None:
-        """The whole command to the clipboard (OSC 52)."""
         try:
             words = self._command()
         except UserError as error:
@@ -320,8 +284,6 @@ class SetupScreen(Screen[None]):
             return
         self.app.copy_to_clipboard(shlex.join(words))
         self.notify("command copied, if the terminal allows it", timeout=3)
-
-    # Start.
 
     @on(Button.Pressed, "#start")
     @on(Input.Submitted)
@@ -354,7 +316,6 @@ class SetupScreen(Screen[None]):
             else:
                 self._complain(UserError("not started: it needs a program that you do not trust"))
 
-        self.preview.remember_places()
         self._busy = True
         self.form.show_message("checking ...")
         # A run file is never the user's own: somebody may have sent it.
@@ -373,11 +334,9 @@ class SetupScreen(Screen[None]):
 
     def _complain(self, error: UserError) -> None:
         self._busy = False
-        if form.field_of(error) not in (None, form.NAME.id):
+        if isinstance(error, form.FieldError) and error.field != form.NAME.id:
             self._show_pane("settings")
         self.form.complain(error)
-
-    # Save as a scenario.
 
     def action_save(self) -> None:
         from ddenv.workbench.setup.save_scenario import SaveScenario
@@ -392,25 +351,7 @@ class SetupScreen(Screen[None]):
     def _written(self, path: Path | None) -> None:
         if path is not None:
             self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
-            self._load_saved(path)
-
-    @work(thread=True, group="recent", exclusive=True)
-    def _load_saved(self, path: Path) -> None:
-        from ddenv.world.load import load_scenario
-
-        remember(path)
-        try:
-            saved = path, load_scenario(path)
-        except UserError as error:
-            call_if_open(self, self._complain, error)
-            return
-        call_if_open(self, self._keep_saved, saved)
-
-    def _keep_saved(self, saved: tuple[Path, Scenario]) -> None:
-        self._saved = saved
-        self._show_outcome()
-
-    # Panes.
+            self._opened(path)
 
     def _show_pane(self, pane: str) -> None:
         self._pane = pane
@@ -435,20 +376,15 @@ class SetupScreen(Screen[None]):
     def _keys_here(self) -> tuple[str, ...]:
         """The ids of the keys in the footer: those of what has the focus come first."""
         bindings = () if self.focused is None else Binding.make_bindings(self.focused.BINDINGS)
-        return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *SHOWN)
+        return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *FIRST)
 
     @on(Panes.Chosen)
     def _pane_chosen(self, event: Panes.Chosen) -> None:
         self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
-        """Moves the focus to a pane, and shows it if only one fits."""
         self._show_pane(pane)
         self.query_one(HEADS[pane]).focus()
-
-    def action_scroll(self, pages: int) -> None:
-        explained = self.query_one(Explained)
-        explained.scroll_relative(y=pages * max(1, explained.size.height - 1), animate=False)
 
     def action_more(self) -> None:
         self._show_pane("settings")

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
-from ddenv.runs.remembered import read_state, write_state
-from ddenv.settings import JOBS, OPTIONS, PRINTED, number_text, read
+from ddenv.settings import OPTIONS, PRINTED, number_text, read
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.files import remember
@@ -19,7 +18,6 @@ from ddenv.workbench.shared.processes import Engine
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-JOBS_FILE = "jobs.json"
 NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
@@ -42,7 +40,7 @@ def command_words(
 
     before, after = own.model_dump(mode="json"), asked.model_dump(mode="json")
     bundled = source.parent == SCENARIOS and source.suffix == ".yaml"
-    words = ["ddenv", "run", source.stem if bundled else _path(source)]
+    words = ["ddenv", "run", source.stem if bundled else str(source.absolute())]
     for place, fields in (("spawn", form.SPAWN), ("goal", form.GOAL)):
         numbers = [read_key(after, field.key) for field in fields]
         if bare or numbers != [read_key(before, field.key) for field in fields]:
@@ -55,16 +53,12 @@ def command_words(
             words += one.words(read(after, one))
     for option, values in reading.items():
         for value in values:
-            words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
+            words += [f"--{option.replace('_', '-')}", str(value.absolute()) if isinstance(value, Path) else str(value)]
     if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]
     if not name:
         return words
-    return [*words, "--output", _path(Path(name))] if len(Path(name).parts) > 1 else [*words, "--name", name]
-
-
-def _path(path: Path) -> str:
-    return str(path.absolute())
+    return [*words, "--output", str(Path(name).absolute())] if len(Path(name).parts) > 1 else [*words, "--name", name]
 
 
 def create(
@@ -81,19 +75,11 @@ def create(
         create_run(scenario, path)
         remember(choice.path)
     engine.start(jobs, accept_mode)
-    # The usual number is not remembered: another machine has other cores.
-    write_state(JOBS_FILE, None if jobs == processor.usable_cores() else jobs)
     if only_baseline:
         # A step of one round ends after the baseline. The engine has started: it ignores older commands.
         with RunFile(path) as run:
             run.send("step", unit="round")
     return engine
-
-
-def usual_jobs() -> int:
-    """The number of jobs of the last run that was started here, or of this machine's cores."""
-    found = read_state(JOBS_FILE)
-    return found if type(found) is int and JOBS.allows(found) else processor.usable_cores()
 
 
 def run_file(scenario_name: str, name: str) -> Path:

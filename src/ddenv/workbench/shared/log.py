@@ -41,7 +41,6 @@ class Log:
         return self._entries[: bisect_right(self._entries, event, key=lambda entry: entry.event)]
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
-        """One more event."""
         try:
             words = news(kind, before, after, attached=True)
         except (KeyError, IndexError, TypeError, ValueError, AttributeError):
@@ -57,17 +56,10 @@ class Log:
 
 
 def as_it_is(text: Text, _: int) -> Text:
-    """A line that is ready."""
     return text.copy()
 
 
-def decision_line(decision: Decision, width: int) -> Text:
-    """A decision with its time of day."""
-    return _timed(decision.time, plain(decision.words))
-
-
 def decision_lines(decision: Decision, width: int) -> list[Text]:
-    """A decision with its time of day, in lines that fit."""
     return _in_lines(decision.time, decision.words, width)
 
 

@@ -64,12 +64,10 @@ class Poll:
 
     @property
     def snapshot(self) -> Snapshot:
-        """What the last look saw."""
         return self._snapshot or Snapshot()
 
     @property
     def catching_up(self) -> bool:
-        """Whether there are more events than the last look read."""
         return self._catching_up
 
     def close(self) -> None:
@@ -122,7 +120,6 @@ class Poll:
         return replace(snapshot, behind=more, version=__version__)
 
     def _left(self, why: str) -> Snapshot:
-        """What was read last of a file that is gone."""
         error = f"{why}; what you see is what was read last"
         return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 
@@ -167,7 +164,8 @@ class Poll:
         """Only valid rows: they name a test and have a whole, finite pose."""
         try:
             rows = self.file.live()
-            return tuple(row for row in rows if 0 < row.test <= len(state.tests) and _finite(row))
+            known = (row for row in rows if 0 < row.test <= len(state.tests) and len(row.pose) == COLUMNS - 1)
+            return tuple(row for row in known if all(map(math.isfinite, (row.time, *row.pose))))
         except (TypeError, ValueError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
@@ -181,7 +179,3 @@ class Poll:
 
     def _spent(self, state: RunState, engine: EngineIs) -> int:
         return int(spent(state, now() if engine == "alive" else state.updated_at))
-
-
-def _finite(row: Live) -> bool:
-    return len(row.pose) == COLUMNS - 1 and all(math.isfinite(value) for value in (row.time, *row.pose))

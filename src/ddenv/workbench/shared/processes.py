@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 from contextlib import suppress
@@ -9,7 +10,8 @@ from pathlib import Path
 from threading import Thread
 
 from ddenv.errors import UserError
-from ddenv.runs.wanted import Wanted, written
+from ddenv.runfile import reading
+from ddenv.runfile.tested import Wanted
 from ddenv.text import plain
 
 # Maximum time that the screen waits for a program to end, s.
@@ -47,7 +49,6 @@ class Engine:
 
     @property
     def trouble(self) -> str:
-        """The error that ended it, or ""."""
         code = None if self._process is None else self._process.poll()
         if code in (None, *GOOD_ENDS):
             return ""
@@ -84,7 +85,6 @@ class Scene:
             self.trouble = f"the scene cannot be started: {error.strerror}"
 
     def show(self, wanted: Wanted) -> None:
-        """What it shows from now on, once it is on."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._ask()
@@ -95,7 +95,7 @@ class Scene:
         # A scene that hangs must not stop the screen, and one that has ended needs nothing.
         with suppress(OSError):
             os.set_blocking(self._process.stdin.fileno(), False)
-            os.write(self._process.stdin.fileno(), written(self._wanted).encode())
+            os.write(self._process.stdin.fileno(), f"{json.dumps(reading.plain(self._wanted))}\n".encode())
 
     def wait(self) -> None:
         """Blocks until the program has printed its URL or has ended: not for the screen's thread."""
@@ -110,7 +110,6 @@ class Scene:
             self.trouble = f"the scene did not start: {last_line(log) or f'see {log}'}"
 
     def stop(self) -> None:
-        """Ends the program; nothing else depends on it."""
         process, self._process, self.url = self._process, None, ""
         if process is None:
             return
@@ -133,7 +132,6 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def last_line(log: Path) -> str:
-    """The last line of a log that is not empty."""
     try:
         lines = log.read_text(errors="replace").splitlines()
     except OSError:

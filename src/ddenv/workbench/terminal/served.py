@@ -65,7 +65,6 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
 
 
 def address_lines(port: int, token: str, font_size: int = FONT_SIZE) -> list[str]:
-    """The address, and who can use it."""
     size = "" if font_size == FONT_SIZE else f"?fontsize={font_size}"
     return [
         f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",

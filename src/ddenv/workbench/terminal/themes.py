@@ -48,25 +48,20 @@ LIGHT = Theme(
 # The terminal's own sixteen colours: for terminals that have no more, and for users who prefer them.
 ANSI = "ansi-dark"
 OURS = (DARK, LIGHT)
-# Other names for themes.
-ALIASES = {"textual-ansi": ANSI, "ansi_dark": ANSI, "ansi": ANSI, "dark": DARK.name, "light": LIGHT.name}
 
 
 def theme_names() -> tuple[str, ...]:
-    """The names of all themes, ddenv's first."""
     return (*(theme.name for theme in OURS), *sorted(BUILTIN_THEMES))
 
 
 def theme_called(name: str, where: str) -> str:
     """The theme of this `name`. Raises UserError with a message that begins with `where`."""
-    found = ALIASES.get(name, name)
-    if found in theme_names():
-        return found
+    if name in theme_names():
+        return name
     raise UserError(f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' lists them")
 
 
 def fitting(color_system: str | None) -> str:
-    """The theme for a terminal with that colour system, as Rich names it."""
     # Colours of ddenv's themes would become the nearest of sixteen, and some the same.
     return ANSI if color_system == "standard" else DARK.name
 

@@ -33,7 +33,7 @@ class Entry:
     """Something that is left out of the environment of `snapshot`: the models `gone`, which have the sign `letter` on the map.
 
     `sentence` says what happens then, `more` the rates; `parting` compares two runs with one seed, whose ways are called `ways`;
-    `rows` has these runs side by side: time, s, both places and how far apart they are. `claim` is that of a certificate.
+    `claim` is that of a certificate.
     """
 
     name: str
@@ -45,11 +45,9 @@ class Entry:
     ways: tuple[str, str]
     snapshot: Snapshot
     claim: Claim | None = None
-    rows: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
-        """All sentences, to be copied."""
         return " ".join(part for part in (self.sentence, *self.more) if part)
 
 
@@ -57,25 +55,11 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
     found = reasons(file, state) if current(state) is not None else ()
     listed = found[:LISTED]
-    letters, listed = _lettered(state, listed)
-    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed), letters)
-    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in zip(letters, listed, strict=True))
-    return (*models, *_nearest(file, state)), len(found) - len(listed)
-
-
-def _lettered(state: RunState, listed: Sequence[Reason]) -> tuple[tuple[int, ...], tuple[Reason, ...]]:
-    """The models in the order of their letters: those of the map of the run, if each is a part of its last round."""
-    of_run = {} if state.round is None else state.round.split.letter_of
-    letters = tuple(of_run.get(each.without, -1) for each in listed)
-    if len({*letters, -1}) <= len(letters):
-        return tuple(range(len(listed))), tuple(listed)
-    order = sorted(range(len(listed)), key=letters.__getitem__)
-    return tuple(letters[place] for place in order), tuple(listed[place] for place in order)
-
-
-def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
+    snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
+    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
     passing = nearest(file, state)
-    return () if passing is None else (_of_nearest(state, passing),)
+    last = () if passing is None else (_of_nearest(state, passing),)
+    return (*models, *last), len(found) - len(listed)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
@@ -98,20 +82,11 @@ def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) 
 
 def _of_nearest(state: RunState, one: Nearest) -> Entry:
     """The whole world fails, and without `gone` it passes."""
-    rows = tuple(
-        f"{each.seconds:6.1f} s   {_place(each.failing)}   {_place(each.passing)}   {each.apart:.2f} m"
-        for each in one.instants
-    )
     snapshot = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
-    return Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ("fails", "passes"), snapshot, rows=rows)
-
-
-def _place(point: tuple[float, float]) -> str:
-    return f"{point[0]:6.2f} {point[1]:6.2f}"
+    return Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ("fails", "passes"), snapshot)
 
 
 def head(width: int) -> Text:
-    """What the columns of `row` are."""
     return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
 
 
@@ -136,17 +111,11 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
         text.append(f"\n\n{plain(words)}", "not bold")
     for words in lacks:
         text.append(f"\n\n▲ {plain(words)}", "bold")
-    if one.rows:
-        text.append(f"\n\n{'time':>8}   {'fails: x, y':>13}   {'passes: x, y':>13}   apart", "dim not bold")
-        text.append("".join(f"\n{line}" for line in one.rows), "not bold")
     return text
 
 
 def head_of(state: RunState, works: bool) -> str:
-    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left.
-
-    The first comes first: a narrow screen has no room for both.
-    """
+    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left."""
     certificate = current(state)
     title = "Why it fails" if state.isolating is None else isolating(state) + ("" if works else " (stopped)")
     return title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"

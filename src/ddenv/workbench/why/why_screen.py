@@ -9,7 +9,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual import on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import OptionList, Static
@@ -24,29 +23,25 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
 from ddenv.text import plain
+from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.signs import SignsDialog
-from ddenv.workbench.map.place import Place, Way, place_of_run
+from ddenv.workbench.help.shortcuts import Reading
+from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
-from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.background import call_if_open, refuse
+from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
-from ddenv.workbench.why.margins_dialog import MarginsDialog
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
 PERIOD = 0.5
 
 
-def _ids(names: str) -> tuple[str, ...]:
-    return tuple(f"why.{name}" for name in names.split())
-
-
-SHOWN = _ids("play isolate margins copy closer farther fit signs help close")
-FIRST = _ids("help close play isolate margins copy signs closer farther fit")
+FIRST = ids("why", "help close play isolate margins copy signs closer farther fit")
 
 
 # What the key of isolation does, as the footer says.
@@ -63,7 +58,6 @@ class Look:
 
     @property
     def isolates(self) -> bool:
-        """Whether an engine is finding the nearest world that passes."""
         return self.works and self.state.isolating is not None
 
 
@@ -75,31 +69,23 @@ class WhyScreen(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low")]
     AUTO_FOCUS = "#why-list"
     BINDINGS: ClassVar = [
-        Binding(
-            "enter",
-            "play",
-            "play both runs",
-            id="why.play",
-            tooltip="play the run with the model and the one without it over each other",
-            priority=True,
+        *keys("why", ("play", "enter", "play", "play both runs", "play both runs over each other"), priority=True),
+        *keys(
+            "why",
+            (
+                "isolate",
+                "i",
+                "isolate",
+                BEGIN,
+                "find a nearest world in which the robot reaches its goal; again: stop that",
+            ),
+            ("margins", "m", "margins", "margins", "how far each number may change before f goes"),
+            ("copy", "c", "copy", "copy", "copy all sentences, or the command that is named (OSC 52)"),
+            *MAP_KEYS,
+            ("signs", "k", "app.signs", "signs", "what the signs and letters on the map mean"),
+            HELP,
+            ("close", "escape,W,q", "dismiss", "close", "back to the run", "esc"),
         ),
-        Binding(
-            "i",
-            "isolate",
-            BEGIN,
-            id="why.isolate",
-            tooltip="find the nearest world that passes, in which the robot reaches its goal; while that goes on: stop it",
-        ),
-        Binding("m", "margins", "margins", id="why.margins", tooltip="how far each number may change before f goes"),
-        Binding(
-            "c", "copy", "copy", id="why.copy", tooltip="copy all sentences, or the command that is named (OSC 52)"
-        ),
-        Binding("plus,equals_sign", "zoom(1.25)", "closer", id="why.closer", tooltip="map: closer", key_display="+"),
-        Binding("minus", "zoom(0.8)", "farther", id="why.farther", tooltip="map: farther away", key_display="-"),
-        Binding("0", "fit", "fit", id="why.fit", tooltip="map: show all that matters"),
-        Binding("k", "signs", "signs", id="why.signs", tooltip="what the signs and letters on the map mean"),
-        Binding("question_mark,f1", "app.help", "help", id="why.help", tooltip="show every key", key_display="?"),
-        Binding("escape,W,q", "close", "close", id="why.close", tooltip="back to the run", key_display="esc"),
     ]
 
     def __init__(
@@ -132,7 +118,7 @@ class WhyScreen(Screen[None]):
                 yield Static("", id="why-legend", markup=False)
         with VerticalScroll(id="why-nothing"):
             yield Static("", id="why-empty", markup=False)
-        yield KeyFooter(SHOWN, FIRST)
+        yield KeyFooter(FIRST)
         yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -141,25 +127,15 @@ class WhyScreen(Screen[None]):
         if self._place.prints:
             self._placed(self._place, "")
         else:
-            self.call_after_refresh(self._read_world)
+            read_world(self, self._file.path, self._placed)
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._list)
-
-    @work(thread=True, group="world", exclusive=True)
-    def _read_world(self) -> None:
-        try:
-            place, notice = place_of_run(self._file.path), ""
-        except UserError as error:
-            place, notice = Place(), str(error)
-        call_if_open(self, self._placed, place, notice)
 
     def _placed(self, place: Place, notice: str) -> None:
         self._place = place
         self.map.set_place(place, notice)
         self._show_entry()
-
-    # What is known.
 
     def _look(self) -> None:
         """Reads all again once there is another certificate, or another nearest world that passes."""
@@ -226,11 +202,8 @@ class WhyScreen(Screen[None]):
         options.highlighted = min(at, len(self._entries) - 1)
         self._show_entry()
 
-    # What is shown.
-
     @property
     def entry(self) -> Entry | None:
-        """What is under the cursor."""
         at = self.query_one("#why-list", OptionList).highlighted
         return self._entries[at] if at is not None and at < len(self._entries) else None
 
@@ -263,20 +236,19 @@ class WhyScreen(Screen[None]):
         ways = tuple(RobotWay(each, name).whole for each, name in zip(found, one.ways, strict=True) if each.rows)
         return (ways if len(ways) == 2 else ()), tuple(lacks)
 
-    # The keys.
-
     def action_play(self) -> None:
         one = self.entry
         if one is None or one.parting is None:
-            self._refuse(
-                "there are no two runs to play: none with the model and one without it have the same seed and other ends"
+            refuse(
+                self,
+                "there are no two runs to play: none with the model and one without it have the same seed and other ends",
             )
             return
         try:
             both = one.parting.with_test, one.parting.without_test
             self.app.push_screen(Playback(self._file, self._position, self._place, *both))
         except UserError as error:
-            self._refuse(str(error))
+            refuse(self, str(error))
 
     def action_isolate(self) -> None:
         self._ask(Stop() if self._look_at().isolates else Isolate())
@@ -288,22 +260,34 @@ class WhyScreen(Screen[None]):
         command = remedy(self._state, self._look_at().works, attach_name(self._file.path))
         lines = [one.text for one in self._entries]
         if not lines and not command:
-            self._refuse("there is nothing to copy yet")
+            refuse(self, "there is nothing to copy yet")
             return
         self.app.copy_to_clipboard("\n".join(map(plain, lines or [command])))
         self.notify("copied, if the terminal allows it", timeout=3)
 
-    def action_zoom(self, factor: float) -> None:
-        self.map.zoom(factor)
 
-    def action_fit(self) -> None:
-        self.map.fit()
+class MarginsDialog(Reading):
+    """The margins that `state` has. `run` is what a shell calls the run."""
 
-    def action_signs(self) -> None:
-        self.app.push_screen(SignsDialog())
+    BINDINGS: ClassVar = keys("margins", ("close", "escape,m,q,enter", "dismiss", "close", "close this dialog"))
 
-    def action_close(self) -> None:
-        self.dismiss(None)
-
-    def _refuse(self, why: str) -> None:
-        self.notify(plain(why), severity="warning", timeout=4, markup=False)
+    def __init__(self, state: RunState, run: str) -> None:
+        known = state.margins
+        found = () if known is None else rows(known)
+        lines = []
+        for one in found:
+            name, now, until, goal, runs = map(plain, one.cells)
+            lines += [
+                (name, bar(one.margin, 41)),
+                ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
+            ]
+        groups = [("How far each number may change before f goes", lines)]
+        if not lines:
+            groups = [
+                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number may change")])
+            ]
+        if known is not None and found:
+            groups += [
+                ("What this says", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
+            ]
+        super().__init__("Margins", groups)

@@ -54,7 +54,6 @@ class Lines(ScrollView, can_focus=True):
         return self._items
 
     def show(self, items: Sequence[Any]) -> None:
-        """Other items."""
         at_end = self.scroll_offset.y >= self.max_scroll_y
         before, self._items = self._items, items
         if not self.size.width:

@@ -31,7 +31,6 @@ class Panes(HorizontalGroup):
             yield Static(f" {title} ", id=f"pane-{pane}", classes="pane", markup=False)
 
     def mark(self, pane: str) -> None:
-        """Marks `pane` as the one that is shown."""
         for name, title in self._titles.items():
             shown = name == pane
             static = self.query_one(f"#pane-{name}", Static)

@@ -1,4 +1,4 @@
-"""A dialog that asks a question, answered by yes or no: also whether a program may start that a scenario or a run brings along."""
+"""Dialogs that ask a question: also whether a program may start that a scenario or a run brings along."""
 
 from __future__ import annotations
 
@@ -8,49 +8,73 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal
 from textual.screen import ModalScreen
 from textual.widgets import Button, Static
 
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.bindings import keys
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 
-class Question(ModalScreen[bool]):
-    """Returns True for yes. The text may contain names from files, so it is never markup."""
+class Choice(ModalScreen[str]):
+    """Returns the answer that was chosen. `answers` are the words of the buttons by answers; the first one has the focus.
 
-    CSS = """
-    Question .dialog { width: 72; }
-    Question .dialog Static { width: 100%; }
+    `text` may contain names from files, so it is never markup.
     """
-    BINDINGS: ClassVar = [
-        Binding("y", "dismiss(True)", "yes", id="question.yes", tooltip="yes, do it"),
-        Binding("n,escape", "dismiss(False)", "no", id="question.no", tooltip="no, leave everything as it is"),
-        Binding("left", "app.focus_previous", show=False, id="question.previous", tooltip="previous button"),
-        Binding("right", "app.focus_next", show=False, id="question.next", tooltip="next button"),
-    ]
 
-    def __init__(self, text: str, *, final: bool = False) -> None:
-        """With `final`, enter alone means no."""
+    BINDINGS: ClassVar = keys(
+        "choice",
+        ("previous", "left", "app.focus_previous", "", "previous button"),
+        ("next", "right", "app.focus_next", "", "next button"),
+    )
+
+    def __init__(self, title: str, hints: str, text: str, **answers: str) -> None:
         super().__init__()
-        self._text, self._final = text, final
+        self._title, self._hints, self._text, self._answers = title, hints, text, answers
 
     def compose(self) -> ComposeResult:
-        with Framed("Sure?", "y yes   n no"):
+        with Framed(self._title, self._hints):
             yield Static(Text(self._text), markup=False)
             with Horizontal(classes="buttons"):
-                yield Button("Yes", id="yes", variant="primary")
-                yield Button("No", id="no")
+                for number, (answer, words) in enumerate(self._answers.items()):
+                    yield Button(words, id=answer, variant="default" if number else "primary")
+
+    def on_button_pressed(self, event: Button.Pressed) -> None:
+        self.dismiss(event.button.id or "")
+
+    def action_answer(self, answer: str) -> None:
+        self.dismiss(answer)
+
+
+class Question(Choice):
+    """Returns "yes" or "no". With `final`, enter alone means no."""
+
+    BINDINGS: ClassVar = keys(
+        "question",
+        ("yes", "y", "answer('yes')", "yes", "yes, do it"),
+        ("no", "n,escape", "answer('no')", "no", "no, leave everything as it is"),
+    )
+
+    def __init__(self, text: str, *, final: bool = False) -> None:
+        super().__init__("Sure?", "y yes   n no", text, yes="Yes", no="No")
+        self._final = final
 
     def on_mount(self) -> None:
         self.query_one("#no" if self._final else "#yes").focus()
 
-    def on_button_pressed(self, event: Button.Pressed) -> None:
-        self.dismiss(event.button.id == "yes")
+
+def ask(app: App[Any], text: str, then: Callable[[], object]) -> None:
+    """Calls `then` after a yes."""
+
+    def answered(answer: str | None) -> None:
+        if answer == "yes":
+            then()
+
+    app.push_screen(Question(text), answered)
 
 
 def once_trusted(app: App[Any], scenario: Scenario, where: Path, then: Callable[[bool], None]) -> None:
@@ -62,9 +86,9 @@ def once_trusted(app: App[Any], scenario: Scenario, where: Path, then: Callable[
         then(True)
         return
 
-    def answered(yes: bool | None) -> None:
-        if yes:
+    def answered(answer: str | None) -> None:
+        if answer == "yes":
             trust(program)
-        then(bool(yes))
+        then(answer == "yes")
 
     app.push_screen(Question(plain(f"{where} starts {program.words}. Do you trust it?"), final=True), answered)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from io import BytesIO
-from xml.etree.ElementTree import Element, ParseError, SubElement, tostring
+from xml.etree.ElementTree import Element, SubElement, tostring
 
+from ddenv.world.access import Unusable, xml_root
 from ddenv.world.files.triangles import Part, parts_of
 
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
@@ -55,15 +56,10 @@ def read_dae(data: bytes) -> list[Part]:
 
 
 def _parse(data: bytes) -> Element:
-    from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import fromstring
-
     try:
-        root = fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
-    except ParseError as error:
-        raise ValueError(f"line {error.position[0]}: not well-formed XML") from None
-    except DefusedXmlException:
-        raise ValueError("DOCTYPE is not allowed (its entities can exhaust memory)") from None
+        root = xml_root(data)
+    except Unusable as error:
+        raise ValueError(str(error)) from None
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":

@@ -13,34 +13,26 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote
-from xml.etree import ElementTree
 
-from ddenv.world.access import Missing, Unusable, is_folder, read, reason, size_of, without_tilde
-from ddenv.world.files.meshes import MESH_LIMIT, build, origin, read_parts, unpack
+from ddenv.world.access import Missing, Unusable, is_folder, read, reason, without_tilde, xml_root
+from ddenv.world.files.meshes import build, origin, read_parts, unpack
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
 
 SDF_LIMIT = 50_000_000  # bytes of a file
-SLOW_MESH = 3_000_000  # bytes; reading a larger mesh is announced
 
 
 class Resources:
     """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from disk, if there are `folders`.
 
-    `base` is the folder of the file that contains the URI; `folders` are from `search_folders`, and `announce` gets a line before
-    slow steps. Both methods raise Missing if there is no such file, and Unusable if it cannot be used, or if its stored bytes are
-    damaged. Equal requests return the same object. Failures are kept too: a world may name one broken file a thousand times.
+    `base` is the folder of the file that contains the URI; `folders` are from `search_folders`. Both methods raise Missing if there
+    is no such file, and Unusable if it cannot be used, or if its stored bytes are damaged. Equal requests return the same object.
+    Failures are kept too: a world may name one broken file a thousand times.
     """
 
-    def __init__(
-        self,
-        taken: Mapping[str, bytes],
-        folders: Sequence[Path] | None = None,
-        announce: Callable[[str], None] | None = None,
-    ) -> None:
+    def __init__(self, taken: Mapping[str, bytes], folders: Sequence[Path] | None = None) -> None:
         self.taken = dict(taken)
         self._folders = folders
-        self._announce = announce
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._failed: dict[str, Missing | Unusable] = {}
@@ -90,19 +82,14 @@ class Resources:
 
     def _parts(self, path: Path) -> list[Part]:
         if self._last is None or self._last[0] != path:
-            size = size_of(path)
-            if self._announce is not None and SLOW_MESH < size <= MESH_LIMIT:
-                self._announce(f"reading mesh {path.name} ({size / 1e6:.0f} MB)")
             self._last = None
             self._last = (path, read_parts(path))
         return self._last[1]
 
 
-def on_disk(
-    world_folder: Path, model_path: Sequence[Path] = (), announce: Callable[[str], None] | None = None
-) -> Resources:
-    """The files beside a world and in the folders of `model_path`, Gazebo and ROS; `announce` gets a line before slow steps."""
-    return Resources({}, search_folders(model_path, world_folder), announce)
+def on_disk(world_folder: Path, model_path: Sequence[Path] = ()) -> Resources:
+    """The files beside a world and in the folders of `model_path`, Gazebo and ROS."""
+    return Resources({}, search_folders(model_path, world_folder))
 
 
 def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
@@ -245,12 +232,9 @@ def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
 
 def _package(folder: Path) -> str:
     """The name of the ROS package in `folder`; empty if it holds none."""
-    from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import fromstring
-
     try:
-        return (fromstring(read(folder / "package.xml", MODEL_CONFIG_LIMIT)).findtext("name") or "").strip()
-    except (Unusable, ElementTree.ParseError, DefusedXmlException, LookupError, ValueError):
+        return (xml_root(read(folder / "package.xml", MODEL_CONFIG_LIMIT)).findtext("name") or "").strip()
+    except Unusable:
         return ""
 
 
@@ -380,17 +364,10 @@ def model_file(folder: Path) -> Path:
 
 def _configured(text: bytes) -> str:
     """The file that a model.config names for the newest supported SDF version; empty if there is none."""
-    from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import fromstring
-
     try:
-        root = fromstring(text)
-    except ElementTree.ParseError as error:
-        raise Unusable(f"model.config:{error.position[0]}: not well-formed XML") from None
-    except DefusedXmlException:
-        raise Unusable("model.config: DOCTYPE is not allowed (its entities can read other files)") from None
-    except (LookupError, ValueError):
-        raise Unusable("model.config: cannot be decoded; save it as UTF-8") from None
+        root = xml_root(text)
+    except Unusable as error:
+        raise Unusable(f"model.config: {error}") from None
     entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]
     # `max` takes the first of two entries for one version.
     usable = [entry for entry in entries if entry[0] <= NEWEST_SDF and entry[1] and "\0" not in entry[1]]

@@ -107,7 +107,7 @@ def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[st
     length = 1.0 if box is None else float((box[1] - box[0])[:2].max())
     # Those of directives stand in files of their own.
     kept = () if is_directives(world.path) else kept
-    models = [world.model(name) for name in kept if name not in world.anchors]
+    models = [one for one in map(world.model, kept) if one.name not in world.anchors and not one.inside]
     values: list[tuple[Kind, str, float | None]] = [
         (kind, f"{model.name}.{what}", _of_model(world, model, what))
         for what, kind in OF_MODELS.items()

@@ -8,7 +8,6 @@ line and XPath. It never guesses.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -20,6 +19,7 @@ from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.inside import opened
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
 from ddenv.world.sdf.xml import complain, name_of, numbers
@@ -32,18 +32,14 @@ REFUSED = {
 }
 
 
-def read_world(path: Path, reading: Reading = PLAIN, announce: Callable[[str], None] | None = None) -> World:
-    """The world in the SDF file `path`. Raises UserError with file, line and XPath.
-
-    `announce` is called with a line of text before slow steps.
-    """
-    text = read_bytes(path)
-    return parse_world(text, path, reading, disk_of(path, reading, announce))
+def read_world(path: Path, reading: Reading = PLAIN) -> World:
+    """The world in the SDF file `path`. Raises UserError with file, line and XPath."""
+    return parse_world(read_bytes(path), path, reading)
 
 
 def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
     """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
-    context = Context(resources or disk_of(path, reading, None), reading)
+    context = Context(resources or disk_of(path, reading), reading)
     try:
         return parse_directives(text, path, context) if is_directives(path) else _world(text, path, context)
     except UserError:
@@ -54,14 +50,14 @@ def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
 
-def read_model(path: Path, reading: Reading = PLAIN, announce: Callable[[str], None] | None = None) -> Model:
+def read_model(path: Path, reading: Reading = PLAIN) -> Model:
     """The one model in the SDF or URDF file `path`, such as a robot. Raises UserError."""
-    return parse_model(read_bytes(path), path, reading, disk_of(path, reading, announce))
+    return parse_model(read_bytes(path), path, reading)
 
 
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
     """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
-    context = Context(resources or disk_of(path, reading, None), reading)
+    context = Context(resources or disk_of(path, reading), reading)
     scope = Scope(root_of(text, path, context), (path,), context)
     if len(scope.parts) != 1:
         raise UserError(f"{path}: expected one <model> inside <sdf>, found {len(scope.parts)}")
@@ -73,12 +69,12 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
 
-def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Resources:
+def disk_of(path: Path, reading: Reading) -> Resources:
     """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return on_disk(path.parent, reading.model_path, announce)
+    return on_disk(path.parent, reading.model_path)
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:
@@ -102,7 +98,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     gravity = next(
         (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None
     )
-    return World(
+    whole = World(
         path=path,
         name=world.get("name") or "",
         text=text,
@@ -113,6 +109,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         anchors=frozenset(model.name for model in models if model.name in anchors),
         resources=context.resources.taken,
     )
+    return opened(whole, root) if context.reading.inside else whole
 
 
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:

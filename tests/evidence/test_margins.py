@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.evidence.margins import MOST_OF_NUMBER, Known, Rule, margin_of
-from ddenv.reduction.margins import steps, wanted
+from ddenv.evidence.margins import MOST_OF_NUMBER, Known, Rule, margin_of, steps, wanted
 from ddenv.runfile.events import NumberAsked
 from tests.tiers import examples, slow
 

@@ -5,6 +5,12 @@ from __future__ import annotations
 from textual.binding import Binding, BindingType
 
 HELP = ("help", "question_mark,f1", "app.help", "help", "show every key", "?")
+# Of every screen with a map.
+MAP_KEYS = (
+    ("closer", "plus,equals_sign", "app.zoom(1.25)", "closer", "map: closer", "+"),
+    ("farther", "minus", "app.zoom(0.8)", "farther", "map: farther away", "-"),
+    ("fit", "0", "app.fit", "fit", "map: show all that matters"),
+)
 
 
 def keys(screen: str, *rows: tuple[str, ...], priority: bool = False) -> list[BindingType]:

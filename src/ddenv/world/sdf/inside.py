@@ -1,0 +1,105 @@
+"""Inside models (`reading.inside`): each collision of a model that never moves becomes a model of its own, such as `house/wall_12`,
+which a reduction can remove. What is written is the file's own text without these elements.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ddenv.world.model import Collision, Link, Model, Note, Shared, Visual, World, is_ground
+from ddenv.world.sdf.xml import Element, place
+
+# Elements and attributes by which others may name a link: then it stays where its last collision goes.
+NAMING = ("joint", "frame", "gripper")
+REFERENCES = ("relative_to", "attached_to", "frame", "placement_frame", "expressed_in")
+Span = tuple[int, int]
+
+
+def opened(world: World, root: Element) -> World:
+    """`world` with the collisions of its models as models; `root` is the XML of its text."""
+    at = {element.start: element for element in root.iter() if element.tag in ("model", "include")}
+    models: list[Model] = []
+    shared, notes, anchors = list(world.shared), list(world.notes), set(world.anchors)
+    for model in world.models:
+        element = at[model.spans[0][0]]
+        if len(model.collisions) < 2 or is_ground(model):
+            models.append(model)
+            continue
+        closed = _closed(model, element)
+        if closed:
+            notes.append(Note("ignored", model.name, place(element), "--inside", f"it stays whole, since {closed}"))
+            models.append(model)
+            continue
+        links = dict(_links(element))
+        parts = [part for link in model.links for part in _parts(model, link, links[link.name])]
+        models += parts
+        shared += _emptied(model, element, links, parts, model.name in anchors)
+        # Others are placed relative to the model, not to its parts.
+        anchors.discard(model.name)
+    return replace(world, models=tuple(models), shared=tuple(shared), notes=tuple(notes), anchors=frozenset(anchors))
+
+
+def _closed(model: Model, element: Element) -> str:
+    """Why a model cannot be opened; "" if it can."""
+    if not model.static:
+        return "it can move"
+    if element.tag == "include" or element.find(".//include") is not None:
+        return "other files have parts of it; 'ddenv world convert' writes them out"
+    return ""
+
+
+def _links(element: Element, prefix: str = "") -> Iterator[tuple[str, Element]]:
+    """The links in a `<model>` and in those nested in it, by the names that `Model.links` has."""
+    for child in element:
+        if child.tag == "link":
+            yield prefix + (child.get("name") or ""), child
+        elif child.tag == "model":
+            yield from _links(child, f"{prefix}{child.get('name')}::")
+
+
+def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
+    """The collisions of a link as models, each with the visuals that are nearest to it."""
+    named = {tag: {child.get("name"): child for child in element.findall(tag)} for tag in ("collision", "visual")}
+    shown: dict[int, list[Visual]] = {}
+    for visual in link.visuals if link.collisions else ():
+        gaps = [math.dist(visual.pose.position, one.pose.position) for one in link.collisions]
+        shown.setdefault(gaps.index(min(gaps)), []).append(visual)
+    for number, collision in enumerate(link.collisions):
+        visuals = tuple(shown.get(number, ()))
+        elements = [named["collision"][collision.name], *(named["visual"][visual.name] for visual in visuals)]
+        yield replace(
+            model,
+            name=_name(model, link, collision),
+            pose=collision.pose,
+            links=(replace(link, collisions=(collision,), visuals=visuals),),
+            spans=tuple((one.start, one.end) for one in elements),
+            line=elements[0].line,
+            inside=model.name,
+        )
+
+
+def _name(model: Model, link: Link, collision: Collision) -> str:
+    words = [model.name]
+    words += link.name.split("::") if len(model.links) > 1 else []
+    words += [collision.name] if len(link.collisions) > 1 or len(model.links) == 1 else []
+    return "/".join(words)
+
+
+def _emptied(
+    model: Model, element: Element, links: dict[str, Element], parts: list[Model], anchor: bool
+) -> Iterator[Shared]:
+    """The links and models that go with the last of their parts."""
+    spans: dict[Span, set[str]] = {}
+    for part in parts:
+        at: Element | None = links[part.links[0].name]
+        while at is not None and at is not element:
+            spans.setdefault((at.start, at.end), set()).add(part.name)
+            at = at.parent
+    named = any(one.tag in NAMING or any(map(one.get, REFERENCES)) for one in element.iter())
+    if not named and len(model.spans) == 1:
+        yield from (Shared(span, frozenset(names)) for span, names in spans.items())
+    if not anchor:
+        whole = frozenset(part.name for part in parts)
+        yield from (Shared(span, whole) for span in model.spans)

@@ -1,0 +1,103 @@
+"""Inside models: their collisions as models that can be removed, and the text without some of them."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.world.load import SDF
+from ddenv.world.scenario import Reading
+from ddenv.world.sdf.read import parse_world, read_world
+from ddenv.world.write import without
+
+BOX = "<geometry><box><size>1 1 1</size></box></geometry>"
+
+
+def shape(tag, name, x=0.0):
+    return f"<{tag} name='{name}'><pose>{x} 0 0 0 0 0</pose>{BOX}</{tag}>"
+
+
+def house(inside, more=""):
+    return f"<model name='house'><static>true</static>{inside}{more}</model>"
+
+
+ROOMS = (
+    f"<link name='walls'>{shape('collision', 'a', 1)}{shape('visual', 'a_shown', 1.1)}"
+    f"{shape('collision', 'b', 5)}{shape('visual', 'b_shown', 5.1)}</link>"
+    f"<model name='shed'><link name='roof'>{shape('collision', 'c', 9)}</link></model>"
+)
+DITCH = read_world(SDF / "worlds" / "ditch.sdf", Reading(inside=True))
+
+
+def test_parts_are_named_by_model_link_and_collision_and_have_the_nearest_visuals(read):
+    world = read(house(ROOMS), inside=True)
+    assert world.elements() == ("house/walls/a", "house/walls/b", "house/shed/roof")
+    assert [[one.name for one in model.links[0].visuals] for model in world.models] == [["a_shown"], ["b_shown"], []]
+    assert world.elements(frozenset({"house"})) == ()
+
+
+def test_the_parts_of_a_model_have_its_shapes_in_their_order(read):
+    (whole,), parts = read(house(ROOMS)).models, read(house(ROOMS), inside=True).models
+    assert whole.collisions == tuple(one for part in parts for one in part.collisions)
+
+
+@pytest.mark.parametrize(
+    ("removed", "left"),
+    [
+        ({"house/walls/a"}, ["collision b", "visual b_shown", "collision c"]),
+        ({"house/walls/a", "house/walls/b"}, ["collision c"]),
+        ({"house/shed/roof"}, ["collision a", "visual a_shown", "collision b", "visual b_shown"]),
+    ],
+)
+def test_links_and_nested_models_go_with_their_last_part(read, removed, left):
+    world = read(house(ROOMS), inside=True)
+    text = without(world, frozenset(removed)).decode()
+    for kind, name in (words.split() for words in ("collision a", "visual a_shown", "collision b", "collision c")):
+        assert (f"<{kind} name='{name}'>" in text) == (f"{kind} {name}" in left)
+    assert ("'walls'" in text) == any(name in ("collision a", "collision b") for name in left)
+    assert ("'shed'" in text) == ("collision c" in left)
+
+
+def test_a_model_goes_with_its_last_part(read):
+    world = read(
+        f"{house(ROOMS)}<model name='box'><link name='l'>{shape('collision', 'd')}</link></model>", inside=True
+    )
+    assert "house" not in without(world, frozenset(name for name in world.elements() if name != "box")).decode()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        "<frame name='door' attached_to='walls'/>",
+        "<joint name='j' type='fixed'><parent>walls</parent><child>shed::roof</child></joint>",
+    ],
+)
+def test_links_that_others_name_stay(read, more):
+    world = read(house(ROOMS, more), inside=True)
+    text = without(world, frozenset({"house/walls/a", "house/walls/b"}))
+    assert b"<link name='walls'></link>" in text
+    assert parse_world(text, world.path).elements() == ("house",)
+
+
+def test_models_that_others_stand_relative_to_stay_though_their_parts_go(read):
+    own = f"<link name='l'>{shape('collision', 'd')}</link>"
+    other = f"<model name='on'><pose relative_to='house'>0 0 1 0 0 0</pose><static>true</static>{own}</model>"
+    world = read(house(ROOMS) + other, inside=True)
+    text = without(world, frozenset(name for name in world.elements() if name != "on"))
+    assert parse_world(text, world.path).model("on").pose.position == (0.0, 0.0, 1.0)
+
+
+def test_what_moves_and_what_other_files_hold_stays_whole_and_is_noted(read, tmp_path):
+    (tmp_path / "hut.sdf").write_text(f"<sdf version='1.9'>{house(ROOMS).replace('house', 'hut')}</sdf>")
+    cart = f"<model name='cart'><link name='l'>{shape('collision', 'a')}{shape('collision', 'b')}</link></model>"
+    world = read(f"{cart}<include><uri>hut.sdf</uri></include>{house(ROOMS)}", inside=True)
+    assert world.elements()[:2] == ("cart", "hut")
+    whole = {note.model: note.why for note in world.notes if note.what == "--inside"}
+    assert "it can move" in whole["cart"]
+    assert "ddenv world convert" in whole["hut"]
+
+
+@given(removed=st.sets(st.sampled_from(DITCH.elements())))
+def test_what_is_left_of_a_real_world_reads_as_before(removed):
+    again = parse_world(without(DITCH, frozenset(removed)), DITCH.path)
+    left = [one for model in DITCH.models if model.name not in removed for one in model.collisions]
+    assert [one for model in again.models for one in model.collisions] == left
