@@ -16,7 +16,7 @@ from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
-from ddenv.runs.folder import attach_name
+from ddenv.runs.folder import attach_name, run_path
 from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.run.candidate_rows import Item
@@ -25,6 +25,7 @@ from ddenv.workbench.run.choose import ChooseModels, Layers, copied
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, failures, rounds
 from ddenv.workbench.run.facts import FactsDialog
 from ddenv.workbench.shared.background import is_open
+from ddenv.workbench.shared.messages import ShowRun
 
 if TYPE_CHECKING:
     from ddenv.workbench.run.run_screen import RunScreen
@@ -157,6 +158,25 @@ class Opening:
 
         world = Path(str(self._poll.snapshot.state.scenario.get("world", "")))
         self._screen.app.push_screen(ExportScreen(self._poll.path, world))
+
+    def inside(self) -> None:
+        """Begins a run inside the models that are left, and shows it."""
+        snapshot = self._poll.snapshot
+        if snapshot.engine != "absent" or not snapshot.state.ended:
+            self._asking.refuse("the search has not ended: what is left can be opened then")
+            return
+        self._screen.run_worker(self._begin_inside, group="inside", exclusive=True, thread=True)
+
+    def _begin_inside(self) -> None:
+        from ddenv.runs.creation import create_inside
+
+        path = run_path(f"{self._poll.path.stem}-inside", None, None)
+        try:
+            create_inside(self._poll.path, path)
+        except UserError as error:
+            self._screen.app.call_from_thread(self._asking.refuse, str(error))
+            return
+        self._screen.app.call_from_thread(self._screen.post_message, ShowRun(path))
 
     def method(self) -> None:
         options = settings(self._poll.snapshot.state)

@@ -27,7 +27,9 @@ FIRST = ids(
     " signs facts play rounds find layers copy scene runs",
 )
 # What comes next when the run has ended.
-ENDED = ids("run", "why isolate export play quit help leave_out history change pin without only undo find scene runs")
+ENDED = ids(
+    "run", "why isolate export play inside quit help leave_out history change pin without only undo find scene runs"
+)
 # While an earlier moment is shown, while the map has the focus, and on a screen that only watches.
 BROWSING = ids("run", "back on round_before next_round rounds facts follow help quit play signs")
 ON_MAP = ids(
@@ -77,6 +79,13 @@ KEYS: list[BindingType] = [
         "run",
         ("history", "h", "open('history')", "history", "the tree of reductions: go back, branch, compare two"),
         ("export", "E", "open('export')", "export", "the world that is left, a scenario that runs it, the report"),
+        (
+            "inside",
+            "I",
+            "open('inside')",
+            "inside",
+            "begin a run inside the models that are left: remove their single parts",
+        ),
         ("why", "W", "open('why')", "why", "why the robot fails: what happens without each model that is left"),
         HELP,
         ("quit", "q", "quit", "quit", "leave; asks whether to stop the engine"),

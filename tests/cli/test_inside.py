@@ -1,0 +1,67 @@
+"""`ddenv run --inside`, on a world and on what a run has left, and its key in the workbench."""
+
+import json
+
+import pytest
+
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.world.sdf.read import read_world
+from tests.command import ddenv, in_process, is_one_line
+from tests.workbench import fake_moments
+from tests.workbench.attached import Attached
+
+GROUND = (
+    "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal>"
+    "<size>50 50</size></plane></geometry></collision></link></model>"
+)
+PLACES = ("--spawn", "0,0,0.15,0", "--goal", "6,0", "--timeout", "12")
+
+
+def box(name, x, y):
+    return (
+        f"<collision name='{name}'><pose>{x} {y} 0.4 0 0 0</pose><geometry><box><size>0.4 0.3 0.8</size></box></geometry>"
+        "</collision>"
+    )
+
+
+def written(path, shapes, more=""):
+    yard = f"<model name='yard'><static>true</static><link name='l'>{shapes}</link></model>"
+    path.write_text(f"<sdf version='1.9'><world name='w'>{GROUND}{yard}{more}</world></sdf>")
+    return path
+
+
+@pytest.mark.slow
+def test_what_a_run_has_left_is_reduced_inside_to_the_parts_that_stop_the_robot(tmp_path):
+    """Two posts of one model, among others of it and beside a crate."""
+    others = "".join(box(f"far_{number}", 1 + number, 3) for number in range(4))
+    crate = f"<model name='crate'><static>true</static><link name='l'>{box('c', 2, -3)}</link></model>"
+    world = written(tmp_path / "yard.sdf", box("left", 2, 0.45) + box("right", 2, -0.45) + others, crate)
+    assert ddenv("run", world, *PLACES, "--output", tmp_path / "whole.ddenv").returncode == 0
+    minimal = tmp_path / "minimal.sdf"
+    done = ddenv("run", tmp_path / "whole.ddenv", "--inside", "--output", tmp_path / "inside.ddenv", "--json")
+    assert json.loads(done.stdout)["environment"] == ["yard/left", "yard/right"]
+    scenario = tmp_path / "minimal.yaml"
+    assert ddenv("export", tmp_path / "inside.ddenv", "--output", minimal, "--scenario", scenario).returncode == 0
+    assert [len(model.collisions) for model in read_world(minimal).models] == [1, 2]
+    runs = ddenv("test", scenario, "--runs", 2, "--json")
+    assert {each["outcome"] for each in json.loads(runs.stdout)["runs"]} == {"failed"}, runs.stdout
+    is_one_line(ddenv("run", tmp_path / "inside.ddenv", "--inside"), "inside models already")
+
+
+def test_a_world_without_models_that_have_parts_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    world = written(tmp_path / "yard.sdf", box("only", 2, 0))
+    done = in_process(monkeypatch, capsys, "run", world, *PLACES, "--inside", "--output", tmp_path / "run.ddenv")
+    is_one_line(done, "no model has parts that can be removed")
+    assert not (tmp_path / "run.ddenv").exists()
+
+
+async def test_a_key_begins_a_run_inside_what_is_left(run, home):
+    """The models of the world are single boxes: that is said in the line of messages, and no file is written."""
+    fake_moments.finished(run)
+    async with Attached(run) as session:
+        await session.press("I")
+        await session.app.workers.wait_for_complete()
+        await session.look()
+        assert "no model has parts that can be removed" in session.said()
+        assert isinstance(session.app.screen, RunScreen)
+        assert not list(home.glob("**/*-inside*"))
