@@ -24,7 +24,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
-from ddenv.engine.worker import Start
+from ddenv.engine.worker import Run, Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.store import RunFile
@@ -56,10 +56,10 @@ class Simulated:
     def busy(self) -> int:
         return len(self.running)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
-        takes = duration(keep, seed)
+    def submit(self, test: int, run: Run) -> None:
+        takes = duration(run.keep, run.seed)
         self.made, self.busy_for = self.made + 1, self.busy_for + takes
-        heapq.heappush(self.running, (self.clock + takes, test, self.needed <= keep, seed))
+        heapq.heappush(self.running, (self.clock + takes, test, self.needed <= run.keep, run.seed))
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult]]:
         if not self.running:

@@ -49,7 +49,7 @@ def hostile_run(scenes: list[Path], path: Path, seed: int) -> Path:
     shutil.copy(chance.choice(scenes), path)
     with sqlite3.connect(path) as database:
         for _ in range(chance.choice((1, 1, 1, 2, 5))):
-            chance.choice((_event, _event, _event, _scenario, _scenario, _samples, _live, _world, _time))(
+            chance.choice((_event, _event, _event, _order, _scenario, _scenario, _samples, _live, _world, _time))(
                 database, chance
             )
     database.close()
@@ -90,6 +90,16 @@ def _event(database: sqlite3.Connection, chance: random.Random) -> None:
     data = json.loads(text)
     _put(data, chance)
     database.execute("UPDATE event SET data = ? WHERE id = ?", (json.dumps(data), id))
+
+
+def _order(database: sqlite3.Connection, chance: random.Random) -> None:
+    """An event is lost, or stands where another one stood."""
+    rows = database.execute("SELECT id, kind, data FROM event WHERE id > 1").fetchall()
+    (at, kind, data), (other, *_) = chance.sample(rows, 2)
+    if chance.random() < 0.5:
+        database.execute("DELETE FROM event WHERE id = ?", (at,))
+    else:
+        database.execute("UPDATE event SET kind = ?, data = ? WHERE id = ?", (kind, data, other))
 
 
 def _scenario(database: sqlite3.Connection, chance: random.Random) -> None:

@@ -14,8 +14,6 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
 from ddenv.text import printable
 from ddenv.words.news import headline
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.config import Config
 from ddenv.workbench.line_mode import LineMode
 from tests.command import in_process
 from tests.workbench import fake_moments, fake_run
@@ -108,15 +106,3 @@ def test_no_line_steers_the_terminal(evil):
     typed = iter(["help", "status", "why", "models", "table", f"try {ESCAPES}", "quit"])
     LineMode(evil, True, out).follow(typed)
     assert "evil" in out.getvalue() and not STEERS.search(out.getvalue()), ascii(out.getvalue())
-
-
-async def test_nothing_that_is_drawn_steers_the_terminal(evil):
-    async with Workbench(evil, config=Config()).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
-        for key in ("question_mark", "escape"):
-            await pilot.press(key)
-            await pilot.pause()
-            lines = pilot.app.screen._compositor.render_strips()
-            drawn = "".join(segment.text for line in lines for segment in line)
-            assert drawn.strip() and not STEERS.search(drawn), ascii(drawn)
-        assert "evil" in drawn

@@ -107,6 +107,7 @@ async def test_the_workbench_stands(hostile, batch):
         raise AssertionError(f"run {now}") from error
 
 
+@pytest.mark.fuzz
 @pytest.mark.parametrize("batch", BATCHES)
 async def test_races_stand(hostile, batch):
     size = (120, 36) if batch % 2 else (80, 24)

@@ -183,6 +183,7 @@ BREAK_THEIR_WORD = {
 }
 
 
+@pytest.mark.programs
 def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin):
     done = plugin(
         "import ddenv\n"

@@ -37,7 +37,11 @@ def test_it_is_in_the_scenario_and_its_schema(one):
     found = definitions[section]["properties"][one.name]
     assert found["default"] == one.default
     assert found["description"] == one.summary
-    assert read(scenario().model_dump(mode="json"), one) == one.default or one.name in ("timeout", "epsilon")
+    assert read(scenario().model_dump(mode="json"), one) == one.default or one.name in (
+        "timeout",
+        "epsilon",
+        "time_step",
+    )
 
 
 @EVERY
@@ -143,36 +147,6 @@ def test_it_is_switched_on_and_off_and_leaves_other_variants_alone():
     assert read(data, one) is True
     put(data, one, False)
     assert data == scenario().model_dump(mode="json")
-
-
-# The section `reduction` of run files that were written when these were the defaults.
-EARLIER = {
-    "algorithm": "ddenv",
-    "pair": "model2model/avg-trajectory-proximal",
-    "n_partitions": 2,
-    "iterations": 3,
-    "candidates": "both",
-    "complement_order": "paper",
-    "growth": "paper",
-    "skip": "known",
-    "delta": 0.5,
-    "prior": "spatial",
-    "seed": 0,
-    "baseline_runs": 10,
-    "budget": None,
-}
-
-
-@pytest.mark.parametrize("changed", [{}, {"growth": "steady", "complement_order": "far-first"}], ids=str)
-def test_an_earlier_run_keeps_its_settings(changed):
-    from ddenv.runfile.run_settings import Settings
-
-    data = load_scenario(DATA / "wall.yaml").model_dump(mode="json") | {"reduction": EARLIER | changed}
-    resumed = Scenario.model_validate_json(json.dumps(data))
-    # A setting that was added since then has its default.
-    now = resumed.model_dump(mode="json")["reduction"]
-    assert {name: now[name] for name in EARLIER} == EARLIER | changed
-    assert Settings(data).growth == (EARLIER | changed)["growth"]
 
 
 def test_what_is_damaged_has_its_default():

@@ -65,10 +65,7 @@ def test_files_without_a_certificate_claim_nothing(run):
     assert "f in 1 of 1 here, 3 of 4 in the whole world; no fresh runs were made" in lines
 
 
-def test_an_engine_makes_at_least_so_many_runs(run, monkeypatch, capsys):
-    started = []
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: started.append((*words, more)))
-    monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, None))
+def test_an_engine_makes_at_least_so_many_runs(run, started, monkeypatch, capsys):
     fake_moments.finished(run)
     in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
     in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)

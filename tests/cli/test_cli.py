@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,6 @@ from mcap_ros2.decoder import DecoderFactory
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
-from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
 from ddenv.schemas import names
 from ddenv.words.claims import shown
@@ -132,16 +132,18 @@ def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
     assert "certificate 1: fresh runs of what is left (2 models)" in done.stderr
 
 
-def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(reduced):
-    folder, _ = reduced
-    (folder / "runs" / "broken.ddenv").write_text("no run file")
-    done = ddenv("runs", env=os.environ | {"DDENV_HOME": str(folder)})
+def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(home, reduced, monkeypatch, capsys):
+    (home / "runs").mkdir()
+    shutil.copy(reduced[1]["run_file"], home / "runs")
+    (home / "runs" / "broken.ddenv").write_text("no run file")
+    done = in_process(monkeypatch, capsys, "runs")
     assert done.returncode == 0
     assert "wall-1" in done.stdout
     assert "2 of 6 models" in done.stdout
     assert "is not a ddenv run file" in done.stdout
 
 
+@pytest.mark.programs
 def test_a_finished_run_resumes_to_its_summary(reduced):
     _, summary = reduced
     done = ddenv("resume", summary["run_file"], "--json")
@@ -225,11 +227,11 @@ def _finished(run):
         return [(test.environment, test.run) for test in fold(file.events()).finished_tests]
 
 
-def test_a_second_engine_is_refused(reduced, tmp_path):
+def test_a_second_engine_is_refused(reduced, tmp_path, monkeypatch, capsys):
     # Another process may be looking at the run that all share.
     run = Path(shutil.copy(reduced[1]["run_file"], tmp_path))
     with engine_lock(run):
-        is_one_line(ddenv("resume", run), "another engine is working on this run")
+        is_one_line(in_process(monkeypatch, capsys, "resume", run), "another engine is working on this run")
 
 
 MISTAKES = {
@@ -302,12 +304,11 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, w
     assert list(home.rglob("*")) == []
 
 
-def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
+@pytest.mark.usefixtures("started")
+def test_options_on_the_reduction_reach_the_run(home):
     from ddenv.cli.command_line import app
     from ddenv.runs.subject import read_parts, with_options
 
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_: None)
-    monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, RunState()))
     options = {
         "pair": "trajectoryseg/timestep",
         "algorithm": "probdd",
@@ -330,8 +331,6 @@ def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
 
 @pytest.mark.programs
 def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home, reduced):
-    import sqlite3
-
     run = shutil.copy(reduced[1]["run_file"], home / "broken.ddenv")
     with sqlite3.connect(run) as database:
         database.execute("UPDATE document SET content = x'7b7d' WHERE name = 'scenario'")
@@ -364,24 +363,22 @@ def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
     assert summary["run_file"] == str(home / "in" / "---esc-1.ddenv")
 
 
-def test_a_malformed_world_is_told_with_its_line(home):
+def test_a_malformed_world_is_told_with_its_line(home, monkeypatch, capsys):
     data = yaml.safe_load((DATA / "wall.yaml").read_text())
     (home / "w.sdf").write_text("<sdf version='1.9'>\n<world name='w'>\n<model name='m'>\n</world></sdf>")
     data["world"] = "w.sdf"
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
-    is_one_line(ddenv("run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
+    is_one_line(in_process(monkeypatch, capsys, "run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
 
 
-def test_a_newer_run_file_is_refused(reduced, tmp_path):
-    import sqlite3
-
+def test_a_newer_run_file_is_refused(reduced, tmp_path, monkeypatch, capsys):
     copy = tmp_path / "newer.ddenv"
     copy.write_bytes(Path(reduced[1]["run_file"]).read_bytes())
     with sqlite3.connect(copy) as database:
         database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
     for command in ("open", "resume", "test"):
-        is_one_line(ddenv(command, copy), "written by a newer ddenv")
+        is_one_line(in_process(monkeypatch, capsys, command, copy), "written by a newer ddenv")
 
 
 @pytest.mark.parametrize(

@@ -15,15 +15,6 @@ from tests.workbench import fake_moments, fake_run
 EXAMPLE = ROOT / "docs/examples/any_simulator"
 
 
-@pytest.fixture
-def started(monkeypatch):
-    """The engines that were asked for; none starts."""
-    asked = []
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: asked.append((*words, more)))
-    monkeypatch.setattr("ddenv.cli.follow.follow", lambda *_: None)
-    return asked
-
-
 def test_what_is_known_is_said_without_a_test(run, started, monkeypatch, capsys):
     fake_moments.isolated(run)
     done = in_process(monkeypatch, capsys, "isolate", run.path)

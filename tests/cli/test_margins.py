@@ -28,15 +28,6 @@ FIX = (
 )
 
 
-@pytest.fixture
-def started(monkeypatch):
-    """The engines that were asked for; none starts."""
-    asked = []
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: asked.append((*words, more)))
-    monkeypatch.setattr("ddenv.cli.follow.follow", lambda *_: None)
-    return asked
-
-
 def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch, capsys, tmp_path):
     fake_moments.with_margins(run)
     done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_0*", "--jobs", 1)

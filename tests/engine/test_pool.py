@@ -114,6 +114,7 @@ def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(p
     assert (test, after.outcome) == (2, "failed")
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("pool", [2], indirect=True)
 def test_an_exception_in_a_worker_is_an_error_of_its_test_and_another_worker_goes_on(pool):
     for test in (1, 2):
@@ -228,6 +229,7 @@ def test_progress_is_seen_while_a_test_runs(pool):
     assert pool.live() == []
 
 
+@pytest.mark.programs
 def test_a_worker_finds_what_rests_on_what(tmp_path):
     scenario, world, robot = parts()
     text = (DATA / "wall.sdf").read_text()
@@ -251,6 +253,7 @@ def test_a_worker_finds_what_rests_on_what(tmp_path):
         pool.close()
 
 
+@pytest.mark.programs
 def test_a_world_that_cannot_be_simulated_is_told():
     scenario, world, robot = parts()
     legless = robot.__class__(robot.name, robot.pose, robot.static, robot.links, (), robot.spans, robot.line)

@@ -78,11 +78,12 @@ def test_with_other_bits_no_test_is_made_until_the_user_has_chosen(begun, monkey
     before = state_of(begun).tests
     # A second engine does not trust the first one, which was refused.
     for _ in range(2):
-        with pytest.raises(UserError, match="gives another trajectory: the tests were made with drake") as refused:
+        with pytest.raises(
+            UserError, match=r"gives another trajectory: the tests were made with ddenv .*drake"
+        ) as refused:
             resumed(begun)
         assert f"'ddenv resume {begun} --mixed'" in str(refused.value) and "\n" not in str(refused.value)
-        assert "this is drake 0.9, numpy 0.9, scipy 0.9;" in str(refused.value)
-        assert "Python" not in str(refused.value)
+        assert ", drake 0.9, numpy 0.9, scipy 0.9, Python" in str(refused.value)
     assert [test.outcome for test in state_of(begun).tests if test.is_finished] == [
         test.outcome for test in before if test.is_finished
     ]
@@ -96,9 +97,9 @@ def test_mixed_it_goes_on_and_says_so(begun, monkeypatch, tmp_path):
     made, state = resumed(begun, kill=False)
     assert FIRST not in made and state.status == "finished"
     (mixed,) = state.physics.mixed
-    assert "then drake 0.9, numpy 0.9, scipy 0.9" in mixed
+    assert ", drake 0.9, numpy 0.9, scipy 0.9" in mixed.partition(", then ")[2]
     write_report(begun, report := tmp_path / "report.md")
-    assert "Mixed tests." in report.read_text() and "then drake 0.9" in report.read_text()
+    assert "Mixed tests." in report.read_text() and ", drake 0.9" in report.read_text()
 
 
 def test_where_the_first_run_breaks_now_it_says_why(begun, monkeypatch):
@@ -141,7 +142,7 @@ def test_the_command_offers_to_go_on_or_to_make_all_tests_again(home):
         )
     refused = ddenv("resume", run)
     assert refused.returncode == 2 and refused.stderr.count("\n") == 1
-    assert "the tests were made with drake 0." in refused.stderr
+    assert ", drake 0." in refused.stderr
     assert "give one of them" in ddenv("resume", run, "--mixed", "--again").stderr
     mixed = ddenv("resume", run, "--mixed")
     assert mixed.returncode == 1, mixed.stderr

@@ -1,20 +1,14 @@
 """Which seed a run has: unlike those of its neighbours, the same for all candidates, and in old files as it was there."""
 
-import sqlite3
-from contextlib import suppress
-
 import pytest
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.single_test import plan
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_like
 from ddenv.runs.subject import open_subject, read_subject
 from ddenv.world.scenario import Reduction, seed_of
-from tests.command import ddenv
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
-from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs
 from tests.engine.reading import state_of
 
@@ -47,37 +41,6 @@ def test_each_run_has_its_own_seed_which_all_environments_share(tmp_path, seeds)
     assert {(test.run, test.seed) for test in state.tests} == set(by_run.items())
     assert len(set(by_run.values())) == len(by_run)
     assert (seeds == "consecutive") == ({seed - run for run, seed in by_run.items()} == {40})
-
-
-def before_there_was_a_choice(path):
-    """Takes the setting out of a run file."""
-    with sqlite3.connect(path) as db:
-        ((document,), (event,)) = (
-            db.execute(query).fetchone()
-            for query in ("SELECT content FROM document WHERE name = 'scenario'", "SELECT data FROM event WHERE id = 1")
-        )
-        key = '"seeds":"consecutive",'
-        assert key.encode() in document and key in event
-        db.execute("UPDATE document SET content = ? WHERE name = 'scenario'", (document.replace(key.encode(), b""),))
-        db.execute("UPDATE event SET data = ? WHERE id = 1", (event.replace(key, ""),))
-
-
-def test_a_run_from_before_there_was_a_choice_goes_on_with_consecutive_seeds(tmp_path):
-    path = new_run(tmp_path, seed=40)
-    with suppress(Killed):
-        drive(path, FakePool(needs("wall"), 1), prepare=lambda file: kill_after(file, 30))
-    before_there_was_a_choice(path)
-    begun = len(state_of(path).tests)
-    state = drive(path, FakePool(needs("wall"), 1))
-    assert len(state.tests) > begun
-    assert {test.seed - test.run for test in state.tests} == {40}
-    with RunFile(path) as file:
-        subject = read_subject(file)
-    assert [trial.seed for trial in plan(subject, repeat=3)] == [40, 41, 42]
-    create_like(path, subject.scenario, again := tmp_path / "again.ddenv")
-    assert state_of(again).scenario["reduction"]["seeds"] == "consecutive"
-    assert ddenv("report", path, "-o", tmp_path / "page.html").returncode == 0
-    assert "consecutive" in (tmp_path / "page.html").read_text()
 
 
 @RULES

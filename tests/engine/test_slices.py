@@ -79,6 +79,7 @@ METHODS = [{}, {"algorithm": "splitting"}, {"pair": "model2model/timestep"}, {"p
 HALF = Participation(salt=40, needed=(MODELS[18], MODELS[3], MODELS[7]), tenths=6)
 
 
+@pytest.mark.fuzz
 @given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), method=st.sampled_from(METHODS))
 # What a run has in view beside what took part in it is otherwise where it is simulated again.
 @example(made_by=HALF, jobs=3, seed=0, method=METHODS[2])

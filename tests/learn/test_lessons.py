@@ -198,6 +198,7 @@ def test_a_recorded_run_came_to_its_end_and_a_reader_writes_nothing_beside_it(ru
     assert run.read_bytes()[18:20] == b"\x01\x01"
 
 
+@pytest.mark.programs
 def test_lessons_and_runs_need_neither_drake_nor_what_windows_lacks(tmp_path):
     code = """
 import sys, asyncio

@@ -1,6 +1,7 @@
 """The reduction as a function, without Drake."""
 
 import tomllib
+from functools import cache
 from itertools import pairwise
 from math import comb
 from zlib import crc32
@@ -87,8 +88,8 @@ def test_a_failure_that_shows_in_four_of_five_runs_is_never_lost_and_minimal_is_
 
 
 def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs():
-    ends = [ddenv.reduce(ELEMENTS, four_of_five(salt), iterations=12, **ALL).kept for salt in range(40)]
-    assert ends.count(("b", "g")) >= 38
+    ends = [ddenv.reduce(ELEMENTS, four_of_five(salt), iterations=12, **ALL).kept for salt in range(12)]
+    assert ends.count(("b", "g")) >= 11
 
 
 @pytest.mark.parametrize("options", [{}, {"iterations": 3}, {"iterations": 3, "accept_rate": "first"}])
@@ -130,6 +131,7 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
         assert claim.low <= claim.shown / claim.runs <= claim.high
 
 
+@cache
 def stepping_back(salt):
     """A reduction that drifts: what is found, its rounds, and the environments to which it went back."""
     rounds, options = [], {"skip": "known", "accept_rate": "kept"}

@@ -21,6 +21,7 @@ from ddenv.reduction.prioritizations import (
 from ddenv.reduction.round import make_round
 from ddenv.schemas import names
 from tests.reduction.worlds import evidence
+from tests.tiers import slow
 
 STILL = np.array([[0.0, 0, 0, 0, 0]])
 
@@ -58,15 +59,6 @@ def test_timeseg_measures_to_the_path_and_not_only_to_its_samples():
 def test_of_two_times_at_one_place_the_first_counts():
     path = np.array([[0.0, 0, 0], [5, 0, 0], [0, 0, 0]])
     assert nearest_on_path(np.array([[1.0, 1, 0]]), np.arange(3.0), path)[1] == pytest.approx([0.2])
-
-
-def test_many_models_are_measured_as_few():
-    rng = np.random.default_rng(1)
-    places, path, times = rng.normal(size=(700, 3)), rng.normal(size=(30, 3)), np.arange(30.0)
-    whole = nearest_on_path(places, times, path)
-    alone = [nearest_on_path(places[index : index + 1], times, path) for index in range(len(places))]
-    assert whole[0] == pytest.approx(np.concatenate([distance for distance, _ in alone]))
-    assert whole[1] == pytest.approx(np.concatenate([moment for _, moment in alone]))
 
 
 @pytest.mark.parametrize("split", [timeseg, trajectoryseg])
@@ -109,7 +101,7 @@ def test_trajectoryseg_groups_models_by_manoeuvre():
 
 
 @pytest.mark.parametrize("partitioning", names("partitioning"))
-@pytest.mark.parametrize("n", [2, 60, 700, 4999])
+@pytest.mark.parametrize("n", slow(pytest.mark.rates, [2, 60, 700, 4999], but=[60]))
 def test_five_thousand_models_are_split_in_the_end(partitioning, n):
     """Not a timing, but a second more than planning takes in earnest would show here."""
     facts = evidence(5000, 1)

@@ -6,7 +6,7 @@ import runpy
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -52,12 +52,16 @@ def of_each(*quick: str) -> pytest.MarkDecorator:
 
 @dataclass(frozen=True)
 class Part:
-    """A scenario with its world in the simulator."""
+    """A scenario with its world."""
 
     scenario: Scenario
     world: World
     robot: Model
-    template: Template
+
+    @cached_property
+    def template(self) -> Template:
+        """The world in the simulator."""
+        return Template(self.world, self.robot, self.scenario)
 
     @property
     def everything(self) -> frozenset[str]:
@@ -67,8 +71,7 @@ class Part:
 @cache
 def part(name: str) -> Part:
     scenario = load_scenario(SCENARIOS / f"{name}.yaml")
-    world, robot = load_parts(scenario)
-    return Part(scenario, world, robot, Template(world, robot, scenario))
+    return Part(scenario, *load_parts(scenario))
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ import json
 import tracemalloc
 from collections.abc import Iterator
 from dataclasses import fields
-from itertools import pairwise
 from unittest.mock import patch
 
 import pytest
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply, fold
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import OUTCOMES, RunState
 from ddenv.runfile.store import Recorded, recorded
 from tests.shorthand import story, typed
@@ -98,18 +96,6 @@ def test_a_part_keeps_its_letter_from_round_to_round():
     ]
 
 
-def test_candidates_are_equal_if_they_and_their_rounds_environment_are():
-    one, same, other = (
-        state_after(round_event([[0], [1]], environment)).round.candidates
-        for environment in ([0, 1, 2], [0, 1, 2], [0, 1, 3])
-    )
-    assert one == same
-    assert hash(one[1]) == hash(same[1])
-    assert one[1] != other[1]
-    assert one[0] != one[2]
-    assert "box" not in repr(one[1])
-
-
 def test_a_round_of_many_one_model_partitions_is_small():
     """The names of all 4,000 candidates, half of them of 1,999 models, would take 32 MB."""
     before = state_after(names=[str(number) for number in range(2000)])
@@ -121,19 +107,6 @@ def test_a_round_of_many_one_model_partitions_is_small():
         assert tracemalloc.get_traced_memory()[1] < 4e6
     finally:
         tracemalloc.stop()
-
-
-def test_a_verdict_copies_a_small_part_of_the_candidates():
-    before = state_after(
-        round_event([[number] for number in range(2000)], range(2000)), names=[str(number) for number in range(2000)]
-    )
-    after = with_event(before, "candidate_judged", candidate=1234, verdict="similar", tests=[], known=0)
-    shared = [
-        one is other for one, other in zip(before.round.candidates.chunks, after.round.candidates.chunks, strict=True)
-    ]
-    assert shared.count(False) == 1
-    assert after.round.split is before.round.split
-    assert [one.index for one in after.round.candidates.changed_since(before.round.candidates)] == [1234]
 
 
 @pytest.mark.parametrize("test", [0, 1, 10**14])
@@ -222,21 +195,6 @@ def test_the_tests_of_the_last_certificate_are_found_whenever_they_were_made(ste
     assert state.confirm_tests == tuple(one for one in state.tests if one.phase == "certify" and one.run >= first)
 
 
-def test_the_tests_of_a_certificate_are_found_without_a_look_at_all_others():
-    state = state_after(
-        *(started(test) for test in range(1, 5)), ("test_started", {**started(5)[1], "phase": "certify"})
-    )
-    looked = []
-
-    class Looked(PersistentTuple):
-        def __getitem__(self, index):
-            looked.append(index)
-            return state.tests[index]
-
-    assert [test.id for test in state.changed(tests=Looked.of(())).confirm_tests] == [5]
-    assert looked == [4]
-
-
 def test_an_outcome_that_nobody_knows_is_told():
     with pytest.raises(UserError, match=r"outcome: should be 'similar', .*, found 'splendid'"):
         read_back((started()[0], started()[1] | {"environment": 0}), finished(outcome="splendid"))
@@ -250,16 +208,6 @@ def test_baseline_runs_count_as_what_they_turned_out_to_be():
     state = with_event(state, "baseline_finished", **told, **more)
     assert state.outcomes() == dict.fromkeys(OUTCOMES, 0) | {"pass": 1, "similar": 1}
     assert state.history[-1].tests == state.tests_done == 2
-
-
-def test_an_event_of_a_test_copies_a_small_part_of_the_tests():
-    states = [state_after(*(started(number + 1) for number in range(2000)))]
-    states.append(with_event(states[-1], "test_finished", **finished(700)[1]))
-    states.append(with_event(states[-1], "test_lost", test=5))
-    states.append(with_event(states[-1], "test_started", **started(2001)[1]))
-    for before, after in pairwise(states):
-        shared = [one is other for one, other in zip(before.tests.chunks, after.tests.chunks, strict=True)]
-        assert shared.count(False) == 1
 
 
 # Whole runs.

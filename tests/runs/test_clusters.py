@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.runs import clusters
+from ddenv.runs import trust
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import how_to_install
 from ddenv.runs.subject import with_options
@@ -21,7 +21,7 @@ def at(cluster):
     "cluster", ["here", "tcp://head:8786", "tls://10.0.0.1:1", "tcp://[::1]:8786", "ssh:a,b.org", __file__]
 )
 def test_a_cluster_is_an_address_a_file_or_hosts(cluster):
-    clusters.check_cluster(cluster)
+    trust.check_cluster(cluster)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_anything_else_is_refused_in_a_line_and_nothing_is_written(cluster, tmp_
 
 
 def test_without_dask_a_line_says_what_to_install(monkeypatch, capsys, home):
-    monkeypatch.setattr(clusters, "find_spec", lambda name: None)
+    monkeypatch.setattr(trust, "find_spec", lambda name: None)
     said = in_process(monkeypatch, capsys, "run", DATA / "wall.yaml", "--cluster", "tcp://head:8786")
     assert said.returncode == 2
     assert said.stderr.splitlines()[-1].endswith(f"Dask is not installed here: {how_to_install('cluster')}")

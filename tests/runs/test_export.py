@@ -17,6 +17,7 @@ from ddenv.world.load import load_scenario
 from ddenv.world.scenario import PLAIN
 from tests.conftest import ROOT
 from tests.shorthand import Writing
+from tests.tiers import slow
 from tests.waiting import PATIENCE
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -208,8 +209,9 @@ PARTS = {
 }
 
 
-@pytest.mark.parametrize(("models", "keep"), PARTS.values(), ids=PARTS)
-def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(tmp_path, folder, monkeypatch, models, keep):
+@pytest.mark.parametrize("parts", slow(pytest.mark.rates, PARTS, but=["a far one is gone"]))
+def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(tmp_path, folder, monkeypatch, parts):
+    models, keep = PARTS[parts]
     # How a ball rolls is found out for so long, shared by all of them.
     monkeypatch.setattr(rehearsal, "BUDGET", 5.0)
     run = run_of(tmp_path, models, keep=keep)

@@ -7,7 +7,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.nearest import nearest, removed_in_passing
+from ddenv.runs.reasons import nearest, removed_in_passing
 from tests.workbench import fake_moments
 
 

@@ -19,7 +19,6 @@ from textual.widgets import OptionList, Static
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help, commands, groups
-from ddenv.workbench.runs.runs_screen import RunsScreen
 from tests.waiting import PATIENCE, eventually
 
 
@@ -103,20 +102,6 @@ async def test_footer_help_and_commands_offer_only_what_can_be_done_now(run):
         own = next(group for group in groups(screen) if group.title == "This screen")
         assert [(each.id, each.enabled) for each in own.shortcuts] == [("choosy.now", True), ("choosy.later", False)]
         assert [each.id for each in commands(screen) if each.id.startswith("choosy")] == ["choosy.now"]
-
-
-@pytest.mark.parametrize("theme", ["ddenv-light", "ansi-dark"])
-async def test_every_theme_can_be_worn(run, theme):
-    fake_moments.mid_round(run)
-    async with Workbench(run.path, config=Config(theme=theme)).run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
-        pilot.app.action_help()
-        await pilot.pause()
-        await pilot.press("escape")
-        pilot.app.action_runs()
-        await pilot.pause()
-        assert isinstance(pilot.app.screen, RunsScreen)
-        await pilot.app.workers.wait_for_complete()
 
 
 def test_serving_is_for_this_machine_alone(runs):

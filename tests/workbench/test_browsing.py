@@ -11,17 +11,17 @@ from textual.widgets import OptionList
 from ddenv.runfile.reading import Invalid, read
 from ddenv.runfile.tested import Wanted
 from ddenv.words.signs import CLAIM, OUTCOME, STATUS, VERDICT
-from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.signs import SignsDialog, signs
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.facts import FactsDialog
 from ddenv.workbench.widgets.lines import Lines
+from tests.tiers import slow
 from tests.waiting import eventually
 
 
-@pytest.mark.parametrize("watch", [False, True])
+@pytest.mark.parametrize("watch", slow(pytest.mark.screens, [False, True], but=[True]))
 async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run, watch):
     fake_moments.finished(run)
     async with Attached(run, watch=watch) as session:
@@ -45,6 +45,7 @@ async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run,
         assert session.screen.snapshot is session.screen.poll.snapshot
 
 
+@pytest.mark.screens
 async def test_the_log_ends_with_the_moment_that_is_shown(run):
     fake_moments.finished(run).hold()
     async with Attached(run, size=(200, 60)) as session:
@@ -57,16 +58,6 @@ async def test_the_log_ends_with_the_moment_that_is_shown(run):
         assert "reduced to 2 models" not in log.items[-1].words
         await session.press("escape")
         assert log.items == whole
-
-
-async def test_the_log_has_all_lines_of_a_long_run(run):
-    fake_moments.finished(run)
-    for _ in range(1050):
-        run.write("paused")
-        run.write("resumed")
-    async with Attached(run) as session:
-        log = session.screen.query_one("#log", Lines)
-        assert len(log.items) > 2100 and "engine started" in log.items[0].words
 
 
 async def test_the_moment_stays_while_the_run_goes_on_and_the_last_step_comes_back_to_it(run):
@@ -88,6 +79,7 @@ async def test_the_moment_stays_while_the_run_goes_on_and_the_last_step_comes_ba
         assert "there is no reduction before this moment" in session.said()
 
 
+@pytest.mark.screens
 async def test_b_lists_the_rounds_and_goes_to_the_end_of_one(run):
     fake_moments.finished(run)
     async with Attached(run, size=(80, 24)) as session:
@@ -131,21 +123,6 @@ async def test_every_sign_has_its_meaning_one_key_away(run):
     async with Attached(run, size=(80, 24)) as session:
         await session.press("k")
         assert isinstance(session.app.screen, SignsDialog)
-
-
-async def test_the_footer_has_the_keys_of_what_has_the_focus(run):
-    fake_moments.guided(run).hold()
-    async with Attached(run) as session:
-        footer = session.screen.query_one(KeyFooter)
-        shown = lambda: [entry.words for entry in footer.entries]  # noqa: E731
-        assert "pause" in shown()
-        assert "next model" not in shown()
-        await session.press("1")
-        await eventually(lambda: "next model" in shown())
-        await session.press("comma")
-        await eventually(lambda: "round before" in shown())
-        await session.press("escape", "2")
-        await eventually(lambda: "history" in shown())
 
 
 async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch, tmp_path):

@@ -11,7 +11,6 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Split, Trial
-from ddenv.workbench.run import candidates as module
 from ddenv.workbench.run.candidate_rows import COLUMNS, fitting, listed, words
 from ddenv.workbench.run.candidates import Candidates
 
@@ -220,15 +219,6 @@ async def test_what_is_looked_at_stays_where_it_is():
         await pilot.pause()
         assert app.lines()[1].startswith("501")
         assert table.under_cursor.index == 9_999
-
-
-async def test_of_many_rows_only_those_in_sight_are_made_into_text(monkeypatch):
-    made = []
-    monkeypatch.setattr(module, "words", lambda *args: made.append(args[2]) or words(*args))
-    async with (app := Table()).run_test(size=(60, 11)) as pilot:
-        app.table.show(large(10_000))
-        await pilot.pause()
-        assert set(made) == set(range(10))
 
 
 async def test_vetoed_rows_and_the_cursor_are_seen_without_colours(run, monkeypatch):

@@ -76,6 +76,7 @@ def test_what_is_wrong_is_told_with_its_place(config, text, told):
     assert told in str(error.value)
 
 
+@pytest.mark.programs
 def test_a_wrong_file_ends_the_program_before_the_screen(config, runs):
     path = config("keys: {run.puse: p}")
     done = subprocess.run([sys.executable, "-m", "ddenv"], capture_output=True, text=True, timeout=PATIENCE)

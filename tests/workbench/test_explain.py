@@ -228,14 +228,6 @@ def test_a_baseline_that_goes_on_says_why(run):
     assert "Of 4 runs so far 1 failed and 3 reached the goal." in told(run)[1]
 
 
-def test_files_that_do_not_say_how_a_robot_failed_are_worded_too(run):
-    run.created().baseline()
-    run.start_round(2)
-    run.test(0, "other", 2.3)
-    run.start(0, 1)
-    assert "the robot failed elsewhere, 2.3 m from f's end" in told(run)[1]
-
-
 def test_an_early_end_is_not_called_minimal(run):
     run.created()
     run.write("finished", minimal=False, reason="the robot never failed in 4 runs")

@@ -133,6 +133,7 @@ async def test_a_bundle_and_a_test_are_written_where_they_are_ticked(run, folder
         assert "crates-1.zip: exists already" in told(pilot)
 
 
+@pytest.mark.screens
 async def test_why_messages_cannot_be_written_is_told(run, folder):
     async with dialog(run) as pilot:
         for kind in ("world", "report", "mcap"):

@@ -1,6 +1,5 @@
 """Names, files and hands that mean no good: whatever they are, the screen stands, and the terminal is not steered."""
 
-import copy
 import html
 import json
 import random
@@ -18,17 +17,12 @@ from rich.cells import cell_len
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
-from ddenv.runfile.reading import plain
-from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile, recorded
-from ddenv.runs.tests_left import remaining
-from ddenv.words.explain import explain
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import read_config
 from ddenv.workbench.export import suggested, write
 from ddenv.workbench.launch import check_terminal
-from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
@@ -51,33 +45,6 @@ NAMES = [
     "two\u2028lines\u200b",
 ]
 STEERING = {"Cc", "Cf", "Cs", "Zl", "Zp"}
-NONSENSE = [
-    None,
-    True,
-    0,
-    -1,
-    2,
-    7,
-    10**30,
-    1.5,
-    float("nan"),
-    float("inf"),
-    "",
-    "similar",
-    "ask",
-    [],
-    [1],
-    [[1]],
-    {},
-    {"a": 1},
-]
-SCENES = (
-    fake_moments.mid_round,
-    fake_moments.waiting,
-    fake_moments.guided,
-    fake_moments.certifying,
-    fake_moments.finished,
-)
 
 
 def steering(app):
@@ -119,70 +86,6 @@ async def test_no_name_steers_the_terminal(runs, size):
 def test_files_are_named_without_what_steers(tmp_path):
     assert suggested(tmp_path / "ev\u202eil.ddenv")[0] == "ev-il.minimal.sdf"
     assert WorldTree.process_label(None, "a\x1b]0;x\x07\u202e.sdf").plain == "a�]0;x��.sdf"
-
-
-def leaves(value, path=()):
-    yield path
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, inner in items:
-        yield from leaves(inner, (*path, key))
-
-
-def put(value, path, other):
-    if not path:
-        return other
-    value = copy.copy(value)
-    value[path[0]] = put(value[path[0]], path[1:], other)
-    return value
-
-
-def damaged(events, others, chance):
-    """The events with one or a few of them lost, doubled, out of order, or with nonsense in them."""
-    events = list(events)
-    for _ in range(chance.choice((1, 1, 2, 4))):
-        place = chance.randrange(len(events))
-        way = chance.randrange(5)
-        if way == 0 and len(events) > 1:
-            del events[place]
-        elif way == 1:
-            events.insert(place, chance.choice(others))
-        elif way == 2:
-            events.insert(chance.randrange(len(events)), events[place])
-        else:
-            kind, data = events[place]
-            path = chance.choice(list(leaves(data)))
-            events[place] = kind, put(data, path, copy.deepcopy(chance.choice(NONSENSE))) if path else data
-    return events
-
-
-@pytest.fixture
-def streams(runs):
-    """The events of some runs, as (kind, data)."""
-    found = []
-    for number, scene in enumerate(SCENES):
-        run = scene(fake_run.FakeRun(runs / f"scene-{number}.ddenv"))
-        found.append([(one.kind, plain(one.event)) for one in run.file.events()])
-        run.close()
-    return found
-
-
-def test_damaged_events_are_told_or_make_a_state_that_can_be_shown(streams):
-    chance = random.Random(6)
-    others = [event for stream in streams for event in stream]
-    told = 0
-    for _ in range(800):
-        state = RunState()
-        for number, (kind, data) in enumerate(damaged(chance.choice(streams), others, chance), 1):
-            try:
-                state = apply(state, recorded(number, 1e9 + number, kind, json.dumps(data)))
-            except UserError:
-                told += 1
-                break
-        for engine in ("alive", "absent"):
-            snapshot = Snapshot(state, (), engine)
-            explain(snapshot), remaining(state, engine == "alive"), listed(snapshot), snapshot.focus
-        assert state.here is None or state.here.environment is not None
-    assert 200 < told < 800
 
 
 def test_a_run_is_made_once_and_rounds_go_on(run):

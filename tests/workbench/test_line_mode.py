@@ -88,6 +88,7 @@ def test_every_action_that_guides_a_run_can_be_typed_with_its_key(run):
     assert all(f"\n{word}" in words for word in (*GUIDES, *QUESTIONS, "quit"))
 
 
+@pytest.mark.programs
 def test_the_program_ends_with_the_run_when_nothing_more_can_be_typed(run):
     fake_moments.finished(run)
     words = [sys.executable, "-m", "ddenv", "open", str(run.path), "--lines"]

@@ -9,7 +9,6 @@ import fake_run
 import pytest
 from attached import Attached
 
-from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.guiding.course import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
@@ -43,13 +42,6 @@ def test_only_what_is_new_makes_a_snapshot(run, poll):
     run.write("paused")
     assert look(poll).state.paused
     assert look(poll) is None
-
-
-def test_a_look_with_nothing_new_folds_and_reads_nothing(run, poll, monkeypatch):
-    poll.look()
-    monkeypatch.setattr(poll.file, "events", None)
-    monkeypatch.setattr(poll.file, "live", None)
-    assert all(poll.look() is None for _ in range(20))
 
 
 def test_a_long_run_is_caught_up_with_over_several_looks(run, poll, monkeypatch):
@@ -184,24 +176,6 @@ async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run
         await eventually(lambda: len(answers) == 3)
         assert set(answers) == {threading.current_thread()}
         assert [kind for kind, _ in session.asked()] == ["pause", "resume", "stop"]
-
-
-async def test_a_watched_run_is_sent_nothing(run):
-    fake_moments.mid_round(run)
-    async with Attached(run, watch=True) as session:
-        session.screen.asking.send(Stop())
-        await session.pilot.pause()
-        assert "--watch" in session.said()
-        assert session.commands() == []
-
-
-def test_an_engine_of_another_version_is_told(run, poll):
-    run.hold()
-    assert look(poll).older_engine == ""
-    run.write("engine_started", pid=1, jobs=2, version="0.0.1", simulator="none")
-    assert look(poll).older_engine == "0.0.1"
-    run.write("engine_started", pid=1, jobs=2, version=__version__, simulator="none")
-    assert look(poll).older_engine == ""
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for root")

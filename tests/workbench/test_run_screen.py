@@ -214,18 +214,10 @@ async def test_q_asks_what_becomes_of_the_engine(run, key, commands, words):
         assert session.app.return_value == 0
 
 
-async def test_q_without_an_engine_just_leaves(run):
-    fake_moments.finished(run)
-    async with Attached(run) as session:
-        await session.press("q")
-        assert session.app._exit
-
-
-@pytest.mark.parametrize("key", ["d", "ctrl+q"])
-async def test_leaving_tells_how_to_come_back(run, key):
+async def test_leaving_tells_how_to_come_back(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
-        await session.press(key)
+        await session.press("ctrl+q")
         assert session.app._exit_renderables[0].plain == "The engine goes on. Attach again with: ddenv open crates-1"
         assert session.commands() == []
 

@@ -15,10 +15,8 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import about, duration, percent, plain, truncated
 from ddenv.words.signs import brief, metres
 from ddenv.workbench.map.map_colors import mixed
-from ddenv.workbench.map.map_drawing import strip
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.map.place import Shown
-from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.shared.processes import last_line
 from ddenv.world.sdf.read import parse_world
 
@@ -85,29 +83,6 @@ def test_without_colours_the_cells_still_differ(run):
     fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
     signs = {chr(char) for char in canvas.chars.flat}
     assert {"█", "▓", "▒", " "} <= signs
-
-
-def test_only_changed_rows_are_drawn_again():
-    before = Canvas(4, 10, (0, 0, 0))
-    after = before.copy()
-    after.put((2, 3), "A")
-    assert after.changed_rows(before) == [2]
-    assert after.changed_rows(None) == [0, 1, 2, 3]
-    assert strip(after, 2).text == "   A      "
-    # Text ends at the edge of the map.
-    after.put((3, 9), "AB")
-    assert strip(after, 3).text == "         A"
-
-
-def test_recent_runs_say_how_they_stand(runs):
-    fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
-    fake_moments.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
-    (runs / "c.ddenv").write_text("no run")
-    told = {run.path.stem: run for run in RunsFolder(runs).look()}
-    assert (told["a"].brief, told["a"].state_words) == ("2/11", "minimal")
-    assert (told["b"].brief, told["b"].state_words) == ("6/11", "engine is gone")
-    assert told["c"].trouble
-    assert RunsFolder(runs / "nowhere").look() == []
 
 
 def test_the_last_line_of_a_log(tmp_path):

@@ -276,7 +276,7 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         "/mesh: has no <uri>": [shape("<mesh/>")],
     },
     "a scale of zero": {
-        r"/mesh/scale: the factors of a scale must be from 1e-09 to 1e\+06": [
+        r"/mesh/scale: a scale must be from 1e-09 to 1e\+06": [
             shape(f"<mesh><uri>a.obj</uri><scale>{scale}</scale></mesh>") for scale in ("0 0 0", "0 1 1", "1 0 1")
         ],
         r"/state/model\[@name='m'\]/scale: a scale must be from 1e-06": [

@@ -26,8 +26,7 @@ def why_command(run: str, as_json: bool) -> int:
     from ddenv.evidence.claims import current
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.nearest import nearest
-    from ddenv.runs.reasons import no_reasons, parting_sentence, reasons, sentence
+    from ddenv.runs.reasons import nearest, no_reasons, parting_sentence, reasons, sentence
 
     with RunFile(find_run(run)) as file:
         state = fold(file.events())
@@ -68,8 +67,8 @@ def isolate_command(
     from ddenv.guiding.situation import Situation
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.nearest import nearest
     from ddenv.runs.programs import start_engine
+    from ddenv.runs.reasons import nearest
 
     path, state = idle_run(run, trust, cluster)
     if give_up:

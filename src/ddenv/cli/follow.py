@@ -16,7 +16,7 @@ from typing import TextIO
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.cli.terminal import announce, say, wrapped
 from ddenv.errors import UserError
-from ddenv.runfile.fold import Follower, fold
+from ddenv.runfile.fold import fold, steps
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words, stop_engines
@@ -62,11 +62,11 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
     out = sys.stderr if as_json else sys.stdout
     interrupted = False
     with RunFile(path) as file:
-        follower = Follower(file, fold(file.events()))
-        before = follower.state.revision
+        state = fold(file.events())
+        before = state.revision
         try:
             while engine.poll() is None:
-                _show(file, follower, out)
+                state = _show(file, state, out)
                 time.sleep(POLL)
         except KeyboardInterrupt:
             interrupted = True
@@ -77,9 +77,8 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
                 f"the engine goes on with {path}: 'ddenv open {path}' attaches to it, 'kill {engine.pid}' stops it"
             )
             raise
-        _show(file, follower, out)
+        state = _show(file, state, out)
     print(CLEAR if out.isatty() else "", end="", file=out, flush=True)
-    state = follower.state
     if interrupted:
         raise Interrupted(state)
     # An engine without any output did not start, unless there was nothing left to do.
@@ -95,13 +94,15 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _show(file: RunFile, follower: Follower, out: TextIO) -> None:
-    """A line for each new event that matters; on a terminal, also the latest state below them."""
+def _show(file: RunFile, state: RunState, out: TextIO) -> RunState:
+    """A line for each event after `state` that matters; on a terminal, also the latest state, which is returned, below them."""
     clear = CLEAR if out.isatty() else ""
-    for event, before, after in follower.new():
+    for event, before, after in steps(file.read(state.revision), state):
+        state = after
         if line := news(event.kind, before, after):
             lines = wrapped(printable(line), shutil.get_terminal_size().columns if clear else None)
             print(clear + "\n".join(lines), file=out, flush=True)
     if clear:
         simulated = max((live.time for live in file.live()), default=None)
-        print(f"{clear}{printable(headline(follower.state, simulated))}", end="", file=out, flush=True)
+        print(f"{clear}{printable(headline(state, simulated))}", end="", file=out, flush=True)
+    return state

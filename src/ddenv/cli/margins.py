@@ -77,7 +77,7 @@ def margins_command(
     if as_json:
         found = [asdict(one.margin) | {"words": one.sentence} for one in rows(margins)]
         fixes = [asdict(one) for one in fixes_of(margins)]
-        print(json.dumps({"margins": found, "fixes": fixes, "certified": margins.certified}))
+        print(json.dumps({"margins": found, "fixes": fixes, "certified": margins.asked.certified}))
     else:
         print("\n".join(lines(margins)))
     return 0

@@ -257,7 +257,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
     from ddenv.evidence.slices import in_whole_world
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.nearest import removed_in_passing
+    from ddenv.runs.reasons import removed_in_passing
     from ddenv.runs.subject import read_parts
 
     path = find_run(name)

@@ -27,10 +27,9 @@ from ddenv.runfile import events
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs import processor
-from ddenv.runs.clusters import HERE, check_cluster, made_here
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.runs.subject import read_parts
-from ddenv.runs.trust import check_trusted
+from ddenv.runs.trust import HERE, check_cluster, check_trusted, made_here
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 

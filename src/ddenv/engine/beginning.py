@@ -73,8 +73,8 @@ def _differs(journal: Journal, result: RunResult | Broken) -> str:
     run, physics = journal.file.path, journal.state.physics
     how = f"broke ({result.failure})" if isinstance(result, Broken) else "gives another trajectory"
     return (
-        f"{run}: made again, the first run of the whole world {how}: the tests were made with {physics.before}, and this is "
-        f"{physics.after}; 'ddenv resume {run} --mixed' goes on all the same, 'ddenv resume {run} --again' makes all tests again "
+        f"{run}: made again, the first run of the whole world {how}: the tests were made with {physics.proven}, and this is "
+        f"{physics.now}; 'ddenv resume {run} --mixed' goes on all the same, 'ddenv resume {run} --again' makes all tests again "
         "in a new run"
     )
 

@@ -71,8 +71,8 @@ def find_margins(
     now = journal.state.margining
     if asked is not None:
         numbers, budget = numbers_left(parts, journal.state, asked[0]), asked[1]
-        if now is None or (now.wanted, now.budget) != (tuple(one.name for one in numbers), budget):
-            _begin(journal, numbers, budget, stood if now is None else (now.status, now.before))
+        if now is None or (now.wanted, now.asked.budget) != (tuple(one.name for one in numbers), budget):
+            _begin(journal, numbers, budget, stood if now is None else (now.asked.status, now.asked.before))
     _Search(parts, journal, pool, control).carry_out()
     journal.record(events.MarginsFinished())
 
@@ -100,7 +100,7 @@ class _Search:
         self._parts, self._journal, self._pool, self._control = parts, journal, pool, control
         self._failures = failures_of(journal.file, journal.state, parts[0].failure)
         self._running: dict[int, Wanted] = {}
-        self._kept = frozenset(journal.state.environments[self._now.environment].names(journal.state.elements))
+        self._kept = frozenset(journal.state.environments[self._now.asked.environment].names(journal.state.elements))
         self._submitted, self._broken = len(journal.state.tests), 0
         # How many looks at a number are over: the second one has the runs that are left.
         self._looks = 0
@@ -156,7 +156,7 @@ class _Search:
         used = sum(one.name != name for one in now.runs[now.before_call :])
         earlier = sum(one.name == name for one in now.runs[: now.before_call])
         first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
-        most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.budget - used)
+        most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.asked.budget - used)
         return known.wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
 
     def _is_impossible(self, name: str, value: float) -> bool:

@@ -23,8 +23,7 @@ from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runs.nearest import nearest
-from ddenv.runs.reasons import GOAL, F, reasons
+from ddenv.runs.reasons import GOAL, F, nearest, reasons
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.words.claims import shown
 from ddenv.world import scenario

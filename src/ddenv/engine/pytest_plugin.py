@@ -1,8 +1,4 @@
-"""A fixture for pytest: minimal worlds as regression tests.
-
-def test_the_robot_no_longer_gets_stuck_at_the_corner(ddenv_reproduce):
-    assert ddenv_reproduce("corner.ddenv").fails is False
-"""
+"""The fixture `ddenv_reproduce` for pytest: minimal worlds as regression tests."""
 
 from __future__ import annotations
 
@@ -20,11 +16,10 @@ Reproduce = Callable[..., "Reproduction"]
 
 @pytest.fixture
 def ddenv_reproduce(request: pytest.FixtureRequest) -> Reproduce:
-    """Runs what a run file has left until it is known whether it still fails at the rate of its certificate.
-
-    `ddenv_reproduce(run, folder=None, most=60, trust=False)`: `run` is a path, relative to the test's folder; `folder` has the
-    user's own controller or simulator, by default that of the run's scenario; with `trust` it is started unasked. The result has
-    `fails` (None: the runs do not say), `shown`, `runs` and `broken`; printed, it says the same in words. Raises UserError.
+    """`ddenv_reproduce(run, folder=None, most=60, trust=False)` runs what a run file has left until it is known whether it still
+    fails at the rate of its certificate. Paths are relative to the test's folder; `folder` has the user's own controller or
+    simulator; with `trust` it is started unasked. The result has `fails` (None: the runs do not say), `shown`, `runs` and `broken`;
+    printed, it says the same in words. Raises UserError.
     """
 
     def reproduce(

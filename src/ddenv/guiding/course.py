@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from ddenv.errors import UserError
-from ddenv.guiding.situation import FINISHED, NO_FAILURE, Situation, Words, new_search
+from ddenv.guiding.situation import FINISHED, NO_FAILURE, Asked, Situation, Words, new_search
 from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
@@ -15,8 +14,7 @@ from ddenv.settings import SETTINGS, Value
 from ddenv.text import count, printable
 
 
-@dataclass(frozen=True, slots=True)
-class Pause:
+class Pause(Asked):
     """Start no new test."""
 
     def refusal(self, now: Situation) -> str:
@@ -26,8 +24,7 @@ class Pause:
         return Words("pause")
 
 
-@dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(Asked):
     """Go on; also ends a step."""
 
     def refusal(self, now: Situation) -> str:
@@ -37,8 +34,7 @@ class Resume:
         return Words("resume")
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Asked):
     """Run one test, or to the end of the round, then pause."""
 
     unit: Literal["test", "round"] = "test"
@@ -51,8 +47,7 @@ class Step:
         return Words(f"step one {self.unit}")
 
 
-@dataclass(frozen=True, slots=True)
-class AcceptMode:
+class AcceptMode(Asked):
     """Make each reduction at once ("automatic"), or wait for accept or reject ("ask")."""
 
     mode: Literal["automatic", "ask"]
@@ -66,8 +61,7 @@ class AcceptMode:
         return Words(f"accept mode {self.mode}", said)
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(Asked):
     """End the engine; another one can go on from there."""
 
     def refusal(self, now: Situation) -> str:
@@ -77,8 +71,7 @@ class Stop:
         return Words("stop")
 
 
-@dataclass(frozen=True, slots=True)
-class StartEngine:
+class StartEngine(Asked):
     """Start an engine on the run. It is not a command: the run file does not have it."""
 
     def refusal(self, now: Situation) -> str:
@@ -93,8 +86,7 @@ class StartEngine:
         return f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it" if spent else ""
 
 
-@dataclass(frozen=True, slots=True)
-class Isolate:
+class Isolate(Asked):
     """Start an engine that finds the nearest world that passes, or goes on with that. It is not a command, as `StartEngine`.
 
     `again`: search also if that world is known.
@@ -118,8 +110,7 @@ class Isolate:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Undo:
+class Undo(Asked):
     """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
 
     def refusal(self, now: Situation) -> str:
@@ -138,8 +129,7 @@ class Undo:
         return Words("undo", f"{said}. {again}: v on their row, or h and enter on #{here.number}")
 
 
-@dataclass(frozen=True, slots=True)
-class GoBack:
+class GoBack(Asked):
     """Make the environment of a node the current one again; the run pauses there."""
 
     node: int
@@ -161,8 +151,7 @@ class GoBack:
         return Words("go back", f"back to {there}; the run pauses there, and space begins a new search", question)
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(Asked):
     """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
 
     settings: dict[str, Any]

@@ -99,8 +99,7 @@ def _accept(now: Situation, pointed: Pointed) -> Command:
 
 def nearest_other(state: RunState, row: Row) -> Test | None:
     """The test of a candidate or try that ended in another failure, nearest to the end of f."""
-    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
-    others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
+    others = [test for test in state.tests_of(row.tests) if test.outcome == "other" and test.end_pose is not None]
     return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 

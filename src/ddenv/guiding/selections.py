@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, helping
-from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Situation, Words, label_of, named, new_search
+from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Asked, Situation, Words, label_of, named, new_search
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.text import count, printable, shortened
@@ -17,8 +16,7 @@ from ddenv.text import count, printable, shortened
 NONE_HELPS = "there is no model that only helps, by a certificate"
 
 
-@dataclass(frozen=True, slots=True)
-class OfCandidate:
+class OfCandidate(Asked):
     """A decision on a candidate of the current round."""
 
     round: int
@@ -44,7 +42,6 @@ class OfCandidate:
         return "" if (self.round, self.candidate) == waits else "that reduction no longer waits"
 
 
-@dataclass(frozen=True, slots=True)
 class Accept(OfCandidate):
     """Make the reduction that waits."""
 
@@ -55,7 +52,6 @@ class Accept(OfCandidate):
         return Words("accept", f"{self.label(state)} is accepted. The next round begins")
 
 
-@dataclass(frozen=True, slots=True)
 class Reject(OfCandidate):
     """Go on as if the candidate that waits had not shown f."""
 
@@ -66,7 +62,6 @@ class Reject(OfCandidate):
         return Words("reject", f"{self.label(state)} is rejected")
 
 
-@dataclass(frozen=True, slots=True)
 class Veto(OfCandidate):
     """Leave out a candidate that has no verdict yet."""
 
@@ -82,7 +77,6 @@ class Veto(OfCandidate):
         return Words("veto", f"{self.label(state)} is vetoed: it is not tried in any round; v again takes that back")
 
 
-@dataclass(frozen=True, slots=True)
 class Unveto(OfCandidate):
     """Try a vetoed or rejected candidate after all."""
 
@@ -108,8 +102,7 @@ def _names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -
     return tuple(state.elements[number] for number in dict.fromkeys(numbers))
 
 
-@dataclass(frozen=True, slots=True)
-class Pin:
+class Pin(Asked):
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
     models: tuple[int, ...]
@@ -134,8 +127,7 @@ class Pin:
         return tuple(name for name in _names_of(state, self.models) or () if name not in state.pinned)
 
 
-@dataclass(frozen=True, slots=True)
-class Unpin:
+class Unpin(Asked):
     """Let pinned models be removed again."""
 
     models: tuple[int, ...]
@@ -151,8 +143,7 @@ class Unpin:
         return tuple(name for name in _names_of(state, self.models) or () if name in state.pinned)
 
 
-@dataclass(frozen=True, slots=True)
-class Try:
+class Try(Asked):
     """Test a selection: `models` are the ones that are kept."""
 
     models: tuple[int, ...]
@@ -182,8 +173,7 @@ class Try:
         return Words("try", f"try {len(state.trials) + 1}: {what}")
 
 
-@dataclass(frozen=True, slots=True)
-class Adopt:
+class Adopt(Asked):
     """Make a try that showed f the environment."""
 
     trial: int
@@ -209,8 +199,7 @@ class Adopt:
         return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
 
 
-@dataclass(frozen=True, slots=True)
-class LeaveOut:
+class LeaveOut(Asked):
     """Make what is left without a model that only helps the environment, by the runs of the certificate."""
 
     model: int
@@ -240,8 +229,7 @@ def _lacks_pinned(state: RunState, label: str, models: Iterable[str]) -> str:
     return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
 
 
-@dataclass(frozen=True, slots=True)
-class AcceptOther:
+class AcceptOther(Asked):
     """Count another failure as f from here on; the models of its test become the environment.
 
     With `instead` it is a branch from where the test was made: only that failure is f in it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import dataclass_transform
 
 from ddenv.runfile.snapshot import EngineIs
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
@@ -51,18 +52,17 @@ class Words:
     question: str = ""
 
 
-def row_of(state: RunState, test: Test) -> Row | None:
-    """The candidate of the current round, or the try, that a test was made for or counts for."""
-    made, current = made_for(state, test), state.round
-    if made is not None or test.trial is not None or current is None:
-        return made
-    # The verdict may rest on tests of earlier rounds.
-    return next((each for each in current.candidates if each.known and test.id in each.tests), None)
+@dataclass_transform(frozen_default=True)
+class Asked:
+    """What the user asks of a run is one of these, and so a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
 
 def label_of(state: RunState, test: Test) -> str:
     """What a test was made for, in words."""
-    row = row_of(state, test)
+    row = made_for(state, test)
     if row is None and test.round is None:
         return purpose(state, test)
     return row.label if row is not None else f"a candidate of round {test.round}"
@@ -76,11 +76,8 @@ def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
 
 def waiting(state: RunState) -> Candidate | None:
     """The candidate whose reduction waits for accept or reject."""
-    return (
-        None
-        if state.round is None or state.waiting_candidate is None
-        else state.round.candidates[state.waiting_candidate]
-    )
+    round, waits = state.round, state.waiting_candidate
+    return None if round is None or waits is None else round.candidates[waits]
 
 
 def new_search(state: RunState, size: int | None = None) -> str:

@@ -1,4 +1,4 @@
-"""How many models were left after each test, as steps; how many of them seem to be needed, as a line below."""
+"""How many models were left after each test, as steps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ def chart(state: RunState) -> str:
     most = max(1, *(point.models for point in state.history))
     points = [*state.history, replace(state.history[-1], tests=last)]
     models = steps([(point.tests, point.models) for point in points])
-    needed = steps([(point.tests, point.needed) for point in points])
     at = scale(last, most)
     line = path(models, at)
     (first, floor), (end, _) = at(0, 0), at(last, 0)
@@ -33,10 +32,7 @@ def chart(state: RunState) -> str:
         f'<path class="area" d="M{first:.1f} {floor:.1f}L{line}L{end:.1f} {floor:.1f}Z"/>',
         f'<path class="steps" d="M{line}"/>',
     ]
-    bounded = any(number for _, number in needed)
-    if bounded:
-        parts.append(f'<path class="needed" d="M{path(needed, at)}"/>')
-    parts += _labels(state, at, last, most, bounded)
+    parts += _labels(state, at, last)
     return "\n".join([*parts, "</svg>"])
 
 
@@ -84,8 +80,8 @@ def axes(at: At, last: int, most: int) -> Iterator[str]:
     yield tick(LEFT - 7, 13, "start", "models left")
 
 
-def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:
-    """What went without a test, the number at the end, and the label of the lower line."""
+def _labels(state: RunState, at: At, last: int) -> Iterator[str]:
+    """What went without a test, and the number at the end."""
     x, y = at(last, len(state.environment))
     for node in state.nodes:
         if node.how == "sliced":
@@ -95,6 +91,3 @@ def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Ite
     yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'
     words = f"{count(len(state.environment), 'model')} left"
     yield f'<text class="said" x="{x - 8:.1f}" y="{y - 10:.1f}" text-anchor="end">{words}</text>'
-    if bounded and state.lower_bound < 0.6 * most:
-        yield '<g transform="translate(180 9)"><path class="needed" d="M0 0H26"/>'
-        yield '<text class="tick" x="34" y="4">seem to be needed</text></g>'

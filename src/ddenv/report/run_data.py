@@ -17,8 +17,7 @@ from ddenv.runfile.fold import recorded_scenario, steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
-from ddenv.runs.nearest import Nearest, nearest
-from ddenv.runs.reasons import Reason, reasons
+from ddenv.runs.reasons import Nearest, Reason, nearest, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario

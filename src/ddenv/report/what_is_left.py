@@ -14,8 +14,7 @@ from ddenv.report.report_map import picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
-from ddenv.runs.nearest import Nearest
-from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
+from ddenv.runs.reasons import Nearest, Parting, no_reasons, parting_sentence, sentence
 from ddenv.text import count, first_of, plain
 from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said

@@ -18,9 +18,9 @@ from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Node, PastRound, Point, narrowed
+from ddenv.runfile.progress import Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
-from ddenv.runfile.store import Recorded, RunFile
+from ddenv.runfile.store import Recorded
 from ddenv.text import count
 
 # Verdicts that tests led to, not the user.
@@ -37,7 +37,7 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
     event = recorded.event
     try:
         changes = _HANDLERS[type(event)](state, event, recorded.time)
-        changes = fold_tests.counted_ahead(state, event, changes)
+        changes |= fold_tests.rested_upon(state, event)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
         raise UserError(f"damaged run file: event {recorded.id} ({recorded.kind}) is invalid here") from None
     if recorded.command is not None:
@@ -56,26 +56,13 @@ def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator
         yield recorded, before, after
 
 
-class Follower:
-    """Follows a run file as it grows. `state` is the one after the last event that was read and is valid."""
-
-    def __init__(self, file: RunFile, state: RunState | None = None) -> None:
-        self._file, self.state = file, state or RunState()
-
-    def new(self, most: int = -1) -> Iterator[tuple[Recorded, RunState, RunState]]:
-        """The events since then as `steps`, at most `most` unless that is negative. Raises UserError."""
-        for recorded, before, after in steps(self._file.read(self.state.revision, most), self.state):
-            self.state = after
-            yield recorded, before, after
-
-
 def recorded_scenario(scenario: dict[str, Any]) -> dict[str, Any]:
     """A scenario as a run file has it: where it does not say so, seeds were consecutive."""
     reduction = scenario.get("reduction")
     return scenario | {"reduction": {"seeds": "consecutive"} | reduction} if isinstance(reduction, dict) else scenario
 
 
-def _created(state: RunState, event: e.Created, _: float) -> Changes:
+def created(state: RunState, event: e.Created, _: float) -> Changes:
     if state.tests or len(state.nodes) > 1 or state.round is not None:
         raise ValueError("a second created")
     names = event.elements
@@ -93,7 +80,7 @@ def _created(state: RunState, event: e.Created, _: float) -> Changes:
 # The engine, and for how long it works: no pause counts, nor the time in which a reduction waits for the user or for the disk.
 
 
-def _engine_started(state: RunState, event: e.EngineStarted, at: float) -> Changes:
+def engine_started(state: RunState, event: e.EngineStarted, at: float) -> Changes:
     # Tests that broke are made again; verdicts that rest on them may change, so the search starts again.
     anew = state.left_unknown and state.baseline is not None
     return {
@@ -117,7 +104,7 @@ def _engine_started(state: RunState, event: e.EngineStarted, at: float) -> Chang
     }
 
 
-def _compared(state: RunState, event: e.Compared, _: float) -> Changes:
+def compared(state: RunState, event: e.Compared, _: float) -> Changes:
     mixed_until = state.mixed_until if event.same else len(state.tests)
     return {"physics": state.physics.compared(event.same), "mixed_until": mixed_until}
 
@@ -132,21 +119,21 @@ def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
     }
 
 
-def _engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
+def engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
     """An isolation, or a search for margins, that is stopped leaves the reduction before it as it was."""
     if state.isolating is not None or state.margining is not None:
         return _as_it_was(state, at)
     return _ended(state, "stopped", event.reason, at)
 
 
-def _engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
+def engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
     """What breaks in a search for margins does no harm to the reduction before it."""
     if state.margining is None:
         return _ended(state, "failed", event.reason, at)
     return {**_as_it_was(state, at), "margins": replace(state.margining, broken_off=True)}
 
 
-def _finished(state: RunState, event: e.Finished, at: float) -> Changes:
+def finished(state: RunState, event: e.Finished, at: float) -> Changes:
     size, here = len(state.environment), state.nodes[state.node]
     return {
         **_ended(state, "finished", event.reason, at),
@@ -156,11 +143,11 @@ def _finished(state: RunState, event: e.Finished, at: float) -> Changes:
     }
 
 
-def _paused(state: RunState, _: e.Paused, __: float) -> Changes:
+def paused(state: RunState, _: e.Paused, __: float) -> Changes:
     return {"paused": True, "status": state.status if state.status == "waiting" else "paused"}
 
 
-def _resumed(state: RunState, _: e.Resumed, __: float) -> Changes:
+def resumed(state: RunState, _: e.Resumed, __: float) -> Changes:
     working = "baseline" if state.baseline is None else "running"
     return {"paused": False, "status": working if state.status == "paused" else state.status}
 
@@ -175,7 +162,7 @@ def _stopped(state: RunState, at: float) -> Changes:
     return {"working_seconds": spent(state, at), "started_at": None}
 
 
-def _clock_jumped(state: RunState, event: e.ClockJumped, at: float) -> Changes:
+def clock_jumped(state: RunState, event: e.ClockJumped, at: float) -> Changes:
     """Nobody worked in that time."""
     return {} if state.started_at is None else {"started_at": min(at, state.started_at + event.seconds)}
 
@@ -197,7 +184,7 @@ def _stands(state: RunState) -> bool:
 # The world.
 
 
-def _supports(state: RunState, event: e.Supports, _: float) -> Changes:
+def supports(state: RunState, event: e.Supports, _: float) -> Changes:
     def named(pairs: Iterable[e.Pair]) -> tuple[tuple[str, str], ...]:
         return tuple((state.elements[first], state.elements[second]) for first, second in pairs)
 
@@ -209,7 +196,7 @@ def _supports(state: RunState, event: e.Supports, _: float) -> Changes:
     }
 
 
-def _environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> Changes:
+def environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> Changes:
     if event.environment != len(state.environments) or not event.models <= state.environments[0]:
         raise ValueError(event.environment)
     return {"environments": state.environments.added(event.models)}
@@ -218,7 +205,7 @@ def _environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> 
 # The search.
 
 
-def _round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
+def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     whole = state.environments[event.environment]
     # The bits of a model that is not there could fill the memory.
     if max((model for part in event.partitions for model in part), default=0) >= len(state.elements):
@@ -269,17 +256,20 @@ def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, 
         raise ValueError("candidates")
 
 
-def _forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
-    """A search is foretold anew in each round: each forecast narrows the one before."""
+def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
+    """A search is foretold anew in each round: each forecast narrows the one before, unless they contradict each other."""
     if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
     if state.forecast is None:
         return {"forecast": event}
-    low, likely, high = (each - event.tests_done + state.forecast.tests_done for each in state.forecast.tests)
-    return {"forecast": replace(event, tests=narrowed((low, likely, high), event.tests))}
+    done = event.tests_done - state.forecast.tests_done
+    low, high = max(event.tests[0], state.forecast.tests[0] - done), min(event.tests[2], state.forecast.tests[2] - done)
+    if low > high:
+        return {"forecast": event}
+    return {"forecast": replace(event, tests=(low, min(max(low, event.tests[1]), high), high))}
 
 
-def _candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
+def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
     candidate = replace(tried(state, event), verdict=event.verdict, tests=event.tests, known=event.known)
     changes = with_candidate(state, candidate)
     changes["left_unknown"] = state.left_unknown or event.verdict == "unknown"
@@ -296,11 +286,11 @@ def _candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Ch
     return changes | {"round": round, "lower_bound": needed, "history": (*state.history, point)}
 
 
-def _waiting(state: RunState, event: e.Waiting, _: float) -> Changes:
+def waiting(state: RunState, event: e.Waiting, _: float) -> Changes:
     return {"status": "waiting", "waiting_candidate": tried(state, event).index}
 
 
-def _decided(state: RunState, event: e.Decided, at: float) -> Changes:
+def decided(state: RunState, event: e.Decided, at: float) -> Changes:
     candidate, accepts = tried(state, event), event.decision == "accept"
     words = f"{'accepted' if accepts else 'rejected'} {_described(state, candidate)}"
     changes = {
@@ -314,7 +304,7 @@ def _decided(state: RunState, event: e.Decided, at: float) -> Changes:
     return {**changes, **with_candidate(state, rejected), **refused(state, candidate.kept, "rejected", event.round)}
 
 
-def _reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
+def reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
     winner, round = tried(state, event), current(state)
     # One part alone shows f although several seemed to be needed: the lower bound was wrong.
     if winner.kind == "partition" and round.missed > 1:
@@ -323,7 +313,7 @@ def _reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
     return changes | {"round": replace(round, winner=winner.index)}
 
 
-def _round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes:
+def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes:
     round = current(state)
     changes: Changes = {"round": replace(round, done=True), "rounds_done": round.number}
     if state.leg is not None:
@@ -345,7 +335,7 @@ def digest(parts: Iterable[Environment]) -> int:
     return hash(tuple(part.bits for part in parts))
 
 
-def _accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float) -> Changes:
+def accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float) -> Changes:
     if event.mode == state.accept_mode:
         return {}
     ask = event.mode == "ask"
@@ -353,13 +343,13 @@ def _accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float)
     return {"accept_mode": event.mode, **decision(state, at, "accept_mode", words)}
 
 
-def _vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
+def vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
     candidate = replace(tried(state, event), verdict=event.verdict)
     changes = {**with_candidate(state, candidate), **refused(state, candidate.kept, event.verdict, event.round)}
     return changes if event.again else changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
 
 
-def _unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
+def unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
     candidate, round = tried(state, event), current(state)
     known = next((one for one in state.refused if one.environment == candidate.kept), None)
     changes = {
@@ -382,73 +372,33 @@ def _described(state: RunState, candidate: Candidate) -> str:
     return f"{candidate.label} of round {current(state).number} ({count(candidate.size, 'model')})"
 
 
-# Each returns only the changed fields, so that the state is copied once per event.
+# By its name in a file each event has a function, here or in a file beside this one, or stands below. Each returns only the changed
+# fields, so that the state is copied once per event.
 _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
-    e.Created: _created,
-    e.EngineStarted: _engine_started,
+    e.KINDS[name]: function
+    for place in (globals(), *map(vars, (fold_tests, fold_decisions, fold_claims)))
+    for name, function in place.items()
+    if name in e.KINDS
+} | {
     e.Cluster: lambda _, event, __: {"jobs": event.jobs, "cluster": event.words},
     e.Comparing: lambda *_: {},
-    e.Compared: _compared,
-    e.Paused: _paused,
-    e.Resumed: _resumed,
     e.DiskSpace: lambda _, event, __: {"needs_room": 0 if event.enough else event.needed},
-    e.ClockJumped: _clock_jumped,
-    e.Finished: _finished,
-    e.EngineStopped: _engine_stopped,
-    e.EngineFailed: _engine_failed,
     e.SupportsStarted: lambda *_: {"settling": True},
-    e.Supports: _supports,
     e.Still: lambda *_: {"ties": ()},
     e.Noted: lambda state, event, _: {"notes": (*state.notes, (event.about, event.words))},
-    e.EnvironmentNamed: _environment_named,
-    e.TestStarted: fold_tests.test_started,
-    e.TestFinished: fold_tests.test_finished,
-    e.Implied: fold_tests.implied,
-    e.TestLost: fold_tests.test_lost,
-    e.BaselineFinished: fold_tests.baseline_finished,
-    e.LegStarted: fold_decisions.leg_started,
-    e.RoundStarted: _round_started,
-    e.Forecast: _forecast,
-    e.CandidateJudged: _candidate_judged,
-    e.Waiting: _waiting,
-    e.Decided: _decided,
-    e.Reduced: _reduced,
-    e.RoundFinished: _round_finished,
-    e.Sliced: fold_claims.sliced,
-    e.SlicesRefuted: fold_claims.slices_refuted,
-    e.CertificateStarted: fold_claims.certificate_started,
-    e.CertificateFinished: fold_claims.certificate_finished,
-    e.RateLost: fold_claims.rate_lost,
-    e.LeftOut: fold_claims.left_out,
-    e.IsolationStarted: fold_claims.isolation_started,
-    e.RemovalJudged: fold_claims.removal_judged,
-    e.IsolationChecked: fold_claims.isolation_checked,
     e.IsolationFinished: lambda state, event, at: {
-        **fold_claims.isolation_finished(state, event),
+        **fold_claims.isolation_found(state, event),
         **_as_it_was(state, at),
     },
     e.IsolationGivenUp: lambda state, _, at: {
         "isolations": fold_decisions.without_open(state),
         **_as_it_was(state, at),
     },
-    e.MarginsStarted: fold_claims.margins_started,
-    e.MarginRan: fold_claims.margin_ran,
     e.MarginImpossible: fold_claims.margin_ran,
     e.MarginsFinished: lambda state, _, at: {
         **_as_it_was(state, at),
         "margins": replace(fold_claims.open_margins(state), ended=True),
     },
-    e.AcceptModeChanged: _accept_mode_changed,
-    e.Vetoed: _vetoed,
-    e.Unvetoed: _unvetoed,
-    e.Pinned: fold_decisions.pinned,
-    e.Unpinned: fold_decisions.unpinned,
-    e.TrialStarted: fold_decisions.trial_started,
-    e.TrialJudged: fold_decisions.trial_judged,
-    e.Adopted: fold_decisions.adopted,
-    e.AcceptedOther: fold_decisions.accepted_other,
-    e.WentBack: fold_decisions.went_back,
-    e.Changed: fold_decisions.changed,
     e.CommandRefused: lambda *_: {},
     e.CommandHandled: lambda *_: {},
 }
@@ -458,5 +408,5 @@ def _as_it_was(state: RunState, at: float) -> Changes:
     """After an isolation, or a search for margins, the reduction is as it was before."""
     if state.isolating is None:
         margins = fold_claims.open_margins(state)
-        return _ended(state, margins.status, margins.before, at)
+        return _ended(state, margins.asked.status, margins.asked.before, at)
     return _ended(state, "finished", state.isolating.asked.before, at)

@@ -103,7 +103,7 @@ def isolation_checked(state: RunState, event: e.IsolationChecked, _: float) -> C
     return {"removals": removals, "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
 
 
-def isolation_finished(state: RunState, event: e.IsolationFinished) -> Changes:
+def isolation_found(state: RunState, event: e.IsolationFinished) -> Changes:
     last = _open(state)
     removal = None if event.environment is None else with_removal(state, event.environment)[1]
     if removal is not None and (not last.checks or last.checks[-1].removal != removal):
@@ -136,25 +136,15 @@ def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Chang
     sound = all(one.low <= one.now <= one.high and one.low < one.high for one in event.numbers)
     if not names or len(set(names)) != len(names) or not sound or not event.rate or state.baseline is None:
         raise ValueError(names)
-    last = state.margins
-    if last is None or last.environment != event.environment:
-        if event.environment >= len(state.environments):
-            raise ValueError(event.environment)
-        last = Margins(event.environment, (), (), 0, 0, False, "", "")
+    if event.environment >= len(state.environments):
+        raise ValueError(event.environment)
     asked = tuple(NumberTried(one, event.rate, event.error) for one in event.numbers)
-    margins = replace(
-        last,
-        numbers=(*(one for one in last.numbers if one.asked.name not in names), *asked),
-        wanted=names,
-        budget=event.budget,
-        before_call=len(last.runs),
-        certified=event.certified,
-        status=event.status,
-        before=event.before,
-        ended=False,
-        broken_off=False,
-    )
-    return {"margins": margins}
+    last = state.margins
+    if last is None or last.asked.environment != event.environment:
+        return {"margins": Margins(event, asked)}
+    numbers = (*(one for one in last.numbers if one.asked.name not in names), *asked)
+    now = replace(last, asked=event, numbers=numbers, before_call=len(last.runs), ended=False, broken_off=False)
+    return {"margins": now}
 
 
 def margin_ran(state: RunState, event: e.MarginRan | e.MarginImpossible, _: float) -> Changes:

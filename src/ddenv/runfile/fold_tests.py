@@ -13,8 +13,6 @@ from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunS
 
 # The fields of the state that an event changes, with their new values.
 Changes = dict[str, Any]
-# The phases of tests that idle workers may make ahead of time.
-MAY_BE_AHEAD = ("round", CERTIFY)
 # How a test ended: an implied one as the test that implies it.
 END = ("outcome", "failure", "distance", "end_pose", "simulated_seconds", "cut", "took_part")
 
@@ -156,23 +154,17 @@ def counts(state: RunState, before: Test | None, after: Test) -> Changes:
     return {"tally": tally}
 
 
-def counted_ahead(before: RunState, event: e.Event, changes: Changes) -> Changes:
-    """`changes` of an event, with the count of the tests that ran ahead, and with those that decisions rest on."""
-    if isinstance(event, e.TestFinished):
-        may_be = before.tests[event.test - 1].phase in MAY_BE_AHEAD
-        return {**changes, "ahead": before.ahead + 1} if may_be else changes
-    # After these, decisions rest on their tests, whatever the number of workers.
+def rested_upon(before: RunState, event: e.Event) -> Changes:
+    """After a verdict decisions rest on its tests, whatever the number of workers."""
     if not isinstance(event, e.CandidateJudged | e.TrialJudged | e.CertificateFinished | e.RateLost):
-        return changes
-    rests_on, ahead, judged = before.rests_on, before.ahead, before.judged
-    for number in event.tests:
-        test = before.tests[number - 1]
-        if not rests_on >> number & 1:
-            rests_on |= 1 << number
-            ahead -= test.phase in MAY_BE_AHEAD and test.implied_by is None
-            if isinstance(event, e.CandidateJudged | e.TrialJudged):
-                judged = judged.added(number)
-    return {**changes, "rests_on": rests_on, "ahead": ahead, "judged": judged}
+        return {}
+    new = [test for test in dict.fromkeys(event.tests) if not before.rests_on >> test & 1]
+    if any(not 0 < test <= len(before.tests) for test in new):
+        raise ValueError(event.tests)
+    judged = before.judged
+    for test in new if isinstance(event, e.CandidateJudged | e.TrialJudged) else ():
+        judged = judged.added(test)
+    return {"rests_on": before.rests_on | sum(1 << test for test in new), "judged": judged}
 
 
 # How often f showed in each environment that the run reached.

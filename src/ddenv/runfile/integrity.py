@@ -44,13 +44,8 @@ def faults(file: RunFile) -> list[str]:
     return [] if rows == [("ok",)] else [" ".join(str(words).split()) for (words,) in rows]
 
 
-def whole(file: RunFile) -> Whole:
-    """How much of the run can be used."""
-    return _read(file, lambda _: None)
-
-
-def _read(file: RunFile, keep: Callable[[Recorded], None]) -> Whole:
-    """Calls `keep` with each event that makes sense, up to the first one that does not."""
+def whole(file: RunFile, keep: Callable[[Recorded], None] = lambda _: None) -> Whole:
+    """How much of the run can be used. Calls `keep` with each event that makes sense, up to the first one that does not."""
     state, count, bare, trouble = RunState(), 0, 0, ""
     try:
         for event in file.read():
@@ -102,7 +97,7 @@ def _fill(file: RunFile, made: Path) -> Whole:
 
         db.execute("BEGIN")
         db.execute("DELETE FROM event")
-        found = _read(file, keep)
+        found = whole(file, keep)
         with suppress(UserError):
             db.executemany("INSERT INTO command VALUES (?, ?, ?, ?)", map(_row, file.commands()))
         db.execute("COMMIT")

@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.events import EngineStarted, IsolationStarted, MarginImpossible, MarginRan, NumberAsked
+from ddenv.runfile.events import (
+    EngineStarted,
+    IsolationStarted,
+    MarginImpossible,
+    MarginRan,
+    MarginsStarted,
+    NumberAsked,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,25 +243,24 @@ class NumberTried:
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """How far numbers may change in environment number `environment`, as `runs` and values that are `impossible` show.
+    """How far numbers may change in the environment that was asked for, as `runs` and values that are `impossible` show.
 
-    The last call asks for the numbers `wanted` with at most `budget` runs after the first `before_call` ones, and `certified` says
-    whether fresh runs had shown the rate of f. `status` and `before` are how the reduction stood then, and why. `ended`: the
-    search is over; `broken_off`: a decision of the user ended it.
+    The last call is as it was `asked`, after the first `before_call` runs. `ended`: the search is over; `broken_off`: a decision of
+    the user ended it.
     """
 
-    environment: int
+    asked: MarginsStarted
     numbers: tuple[NumberTried, ...]
-    wanted: tuple[str, ...]
-    budget: int
-    before_call: int
-    certified: bool
-    status: str
-    before: str
+    before_call: int = 0
     runs: tuple[MarginRan, ...] = ()
     impossible: tuple[MarginImpossible, ...] = ()
     ended: bool = False
     broken_off: bool = False
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """The names of the numbers that the last call asks for."""
+        return tuple(one.name for one in self.asked.numbers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,25 +285,5 @@ class Physics:
 
     def compared(self, same: bool) -> Physics:
         """After a test was made again, with the same bits or not."""
-        mixed = self.mixed if same else (*self.mixed, f"first {self.before}, then {self.after}")
+        mixed = self.mixed if same else (*self.mixed, f"first {self.proven}, then {self.now}")
         return replace(self, proven=self.now, mixed=mixed)
-
-    @property
-    def before(self) -> str:
-        """What of `proven` is different now."""
-        return _lacking(self.proven, self.now)
-
-    @property
-    def after(self) -> str:
-        """What is different from `proven`."""
-        return _lacking(self.now, self.proven)
-
-
-def _lacking(these: str, those: str) -> str:
-    return ", ".join(each for each in these.split(", ") if each not in those.split(", ")) or "something unknown"
-
-
-def narrowed(before: tuple[int, int, int], now: tuple[int, int, int]) -> tuple[int, int, int]:
-    """What two estimates, as (low, likely, high), have in common; `now` where they contradict each other."""
-    low, high = max(before[0], now[0]), min(before[2], now[2])
-    return (low, min(max(low, now[1]), high), high) if low <= high else now

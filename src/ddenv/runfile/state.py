@@ -63,7 +63,7 @@ class RunState:
     it needs is present.
     `supports`, `welds` and `ties` have (model, other): it rests on the other once the whole world has settled (found while
     `settling`; `unsettled` says why it could not be), is welded to it by the files, or tied to it; `ties` are None if unknown.
-    Of the tests, `implied` ones were not simulated, `audits` were although they were implied, and `ahead` are not needed so far;
+    Of the tests, `implied` ones were not simulated, and `audits` were although they were implied;
     decisions rest on those with the bits 1 << id of `rests_on`. Those up to `mixed_until` were computed with something else, and
     imply nothing now. If one of these, the first of `refuted`, did not repeat the second, slices are no longer used.
     `engines` counts the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one
@@ -121,7 +121,6 @@ class RunState:
     welds: Pairs = ()
     ties: Pairs | None = None
     implied: int = 0
-    ahead: int = 0
     rests_on: int = 0
     audits: int = 0
     refuted: tuple[int, int] | None = None
@@ -263,6 +262,13 @@ class RunState:
         return counts | {"failed": self.tally["failed"]} if self.tally["failed"] else counts
 
     @property
+    def ahead(self) -> int:
+        """How many tests were made ahead of time and are not needed so far."""
+        needed = set(Environment(self.rests_on))
+        made = (test for test in self.tests if test.phase in ("round", CERTIFY) and test.implied_by is None)
+        return sum(test.is_finished and test.id not in needed for test in made)
+
+    @property
     def made(self) -> int:
         """How many finished tests were simulated."""
         return self.tests_done - self.implied
@@ -295,11 +301,6 @@ class Round:
     @property
     def partitions(self) -> tuple[tuple[str, ...], ...]:
         return self.split.partitions
-
-    @property
-    def untried(self) -> tuple[Candidate, ...]:
-        """The candidates that have no verdict, while the round goes on."""
-        return () if self.done or self.winner is not None else tuple(one for one in self.candidates if not one.verdict)
 
 
 @dataclass(frozen=True, slots=True)

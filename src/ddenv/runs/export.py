@@ -13,7 +13,7 @@ from ddenv.evidence.margins import fixes_of
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runs.nearest import removed_in_passing
+from ddenv.runs.reasons import removed_in_passing
 from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest

@@ -10,10 +10,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shlex
 import stat
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -22,13 +24,17 @@ import yaml
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.clusters import HERE, check_cluster, made_here
+from ddenv.runs.programs import how_to_install
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.runs.subject import read_scenario
 from ddenv.world.access import is_file
 from ddenv.world.command import start_folder
 from ddenv.world.scenario import Scenario
 
+HERE = "here"
+SSH = "ssh:"
+# A scheduler's address; a bracket holds the colons of IPv6.
+SCHEDULER = re.compile(r"(tcp|tls)://(\[[\w:.%]+\]|[\w.-]+):\d{1,5}")
 FILE = "trusted.json"
 # Begins a scenario's file that ddenv wrote: it may be of a run that somebody sent, whose program nobody here has chosen.
 WRITTEN = "# Written by ddenv; a program that it starts is asked about.\n"
@@ -180,3 +186,30 @@ def trusted_scenario(file: RunFile, asks: Callable[[str], bool], cluster: str | 
     check_cluster(cluster or scenario.reduction.cluster)
     check_trusted(made_here(scenario) if cluster else scenario, file.path, asks)
     return scenario
+
+
+# Where tests are made: on this machine, or by a Dask cluster that the user names.
+
+
+def check_cluster(cluster: str) -> None:
+    """Raises UserError for what is neither `here` nor a cluster that can be asked, and where Dask is not installed."""
+    if cluster == HERE:
+        return
+    if not (SCHEDULER.fullmatch(cluster) or hosts_of(cluster) or is_file(Path(cluster))):
+        raise UserError(
+            f"options: reduction.cluster: expected here, tcp://HOST:PORT, tls://HOST:PORT, ssh:HOST1,HOST2 or the path of a "
+            f"scheduler file that is there, found '{cluster}'"
+        )
+    if find_spec("distributed") is None:
+        raise UserError(f"options: reduction.cluster: Dask is not installed here: {how_to_install('cluster')}")
+
+
+def made_here(scenario: Scenario) -> Scenario:
+    """`scenario` with its tests on this machine."""
+    return scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update={"cluster": HERE})})
+
+
+def hosts_of(cluster: str) -> list[str]:
+    """The hosts of `ssh:HOST1,HOST2`; none for any other cluster."""
+    hosts = cluster.removeprefix(SSH).split(",") if cluster.startswith(SSH) else []
+    return hosts if all(re.fullmatch(r"\w[\w.-]*", host) for host in hosts) else []

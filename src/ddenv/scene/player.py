@@ -17,9 +17,8 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runfile.tested import Wanted, made_for
-from ddenv.runs.nearest import nearest
 from ddenv.runs.playback import played
-from ddenv.runs.reasons import Parting, reasons
+from ddenv.runs.reasons import Parting, nearest, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view

@@ -116,7 +116,7 @@ def nearest_fix(margins: Margins) -> str:
 
 
 def sureness(margins: Margins) -> str:
-    less = "" if margins.certified else " No certificate has shown yet how often f shows in what is left."
+    less = "" if margins.asked.certified else " No certificate has shown yet how often f shows in what is left."
     return (
         "Claims are about the values that were tried, not those between; the chance that any claim of a call is wrong is at most "
         f"{percent(ERROR)}.{less}"
@@ -157,7 +157,7 @@ def finding(state: RunState) -> str:
     if now is None:
         return FINDING
     runs = now.runs[now.before_call :]
-    most = min(now.budget, MOST_OF_NUMBER * len(now.wanted)) + FIX_RUNS
+    most = min(now.asked.budget, MOST_OF_NUMBER * len(now.wanted)) + FIX_RUNS
     if not runs:
         return f"{FINDING}: at most {count(most, 'run')}"
     left = most - len(runs)

@@ -93,7 +93,7 @@ def _engine_started(before: RunState, after: RunState) -> str:
 def _comparing(_: RunState, after: RunState) -> str:
     if after.physics.now == after.physics.proven:
         return "a failing run is made again with its seed, to see whether it repeats"
-    return f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
+    return f"made with {after.physics.proven}, now {after.physics.now}: the first run is made again and compared"
 
 
 def _compared(before: RunState, after: RunState) -> str:

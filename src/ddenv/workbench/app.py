@@ -211,8 +211,6 @@ class Workbench(App[int]):
 
         self.push_screen(Help(groups(self.screen)))
 
-    # What all maps of the screen do together.
-
     def action_names(self) -> None:
         for world in self._maps:
             world.toggle_layer("names")

@@ -38,6 +38,13 @@ NAMED = 40
 GO = "go on from this environment: the run pauses there (branch)"
 
 
+class Tree(DataTable[Text]):
+    """Home and end go to the first and the last row."""
+
+    action_scroll_home = DataTable.action_scroll_top
+    action_scroll_end = DataTable.action_scroll_bottom
+
+
 class History(Screen[int | None]):
     """Returns the node to go on from, or None. It follows the run while it is open."""
 
@@ -66,7 +73,7 @@ class History(Screen[int | None]):
     def compose(self) -> ComposeResult:
         with Horizontal(id="both"):
             with Framed("Reductions", id="tree-panel", classes="panel"):
-                yield DataTable[Text](id="tree", cursor_type="row", cell_padding=1)
+                yield Tree(id="tree", cursor_type="row", cell_padding=1)
             with Framed("What you decided", id="past-decisions", classes="panel"):
                 yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         yield Static("", id="about", markup=False)
@@ -170,4 +177,4 @@ def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]
 
 
 def _named(names: Sequence[str]) -> str:
-    return f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}"
+    return f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}" if names else "none"

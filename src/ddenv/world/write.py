@@ -37,7 +37,7 @@ from ddenv.world.model import (
     Visual,
     World,
 )
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import Pose
 
 DRAKE = "http://drake.mit.edu"
 _LINE_START = re.compile(rb"(\r\n|\n|\r)[ \t]*\Z")
@@ -194,34 +194,16 @@ def _inertia(parent: Element, inertia: Inertia, link_pose: Pose) -> None:
 
 def _joint(parent: Element, name: str, joint: Joint, model: Model, child_pose: Pose, names: dict[str, str]) -> None:
     element = SubElement(parent, "joint", name=name, type=joint.kind)
-    # Its axes are those of its frame: rounded axes of a universal joint would no longer be perpendicular.
-    frame = Pose(joint.pose.position, _turned(joint.axis, joint.axis2 or _across(joint.axis)))
-    _pose(element, child_pose.inverse() @ frame)
+    _pose(element, child_pose.inverse() @ joint.pose)
     SubElement(element, "parent").text = names.get(joint.parent, joint.parent)
     SubElement(element, "child").text = names[joint.child]
     if joint.kind in ("fixed", "ball"):
         return
-    for tag, axis in (("axis", "1 0 0"), ("axis2", "0 1 0"))[: 2 if joint.axis2 else 1]:
-        holder = SubElement(element, tag)
-        SubElement(holder, "xyz").text = axis
-        _limits(holder, joint)
-
-
-def _across(axis: Vector) -> Vector:
-    """A unit vector perpendicular to the unit vector `axis`."""
-    other = np.eye(3)[int(np.abs(axis).argmin())]
-    across = np.cross(axis, other)
-    x, y, z = (across / np.linalg.norm(across)).tolist()
-    return x, y, z
-
-
-def _turned(x_axis: Vector, y_axis: Vector) -> tuple[float, float, float, float]:
-    """The quaternion (w, x, y, z) of the frame whose x and y axes are these unit vectors."""
-    from scipy.spatial.transform import Rotation
-
-    matrix = np.column_stack([x_axis, y_axis, np.cross(x_axis, y_axis)])
-    x, y, z, w = Rotation.from_matrix(matrix).as_quat().tolist()
-    return w, x, y, z
+    for tag, axis in (("axis", joint.axis), ("axis2", joint.axis2)):
+        if axis is not None:
+            holder = SubElement(element, tag)
+            SubElement(holder, "xyz").text = _numbers(joint.pose.inverse().rotate(axis))
+            _limits(holder, joint)
 
 
 def _limits(holder: Element, joint: Joint) -> None:

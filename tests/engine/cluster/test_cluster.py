@@ -113,24 +113,6 @@ def test_a_run_waits_for_a_lost_scheduler_and_goes_on_with_the_next_one(cluster,
 
 @LONG
 @pytest.mark.programs
-def test_a_run_whose_scheduler_is_lost_goes_on_here_when_asked(cluster, held, home):
-    cluster.start_worker()
-    held.hold()
-    run = home / "there.ddenv"
-    program = start(held.file, run, "--cluster", cluster.address)
-    wait_until(held.begun, lambda: said(run))
-    cluster.kill(cluster.scheduler)
-    until_said(run, "resume it with --cluster here")
-    program.send_signal(signal.SIGINT)
-    program.communicate(timeout=PATIENCE)
-    held.let_go()
-    done = ddenv("resume", run, "--cluster", "here")
-    assert done.returncode == 0, done.stderr
-    assert state_of(run).environment == state_of(here(held.file, home / "here.ddenv")).environment
-
-
-@LONG
-@pytest.mark.programs
 def test_the_tests_of_a_killed_engine_end_and_the_next_one_uses_the_same_workers(cluster, held, home):
     cluster.start_worker(), cluster.start_worker()
     held.hold()
@@ -195,22 +177,3 @@ def test_a_scheduler_may_ask_for_certificates(held, home, tmp_path, monkeypatch)
         assert "Traceback" not in refused.stderr
     finally:
         cluster.close()
-
-
-@LONG
-@pytest.mark.programs
-@pytest.mark.parametrize(("scenario", "tests"), [(DATA / "wall.yaml", 4), ("ditch", 12)], ids=["wall", "ditch"])
-def test_it_ends_the_same_on_drake_when_a_worker_dies_and_then_the_scheduler(cluster, home, scenario, tests):
-    first, _ = cluster.start_worker(), cluster.start_worker()
-    run = home / "there.ddenv"
-    program = start(scenario, run, "--cluster", cluster.address)
-    wait_until(lambda: run.exists() and state_of(run).tests_done >= tests)
-    cluster.kill(first)
-    until_said(run, "1 worker left the cluster")
-    wait_until(lambda: state_of(run).tests_done >= 2 * tests)
-    cluster.kill(cluster.scheduler)
-    until_said(run, "is lost")
-    cluster.start_scheduler()
-    cluster.start_worker(), cluster.start_worker()
-    ended(program)
-    check_same(run, here(scenario, home / "here.ddenv"))

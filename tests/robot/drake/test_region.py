@@ -62,6 +62,7 @@ def test_every_bit_is_the_same_in_a_small_region_in_a_large_one_and_with_everyth
         assert [all_bits(one.run(part, seed=1)) for part in parts] == expected
 
 
+@pytest.mark.rates
 def test_a_run_that_leaves_the_region_is_made_again_from_its_start_in_a_larger_one(variants, world):
     names = frozenset(world.elements())
     expected = all_bits(variants(EVERYTHING).run(names, seed=1))
@@ -75,6 +76,7 @@ def test_a_run_that_leaves_the_region_is_made_again_from_its_start_in_a_larger_o
     assert still(small) == after
 
 
+@pytest.mark.rates
 @pytest.mark.parametrize("x", [0.0, 3.0], ids=["beside the robot", "played back"])
 def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
     world_of, add, variants, husky, scenario, x
@@ -93,6 +95,7 @@ def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
     assert expected[0][3] != expected[1][3]
 
 
+@pytest.mark.rates
 def test_what_rests_on_what_is_found_where_a_pile_leaves_the_region(variants, world):
     names = frozenset(world.elements())
     expected = variants(EVERYTHING).supports(names)

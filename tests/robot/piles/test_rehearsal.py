@@ -45,6 +45,7 @@ def test_scripts_are_held_in_a_bounded_memory(world_of, monkeypatch):
         assert not repertoire.find(heap, everything)
 
 
+@pytest.mark.rates
 @pytest.mark.parametrize("memory", slow(pytest.mark.examples, [0.0, 3e5], but=[3e5]))
 def test_a_small_memory_changes_no_bit(world_of, add, husky, scenario_of, monkeypatch, memory):
     world = add(

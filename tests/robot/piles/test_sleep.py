@@ -82,7 +82,7 @@ def template(world_of, add, husky, scenario_of):
     return make
 
 
-@pytest.mark.parametrize("far", slow(pytest.mark.rates, FAR, but=["in the air", "colliding with itself"]))
+@pytest.mark.parametrize("far", slow(pytest.mark.rates, FAR, but=["in the air"]))
 def test_a_model_that_takes_no_part_leaves_no_trace_when_it_is_removed(template, far):
     near, far = (cube("near", 1.2, 0.0, 0.15), cube("beside", 1.5, 1.5, 0.4)), FAR[far]
     names = {model.name for model in (*near, *far)}
@@ -95,6 +95,7 @@ def test_a_model_that_takes_no_part_leaves_no_trace_when_it_is_removed(template,
     assert bits(run(template(*near, *far[1:]), *names - {"far"})) == bits(without)
 
 
+@pytest.mark.rates
 def test_what_moves_far_away_does_not_decide_whether_the_robot_wakes_what_it_passes(template):
     """What touches itself has no twin, and wakes before the robot can touch it."""
     links = (link_of(name, Box((0.3, 0.3, 0.3)), Pose((1.2, 0.55, z))) for name, z in (("a", 0.15), ("b", 0.46)))
@@ -112,6 +113,7 @@ def test_what_fell_to_rest_does_not_creep_at_all(template):
         assert (rows == rows[0]).all()
 
 
+@pytest.mark.rates
 def test_boards_that_lie_across_each_other_come_to_rest(template, world_of, husky, scenario_of):
     boards = [
         box_model("left", "1 3 0.02 0 0 0", BOARD, mass=2.0),
@@ -134,6 +136,7 @@ def test_the_robot_pushes_what_was_asleep_as_if_it_had_been_awake(template):
     assert slept.motions["crate"][:, 1:4] == pytest.approx(awake.motions["crate"][:, 1:4], abs=0.03)
 
 
+@pytest.mark.rates
 def test_models_of_many_and_of_few_shapes_rest_on_each_other_and_are_pushed(template):
     # At rest the cube lies a little within the tile. Drake must not look for contacts of one twin with another.
     pile = template(tile("tile", 2.0, 0.0), cube("cube", 2.0, 0.0, 0.349), tile("beside", 2.0, 0.905))
@@ -154,6 +157,7 @@ def test_a_pile_wakes_as_one(template):
     assert result.motions["storey_3"][-1, 3] < 0.3
 
 
+@pytest.mark.rates
 def test_what_the_robot_sets_in_motion_wakes_what_it_comes_near(template):
     row = [
         model_of(f"domino_{number}", link_of("link", Box((0.1, 0.5, 0.9)), Pose((1.5 + 0.5 * number, 0.0, 0.45)), 2.0))
@@ -167,6 +171,7 @@ def test_what_the_robot_sets_in_motion_wakes_what_it_comes_near(template):
     assert result.trajectory[fallen, 1] + 0.5 < last[0, 1] - 1.0
 
 
+@pytest.mark.rates
 def test_what_moves_by_itself_wakes_what_it_comes_near(template):
     ball = model_of("ball", link_of("link", Sphere(0.2), Pose((2.3, 6.0, 0.55)), 5.0))
     # The slope rises along x: the ball rolls back along it, onto a box that is long at rest.
@@ -178,6 +183,7 @@ def test_what_moves_by_itself_wakes_what_it_comes_near(template):
     assert bits(run(world, "ball", "hill", "box")) == bits(result)
 
 
+@pytest.mark.rates
 def test_what_is_asleep_or_removed_stands_on_its_joint_like_a_pencil_on_its_tip(template):
     pole = link_of("pole", Box((0.1, 0.1, 0.4)), Pose((1.0, 3.0, 1.5)))
     hinge = joint_of("revolute", "world", "pole", (1.0, 3.0, 1.2), (0.0, 1.0, 0.0))
@@ -232,6 +238,7 @@ def test_a_run_leaves_no_trace_in_the_next(template):
     assert bits(run(template(*models), *names)) == bits(first)
 
 
+@pytest.mark.rates
 def test_what_moves_longer_than_it_could_be_rehearsed_goes_on_moving(template, monkeypatch):
     swing = flap("flap", 1.0, -3.0, lower=-np.inf, damping=0.0)
     whole = run(template(swing), "flap").motions["flap"]
@@ -254,6 +261,7 @@ def test_what_cannot_be_rehearsed_is_simulated_with_the_robot(template, monkeypa
     assert rows[-1, 3] == pytest.approx(0.15, abs=0.005)
 
 
+@pytest.mark.rates
 def test_links_of_a_model_meet_only_if_it_says_so(template):
     pair = model_of(
         "pair",
@@ -267,6 +275,7 @@ def test_links_of_a_model_meet_only_if_it_says_so(template):
             run(pairs)
 
 
+@pytest.mark.rates
 def test_links_that_are_met_one_after_the_other_stay_apart_from_their_own_model_only(template):
     """Waking and falling asleep must not let a model's own links meet."""
     pair = model_of(

@@ -64,6 +64,7 @@ def test_what_stands_beside_something_does_not_rest_on_it(template, world_of, ad
     assert pairs(template, world) == []
 
 
+@pytest.mark.rates
 def test_what_rolls_onto_another_pile_rests_on_it(template, world_of, add):
     ramp = model_of("ramp", link_of("link", wedge(1.0, 1.0, 0.3), Pose((2.0, 6.0, 0.45)), mass=None))
     tray = [cube(f"tray_{side}", 0.6, 6.0 + side, 0.15) for side in (-1, 1)]
@@ -73,6 +74,7 @@ def test_what_rolls_onto_another_pile_rests_on_it(template, world_of, add):
     assert ("ball", "bottom") in pairs(template, world)
 
 
+@pytest.mark.rates
 def test_finding_it_leaves_no_trace_in_the_next_run(template, world_of, add):
     world = add(world_of(SHELF), cube("cup", 1.0, 3.0, 1.2), cube("near", 1.2, 0.0, 0.15), cube("over", 1.2, 0.0, 0.5))
     names = world.elements()
@@ -91,6 +93,7 @@ def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(template, world_o
     assert pairs(template, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [("cup", "shelf")]
 
 
+@pytest.mark.rates
 @pytest.mark.skipif(not REAL.exists(), reason="the real worlds are not here")
 def test_a_block_of_a_real_world_lies_on_its_asphalt(template):
     from ddenv.world.sdf.read import read_world

@@ -14,6 +14,7 @@ from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, noticed, run
+from tests.tiers import slow
 
 WALL = box_model("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")
 FRONT = 0.4937  # m, from the robot's frame to the foremost point of its box
@@ -168,7 +169,7 @@ def test_links_that_are_fixed_in_the_world_are_part_of_their_model(world_of, add
     assert x_at(result, result.first_touched["gate"]) + FRONT == pytest.approx(1.4, abs=0.06)
 
 
-@pytest.mark.parametrize("sleeping", [True, False])
+@pytest.mark.parametrize("sleeping", slow(pytest.mark.rates, [True, False], but=[True]))
 def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husky, scenario_of, monkeypatch, sleeping):
     tower = [
         model_of(f"storey_{number}", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.5, 0.1, 0.15 + 0.3 * number))))
@@ -198,6 +199,7 @@ def test_noticing_changes_no_bit_of_a_run_in_the_ditch(ditch, ditch_world, monke
         assert bits(bare) == bits(result)
 
 
+@pytest.mark.rates
 def test_a_used_template_notices_the_same_as_a_fresh_one(world_of, add, husky, scenario_of):
     crate = model_of("crate", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.0, 0.2, 0.15))))
     world = add(world_of(WALL, box_model("post", "0 -2 0.5 0 0 0", "0.2 0.2 1")), crate)
@@ -212,6 +214,7 @@ def test_a_used_template_notices_the_same_as_a_fresh_one(world_of, add, husky, s
     assert noticed(run(Template(world, husky, scenario), "wall", "crate", "post")) == noticed(first)
 
 
+@pytest.mark.rates
 def test_contacts_that_cannot_be_worked_out_are_the_next_steps_to_report(world_of, husky, scenario_of):
     template = Template(world_of(WALL), husky, scenario_of())
     before = run(template, "wall")

@@ -162,6 +162,7 @@ def test_any_part_with_all_that_took_part_gives_the_same_bits(flat, placed, sees
     assert is_implied(world, there, data.draw(some, "more"))
 
 
+@pytest.mark.rates
 def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkeypatch):
     bump, wall = still("bump", 0.8, 0.3, (0.04, 0.3, 0.01)), still("wall", 1.8, 0.5, (0.3, 0.6, 1.0))
     crate, stop = cube("crate", 1.2, 0.0, 0.15), still("stop", 2.2, 0.0, (0.1, 0.3, 0.05))

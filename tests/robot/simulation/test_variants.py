@@ -88,6 +88,7 @@ def test_what_a_pile_does_is_worked_out_once_for_all_plants(cubes, husky, scenar
     assert all_bits(results[1]) == all_bits(whole.run(ALL - {"a"}, 1))
 
 
+@pytest.mark.rates
 def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_was_left_out(
     world_of, add, husky, scenario
 ):
@@ -105,6 +106,7 @@ def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_w
         assert rows[-1, 3] == pytest.approx(height, abs=0.005)
 
 
+@pytest.mark.rates
 def test_a_plant_is_built_once_while_it_is_asked_for(cubes, husky, scenario, built):
     smaller = Variants(cubes, husky, scenario)
     for seed in range(3):

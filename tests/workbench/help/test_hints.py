@@ -42,7 +42,7 @@ def test_each_key_has_the_words_behind_it(text, keys):
     assert [(found.plain[at.start : at.end], at.style.meta["key"]) for at in found.spans] == keys
 
 
-@pytest.mark.parametrize("name", slow(pytest.mark.screens, OPENED, but=["help", "facts", "settings"]))
+@pytest.mark.parametrize("name", slow(pytest.mark.screens, OPENED, but=["settings"]))
 async def test_a_dialog_obeys_each_key_that_it_shows_and_closes_by_a_click(run, name):
     fake_moments.guided(run).hold()
     app = Workbench(run.path)
@@ -58,6 +58,7 @@ async def test_a_dialog_obeys_each_key_that_it_shows_and_closes_by_a_click(run, 
             await eventually(lambda: app.screen is not screen)
 
 
+@pytest.mark.screens
 async def test_a_click_in_a_pane_without_the_focus_is_for_this_pane(scenarios, runs):
     fake_moments.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
     app = Workbench()

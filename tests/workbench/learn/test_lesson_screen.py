@@ -76,6 +76,7 @@ async def test_enter_shows_the_rest_of_a_long_text_first():
         assert course.step == 1
 
 
+@pytest.mark.screens
 async def test_at_80_columns_a_hint_is_in_sight_and_the_map_has_the_way_of_the_test_that_is_told():
     keep_score("what-delta-debugging-is", Score(step=10))
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
@@ -97,6 +98,7 @@ async def test_at_80_columns_a_hint_is_in_sight_and_the_map_has_the_way_of_the_t
         assert screen.query_one("#lesson-world").border_title == "World: path of test 6"
 
 
+@pytest.mark.screens
 async def test_after_a_lesson_comes_the_next_one_by_itself_and_the_list_shows_how_far_one_is():
     names = [open_lesson(file).lesson.name for file in bundled()]
     for name in names[:2]:
@@ -125,6 +127,7 @@ async def test_after_a_lesson_comes_the_next_one_by_itself_and_the_list_shows_ho
         assert "next lesson" not in text(pilot) and isinstance(pilot.app.screen, LessonScreen)
 
 
+@pytest.mark.screens
 async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it():
     keep_score("what-delta-debugging-is", Score(step=2))
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
@@ -159,6 +162,7 @@ async def test_a_lesson_that_is_done_shows_the_end_of_its_run_and_can_be_started
     assert all_scores()["what-delta-debugging-is"].done
 
 
+@pytest.mark.screens
 async def test_the_letters_of_answers_leave_out_f_and_the_key_of_the_hint():
     lesson = open_lesson(bundled()[0]).lesson
     round_2 = next(number for number, step in enumerate(lesson.steps) if step.foretell == "winner")
@@ -213,6 +217,7 @@ async def test_the_setup_screen_leads_to_the_lessons():
         assert not isinstance(pilot.app.screen, LessonsScreen)
 
 
+@pytest.mark.screens
 async def test_the_algorithm_is_shown_from_the_step_that_speaks_of_it_on():
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
         await pilot.pause()

@@ -120,6 +120,7 @@ async def test_two_tests_are_overlaid_and_p_goes_to_where_they_part(two_ways):
         assert [one.test.id for one in screen._tests] == [61, 38]
 
 
+@pytest.mark.screens
 async def test_o_offers_tests_with_the_same_seed_first(two_ways):
     state = two_ways.state
     found = others(state.tests, state.tests[37])
@@ -135,6 +136,7 @@ async def test_o_offers_tests_with_the_same_seed_first(two_ways):
         assert len(screen._tests) == 1
 
 
+@pytest.mark.screens
 async def test_arrows_go_to_other_tests_and_facts_play_theirs(two_ways):
     async with Attached(two_ways, size=(80, 24)) as session:
         await session.press("2", "home", "F", "left", "p")
@@ -149,6 +151,7 @@ async def test_arrows_go_to_other_tests_and_facts_play_theirs(two_ways):
         assert isinstance(session.app.screen, RunScreen)
 
 
+@pytest.mark.screens
 async def test_a_click_on_the_slider_goes_there_and_the_wheel_turns_frames(two_ways):
     async with Attached(two_ways) as session:
         await session.press("P")

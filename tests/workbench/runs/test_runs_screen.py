@@ -15,6 +15,7 @@ from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
 from ddenv.workbench.runs.runs_table import RunTable
 from ddenv.workbench.setup.setup_screen import SetupScreen
+from tests.tiers import slow
 
 
 @pytest.fixture
@@ -103,6 +104,7 @@ async def test_every_run_says_how_it_stands(several, runs):
         assert listed.table.chosen.path.stem == "done"
 
 
+@pytest.mark.screens
 async def test_at_80_columns_the_run_under_the_cursor_is_whole_below_the_list(several, runs):
     name = "a run whose name takes more than the list has room for"
     fake_moments.finished(fake_run.FakeRun(runs / f"{name}.ddenv")).close()
@@ -121,6 +123,7 @@ async def test_small_terminals_show_what_there_is_room_for(several, size):
             assert all(len(row) >= 5 for row in listed.rows().values())
 
 
+@pytest.mark.screens
 async def test_enter_opens_a_run_w_watches_it_and_n_makes_one_like_it(several, scenarios):
     async with Listed(several) as listed:
         await listed.choose("done")
@@ -224,7 +227,9 @@ async def test_two_runs_are_compared(several, runs):
     assert list(differences(one, other)) == [("a.c", "none", "[2]")]
 
 
-@pytest.mark.parametrize("how", ["typed", "completed", "pasted", "quoted", "url"])
+@pytest.mark.parametrize(
+    "how", slow(pytest.mark.screens, ["typed", "completed", "pasted", "quoted", "url"], but=["pasted"])
+)
 async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
     folder = tmp_path / "from a robot"
     folder.mkdir()

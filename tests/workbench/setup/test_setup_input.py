@@ -138,6 +138,7 @@ async def test_numbers_begin_with_their_sign(scenarios, size):
             assert shown(session, id) == NUMBERS[id]
 
 
+@pytest.mark.screens
 async def test_a_number_that_does_not_fit_says_so_and_is_replaced_by_typing(scenarios):
     async with Opened() as session:
         await session.press("f4")

@@ -169,6 +169,7 @@ async def test_a_world_that_misses_nothing_has_no_rows(scenarios, depot):
         assert "--stand-in auto" in session.told("command")
 
 
+@pytest.mark.screens
 async def test_what_was_replaced_or_ignored_can_be_read(tmp_path):
     ball = """<model name='{}'><link name='l'><velocity_decay/><collision name='c'><geometry><sphere><radius>1</radius>
         </sphere></geometry><surface><bounce><restitution_coefficient>1</restitution_coefficient></bounce></surface>
@@ -198,6 +199,7 @@ def test_only_the_newest_remedies_are_kept():
     assert list(found)[-1] == "model://9"
 
 
+@pytest.mark.screens
 async def test_the_question_for_the_start_comes_back_to_the_map(depot):
     async with Opened(size=(80, 24)) as session:
         await session.open(depot)

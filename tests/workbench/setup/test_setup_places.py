@@ -105,6 +105,7 @@ async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size
         assert session.told("command").startswith("$ ddenv run")
 
 
+@pytest.mark.screens
 async def test_the_ground_gives_the_z_of_a_start_that_is_typed_until_one_types_that(scenarios, tmp_path):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
@@ -147,6 +148,7 @@ async def test_the_crosshair_and_the_mouse_pick(scenarios):
         assert places.numbers() == before
 
 
+@pytest.mark.screens
 async def test_looking_at_a_world_in_the_list_asks_nothing_before_enter(scenarios, tmp_path):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
@@ -173,7 +175,7 @@ async def says(session, words):
     return line
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 36)])
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)]))
 async def test_a_robot_in_the_air_is_told_until_its_start_is_lower(scenarios, size):
     data = fake_run.scenario()
     data["robot"]["spawn"]["z"] = 1.0
@@ -189,6 +191,7 @@ async def test_a_robot_in_the_air_is_told_until_its_start_is_lower(scenarios, si
         await says(session, "")
 
 
+@pytest.mark.screens
 async def test_models_inside_each_other_are_told_of_a_world_without_a_start(scenarios):
     (scenarios / "inside.sdf").write_text(world(LOOSE, fake_run.box("wall", 0.5, 0)))
     async with Opened() as session:

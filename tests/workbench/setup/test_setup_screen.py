@@ -81,6 +81,7 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
         assert session.app.focused.id == "epsilon"
 
 
+@pytest.mark.screens
 async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenarios, runs):
     fake_moments.finished(fake_run.FakeRun(runs / "crates-world-1.ddenv")).close()
     fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
@@ -100,7 +101,8 @@ async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenari
         assert session.told("about") == session.screen.preview.choice.about
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (200, 60)], but=[(120, 36)]), ids=str)
+@pytest.mark.screens
+@pytest.mark.parametrize("size", [(120, 36), (200, 60)], ids=str)
 async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, size):
     async with Opened(size) as session:
         for id in ("#choice", "#preview", "#fields", "#explained"):
@@ -108,9 +110,8 @@ async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, siz
         assert session.screen.query_one(WorldMap).size.height >= size[1] * 4 // 10
 
 
-@pytest.mark.parametrize(
-    "size", slow(pytest.mark.screens, [(64, 18), (80, 24), (120, 36), (200, 60)], but=[(80, 24)]), ids=str
-)
+@pytest.mark.screens
+@pytest.mark.parametrize("size", [(64, 18), (80, 24), (120, 36), (200, 60)], ids=str)
 async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios, size):
     async with Opened(size) as session:
         for key in ("f2", "f4", "f9"):
@@ -125,6 +126,7 @@ async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios
             assert select.query_one("#label").size.width >= widest, select.id
 
 
+@pytest.mark.screens
 async def test_an_open_list_shows_all_its_names(scenarios):
     async with Opened((64, 18)) as session:
         await session.press("enter", "tab", "tab", "enter")
@@ -133,17 +135,11 @@ async def test_an_open_list_shows_all_its_names(scenarios):
         assert session.screen.region.contains_region(region)
 
 
+# One of each kind; `tests/test_settings.py` has the range of every setting.
 WRONG = (
     ("iterations", "three", "iterations: expected a whole number, found 'three'"),
-    ("iterations", "-1", "iterations: expected 0 to 1000, found -1"),
     ("timeout", "", "timeout s: is missing"),
-    ("timeout", "nan", "timeout s: expected 0.01 to 100000, found nan"),
-    ("timeout", "1e300", "timeout s: expected 0.01 to 100000, found 1e300"),
-    ("epsilon", "0", "epsilon m: expected 0.001 to 1000, found 0"),
-    ("seed", "99999999999", "seed: expected 0 to 2147483647"),
-    ("spawn_x", "1e300", "spawn x m: expected -1000000 to 1000000, found 1e300"),
     ("spawn_yaw", "-inf", "yaw rad: expected -1000 to 1000, found -inf"),
-    ("goal_y", "2e6", "goal y m: expected -1000000 to 1000000, found 2e6"),
     ("jobs", "0", "jobs: expected 1 to 1024, found 0"),
     ("name", " ", "run name: is missing"),
 )
@@ -208,11 +204,10 @@ async def test_the_preview_shows_what_is_wrong_with_a_scenario(scenarios, starte
         assert "choose a scenario" in session.wrong()
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 36)])
-async def test_a_world_that_cannot_be_read_leaves_nothing_of_the_one_before(scenarios, size):
+async def test_a_world_that_cannot_be_read_leaves_nothing_of_the_one_before(scenarios):
     broken = scenarios / "broken.sdf"
     broken.write_text("<sdf version='1.6'><model/></sdf>")
-    async with Opened(size) as session:
+    async with Opened((80, 24)) as session:
         assert session.value("spawn_x") and session.told("about")
         await session.open(broken)
         assert "found no <world>" in session.screen.query_one(WorldMap).notice

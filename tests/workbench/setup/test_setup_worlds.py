@@ -73,18 +73,6 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
 
 
 @pytest.mark.screens
-async def test_typed_places_are_marked_in_the_next_world_too(scenarios, tmp_path):
-    other = tmp_path / "other.sdf"
-    other.write_bytes((scenarios / "crates.sdf").read_bytes())
-    async with Opened() as session:
-        await session.open(scenarios / "crates.sdf")
-        session.place()
-        await session.pilot.pause()
-        await session.open(other)
-        assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
-
-
-@pytest.mark.screens
 async def test_without_scenarios_the_map_names_the_key_that_opens_a_file(tmp_path, monkeypatch):
     monkeypatch.setattr("ddenv.world.load.SCENARIOS", tmp_path / "none")
     async with Opened() as session:

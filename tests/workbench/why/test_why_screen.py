@@ -13,8 +13,7 @@ from ddenv.cli.command_line import app as command_line
 from ddenv.evidence.certificate import Pairs
 from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile
-from ddenv.runs.nearest import nearest
-from ddenv.runs.reasons import parting_sentence, reasons, sentence
+from ddenv.runs.reasons import nearest, parting_sentence, reasons, sentence
 from ddenv.text import percent
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.run.run_screen import RunScreen

@@ -266,16 +266,3 @@ for path in sorted(Path({str(tmp_path)!r}).iterdir()):
     print([unpack("", build(read_parts(path), convex=convex)).origin for convex in (False, True)])
 """
     assert run(text, "1") == run(text, "2")
-
-
-def test_nothing_slow_is_imported_before_it_is_needed():
-    text = """
-import sys, numpy
-from ddenv.world.files.meshes import origin, pack
-from ddenv.world.files.resources import Resources, _key
-points, faces = numpy.eye(3), numpy.array([[0, 1, 2]])
-stored = Resources({_key("mesh", "a.obj", "/", "", False, True): pack(points, faces)})
-assert stored.mesh("a.obj", "/", convex=True).faces.tolist() == faces.tolist()
-print([name for name in ("scipy", "trimesh", "collada") if name in sys.modules])
-"""
-    assert run(text) == "[]"

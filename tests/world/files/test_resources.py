@@ -71,40 +71,6 @@ def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
             ask()
 
 
-def test_the_same_request_gives_the_same_object_without_another_look(world, monkeypatch):
-    disk = on_disk(world)
-    disk.mesh("cube.obj", world, convex=True)
-    for source in (disk, Resources(disk.taken)):
-        first = source.mesh("cube.obj", world, convex=True)
-        with monkeypatch.context() as patch:
-            for once in ("find", "read_parts", "build", "unpack"):
-                patch.setattr(resources, once, None)
-            assert source.mesh("cube.obj", world, convex=True) is first
-
-
-def test_refusals_are_kept_but_not_taken(world, monkeypatch):
-    disk = on_disk(world)
-    asks = {
-        "bad": (lambda: disk.mesh("bad.obj", world, convex=True), Unusable),
-        "none": (lambda: disk.sdf("model://none", world), Missing),
-        "folder": (lambda: disk.mesh("model://box", world, convex=True), Unusable),
-    }
-    for ask, kind in asks.values():
-        with pytest.raises(kind):
-            ask()
-    monkeypatch.setattr(resources, "find", None)
-    for ask, kind in asks.values():
-        with pytest.raises(kind):
-            ask()
-    assert disk.taken == {}
-
-
-def test_limits(world, monkeypatch):
-    monkeypatch.setattr(resources, "SDF_LIMIT", 3)
-    with pytest.raises(Unusable, match="the maximum is"):
-        on_disk(world).sdf("model://box", world)
-
-
 def damaged(packed: bytes):
     triangle = pack(np.eye(3), np.array([[0, 1, 2]]))
     yield b""

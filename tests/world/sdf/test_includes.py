@@ -6,7 +6,7 @@ from ddenv.errors import UserError
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Cylinder
 from ddenv.world.scenario import Reading
-from ddenv.world.sdf.read import parse_world, unique_names
+from ddenv.world.sdf.read import parse_world
 from tests.world.sdf.conftest import BOX, world_text
 
 TOP = f"<pose>0 0 5 0 0 0</pose><static>1</static><link name='top'>{BOX}</link>"
@@ -124,11 +124,6 @@ def test_models_of_one_name_are_told_apart_by_their_place(read):
     world = read(one + "<model name='box #2'><link name='l'/></model>" + one + one)
     assert [model.name for model in world.models] == ["box", "box #2", "box #3", "box #4"]
     assert all("used 3 times" in note.why for note in world.notes if "name" in note.why)
-
-
-def test_unique_names_are_made_quickly():
-    assert unique_names(["a"] * 3 + ["b"]) == ["a", "a #2", "a #3", "b"]
-    assert len(set(unique_names(["a"] * 20_000))) == 20_000
 
 
 def test_words_that_are_not_known_are_noted(read):

@@ -12,7 +12,7 @@ from distributed import Client, Security, SSHCluster
 
 from ddenv.engine.worker import reason_of
 from ddenv.errors import UserError
-from ddenv.runs.clusters import hosts_of
+from ddenv.runs.trust import hosts_of
 from ddenv.world.access import is_file
 
 # The time between two looks at who is there, and between two attempts to connect, s.

@@ -105,8 +105,6 @@ class WorldMap(Widget, can_focus=True):
 
         return MapDrawing()
 
-    # The content.
-
     @property
     def place(self) -> Place:
         return self.shown.place
@@ -167,8 +165,6 @@ class WorldMap(Widget, can_focus=True):
 
     def legend(self, width: int) -> Text:
         return legend(self.shown, width)
-
-    # Models.
 
     @property
     def model_at_cursor(self) -> str | None:
@@ -245,8 +241,6 @@ class WorldMap(Widget, can_focus=True):
             why = "removed already" if name in state.elements else "protected: it always stays"
             self.notify(f"{plain(name)} is {why}", severity="warning", markup=False)
 
-    # The view.
-
     def zoom(self, factor: float) -> None:
         self.viewport.zoom(factor, self.viewport.cursor if self.aims else None)
         self._draw_soon()
@@ -275,8 +269,6 @@ class WorldMap(Widget, can_focus=True):
     def action_move(self, right: int, up: int) -> None:
         self.viewport.step(right, up)
         self._draw_soon()
-
-    # The mouse.
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
         self._wheel(event, WHEEL)
@@ -313,8 +305,6 @@ class WorldMap(Widget, can_focus=True):
             self.viewport.cursor, self._aim = (event.y, event.x), None
             self.action_pick()
             self._draw_soon()
-
-    # Drawing.
 
     def watch_has_focus(self, focused: bool) -> None:
         super().watch_has_focus(focused)

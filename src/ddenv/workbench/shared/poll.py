@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.runfile.fold import Follower, spent
+from ddenv.runfile.fold import spent, steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.snapshot import EngineIs, Snapshot
 from ddenv.runfile.state import RunState
@@ -53,7 +53,7 @@ class Poll:
         self.watch = watch
         self._on_event = on_event
         self.file = Observed(path, strictly=watch)
-        self._follower = Follower(self.file)
+        self._state = RunState()
         self._starting = starting
         self._snapshot: Snapshot | None = None
         self._behind = self._catching_up = True
@@ -105,7 +105,7 @@ class Poll:
                 return last
             return replace(last, engine=engine, spent=spent)
         error, more = self._follow()
-        state = self._follower.state
+        state = self._state
         spent = self._spent(state, engine)
         try:
             live, due = self._poses(state) if engine == "alive" else ((), True)
@@ -129,7 +129,8 @@ class Poll:
         try:
             while more:
                 more = False
-                for event, before, after in self._follower.new(SOME_EVENTS):
+                for event, before, after in steps(self.file.read(self._state.revision, SOME_EVENTS), self._state):
+                    self._state = after
                     self._on_event(event.kind, before, after)
                     more = True
                 if time.monotonic() - begun > PATIENCE:

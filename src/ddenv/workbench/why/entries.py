@@ -13,8 +13,7 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
-from ddenv.runs.nearest import Nearest, nearest
-from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, reasons, sentence
+from ddenv.runs.reasons import Nearest, Parting, Reason, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.text import as_sentence, padded, percent, plain, shortened
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating

@@ -127,7 +127,11 @@ class Directive:
 
     def complain(self, message: str) -> UserError:
         """A UserError with file and line."""
-        return UserError(f"{self.path}:{self.line}: {printable(message)}")
+        return _wrong(self.path, self.line, message)
+
+
+def _wrong(path: Path, line: int, message: str) -> UserError:
+    return UserError(f"{path}:{line}: {printable(message)}")
 
 
 class _Loader(yaml.BaseLoader):
@@ -200,27 +204,26 @@ def _items(text: bytes, path: Path, context: Context) -> Iterator[tuple[Section,
         raise UserError(f"{path}: expected 'directives:' with a list, and nothing else")
     for node in listed.value:
         line = node.start_mark.line + 1
-        where = Directive(AddModelInstance.model_construct(), path, line)
         try:
             data = loader.construct_object(node, deep=True)
         except yaml.YAMLError as error:
             raise _not_yaml(path, error) from None
         if not isinstance(data, dict) or len(data) != 1:
-            raise where.complain(f"expected one directive: {', '.join(KINDS)}")
+            raise _wrong(path, line, f"expected one directive: {', '.join(KINDS)}")
         ((kind, content),) = data.items()
         if kind == FILTERS:
             why = "collision filters are not simulated, nor written with what is left"
             context.notes.append(Note("ignored", "", f"{path}:{line}", kind, why))
             continue
         if kind not in KINDS:
-            raise where.complain(f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KINDS))}")
+            raise _wrong(path, line, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KINDS))}")
         try:
             yield KINDS[kind].model_validate(content), line
         except ValidationError as error:
             # A misspelled key, before the one that is missing.
             first = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
             words, what = complaint(first, KINDS[kind])
-            raise where.complain(": ".join(each for each in (kind, words, what) if each)) from None
+            raise _wrong(path, line, ": ".join(each for each in (kind, words, what) if each)) from None
 
 
 def _not_yaml(path: Path, error: Exception) -> UserError:

@@ -116,9 +116,7 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     factor = element.find("scale")
     own = ONE if factor is None else vector(numbers(factor, 3))
     if factor is not None and (min(map(abs, own)) < 1e-9 or max(map(abs, own)) > LARGEST):
-        raise complain(
-            factor, f"the factors of a scale must be from 1e-09 to 1e+06 or negative, found '{text_of(factor)}'"
-        )
+        raise complain(factor, f"a scale must be from 1e-09 to 1e+06 or negative, found '{text_of(factor)}'")
     given = context.stand_in(uri)
     if given is not None:
         text, stand_in = given

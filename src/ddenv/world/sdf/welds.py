@@ -110,7 +110,7 @@ class _Builder:
     def _add_model(self, one: Directive, value: AddModel) -> None:
         name = value.name
         self._claim(name, one)
-        include, uri = _element("add_model", one), _element("uri", one)
+        include, uri = (_element(tag, one.path, one.line, one.span) for tag in ("add_model", "uri"))
         uri.text = value.file
         include.set("name", name)
         include.append(uri)
@@ -120,7 +120,7 @@ class _Builder:
         if part is None:
             return
         part = replace(part, name=name)
-        outer = Scope(_element(WORLD, one), (one.path,), self.context, self.scopes)
+        outer = Scope(_element(WORLD, one.path), (one.path,), self.context, self.scopes)
         model = assemble(part, name, outer, None, self.context)
         model, turned = _at_positions(without_mass(model, part.element), value, one)
         self.models[name], self.elements[name] = model, include
@@ -296,7 +296,7 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
         # Again, for the places in that text; what is wrong was said with the places in the files.
         filters = [note for note in context.notes if note.what == FILTERS]
         return parse_directives(joint_text, path, Context(context.resources, context.reading, filters))
-    context.note_unused(_element(WORLD, Directive(AddModelInstance.model_construct(), path, 1)))
+    context.note_unused(_element(WORLD, path))
     ties = ((builder.carrier(name), builder.carrier(other)) for name, other in builder.ties)
     return World(
         path=path,
@@ -312,10 +312,10 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
     )
 
 
-def _element(tag: str, one: Directive) -> Element:
+def _element(tag: str, path: Path, line: int = 1, span: tuple[int, int] = (0, 0)) -> Element:
     """An element at the place of a directive, for all that reads SDF."""
     made = Element(tag)
-    made.source, made.line, (made.start, made.end), made.parent = one.path, one.line, one.span, None
+    made.source, made.line, (made.start, made.end), made.parent = path, line, span, None
     return made
 
 
