@@ -21,7 +21,7 @@ def test_what_is_known_is_said_without_a_test(run, started, monkeypatch, capsys)
     assert (done.returncode, started) == (0, [])
     assert done.stdout.startswith("A nearest world that passes lacks 1 model of 11 (crate_00)")
     found = json.loads(in_process(monkeypatch, capsys, "isolate", run.path, "--json").stdout)["nearest"]
-    assert (found["gone"], found["shown"], len(found["instants"])) == (["crate_00"], True, 8)
+    assert (found["gone"], found["shown"]) == (["crate_00"], True)
     in_process(monkeypatch, capsys, "isolate", run.path, "--again", "--jobs", 1)
     in_process(monkeypatch, capsys, "isolate", run.path, "--runs", 50, "--jobs", 1)
     assert started == [(run.path, 1, {"isolate": 0, "cluster": None}), (run.path, 1, {"isolate": 50, "cluster": None})]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import fake_moments
 import pytest
+from attached import SRC
 from textual.app import App
 
 from ddenv.runfile import state as runs_state
@@ -49,6 +50,8 @@ def large(number: int, judged: int = 0) -> Snapshot:
 
 
 class Table(App):
+    CSS_PATH = str(SRC / "workbench/run/run.tcss")
+
     def compose(self):
         yield Candidates()
 

@@ -82,9 +82,9 @@ async def test_selected_text_in_a_field_and_by_the_mouse(run):
         x, y, width, _ = field.content_region
         row = frame(app, False)[y][x : x + width]
         assert "".join(char for char, _, _, reverse, _ in row if reverse) == "ate"
-        await pilot.press("escape", "e")
+        await pilot.press("escape", "F")
         await pilot.pause()
-        x, y, *_ = app.screen.query_one("Static").content_region
+        x, y, *_ = app.screen.query_one("#facts").content_region
         await pilot.mouse_down(offset=(x, y))
         await pilot.hover(offset=(x + 6, y))
         await pilot.mouse_up(offset=(x + 6, y))

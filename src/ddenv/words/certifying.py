@@ -10,6 +10,7 @@ from ddenv.text import percent, plain
 from ddenv.words.claims import environment_named, of_runs, terms, usual_runs
 from ddenv.words.margins import finding
 from ddenv.words.news import isolating
+from ddenv.words.signs import bar
 
 
 def certifying(snapshot: Snapshot) -> tuple[str, ...]:
@@ -33,7 +34,7 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
         return (_after(certificate), *_now(snapshot, certificate))
     made = fresh_runs_made(state, certificate)
     return (
-        *(() if certificate.seeds else (_aim(state, certificate),)),
+        *(() if certificate.seeds else (_bar(state, certificate),)),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
         f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
         *_so_far(state),
@@ -53,11 +54,11 @@ def _so_far(state: RunState) -> tuple[str, ...]:
     return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
 
 
-def _aim(state: RunState, certificate: Certificate) -> str:
+def _bar(state: RunState, certificate: Certificate) -> str:
     """What is shown to be kept by now, and where it has to come."""
     shown = fresh_runs(state)[0].bound or 0.0
-    kept = f"At least {percent(shown)} is kept" if shown else "Nothing is shown yet"
-    return f"{kept}, aim {percent(certificate.certify_rate)}."
+    kept = f"at least {percent(shown)} is kept" if shown else "nothing is shown yet"
+    return f"{bar(shown, certificate.certify_rate)} {kept}, aim {percent(certificate.certify_rate)}"
 
 
 def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, failing_instead, helping
@@ -23,6 +24,8 @@ from ddenv.words.slices import TEACHING, refuted_words, slice_words
 NAMED = 8
 # Maximum number of models whose runs without them a sentence each describes.
 NAMED_ENDS = 2
+# An end within so many epsilon of f's end may be the same failure to the user.
+NEAR = 3
 _SETTLING = (
     "Finding which models rest on which: the piles fall and settle once, without the robot. "
     "Then it is known what a removal would drop.",
@@ -312,13 +315,18 @@ def _finished(state: RunState) -> Happening:
 
 
 def _instead_of_f(state: RunState) -> tuple[str, ...]:
-    """What the robot does without models that f needs, where it mostly fails in another way."""
+    """What the robot does without models that f needs, where it mostly fails in another way; and what counts that as f."""
     if (certificate := current(state)) is None:
         return ()
-    claims = [claim for claim in certificate.claims if failing_instead(state, certificate, claim)]
-    return tuple(
-        f"Without {plain(str(one.without))} {instead(state, certificate, one)}." for one in claims[:NAMED_ENDS]
-    )
+    ends = {claim: end for claim in certificate.claims if (end := failing_instead(state, certificate, claim))}
+    said = [f"Without {plain(str(claim.without))} {instead(state, certificate, claim)}." for claim in ends][:NAMED_ENDS]
+    epsilon = settings(state).epsilon
+    # Where no distance is known, it is not near.
+    farthest = min((end.farthest for end in ends.values() if end.farthest <= NEAR * epsilon), default=None)
+    if farthest is not None:
+        wider = math.floor(farthest * 10 + 1) / 10
+        said.append(f"To count that as f, too, start again with epsilon {wider:g} m (now {epsilon:g} m).")
+    return tuple(said)
 
 
 def _reason(state: RunState, otherwise: str) -> str:

@@ -50,7 +50,7 @@ async def test_each_model_has_its_sentence_its_rate_and_its_two_ways(run, watch)
             assert sentence(one) in said and parting_sentence(one) in said
             assert "fresh runs (" in said and "needed: without it" in said
             assert [way.name for way in screen.map.shown.ways] == ["with", "without"]
-            assert one.without not in screen.map.candidate.models
+            assert one.without not in screen.map.shown.candidate.models
             await session.press("down")
         await session.press("c")
         assert session.app.clipboard.splitlines()[0].startswith(sentence(known[0]))
@@ -143,7 +143,7 @@ async def test_stacks_are_left_out_together(runs):
     async with Attached(run) as session:
         screen = await opened(session)
         assert "what rests on it (1 model)" in words(screen, "#why-said")
-        assert set(screen.map.candidate.models) == set(run.elements[2:6])
+        assert set(screen.map.shown.candidate.models) == set(run.elements[2:6])
     run.close()
 
 
@@ -163,7 +163,7 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
         assert "nearest world that passes" in str(options.get_option_at_index(options.option_count - 1).prompt)
         said = words(screen, "#why-said")
         assert known.words[1:] in said
-        assert set(screen.map.candidate.models) == set(run.elements) - set(known.gone)
+        assert set(screen.map.shown.candidate.models) == set(run.elements) - set(known.gone)
         if damaged:
             assert "has no trajectory" in said
             return

@@ -32,6 +32,8 @@ def scenario_path(text: str) -> Path:
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
     path = without_tilde(text)
+    if path.parts[0].startswith("~"):
+        raise UserError(f"{text}: unknown user")
     path = path if path.suffix.lower() in SUFFIXES else path.with_name(f"{path.name}.yaml")
     if is_folder(path):
         raise UserError(f"{path}: is a folder; give the name of a file")
