@@ -57,6 +57,13 @@ def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
     check_trusted(loaded, "mail.ddenv")
 
 
+def test_a_run_file_with_the_name_of_the_module_changes_nothing(scenario):
+    loaded = load_scenario(scenario(BRINGS["simulator"]))
+    trust(program_of(loaded))
+    (loaded.folder / "mine.ddenv").write_text("a run")
+    check_trusted(loaded, "mine.ddenv")
+
+
 # A program that has changed, and what Python would import first in its place.
 CHANGED = (
     ("command", "sim.sh"),

@@ -11,7 +11,7 @@ import umsgpack
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.tested import Wanted
-from ddenv.scene.camera import view
+from ddenv.scene.camera import scale_of, view
 from ddenv.scene.draw import MOST_LETTERS, Scenery, path_on_ground, safe_name
 from ddenv.scene.mesh import box, outline, paint, sphere
 from ddenv.scene.player import Player
@@ -21,9 +21,10 @@ from ddenv.scene.wheels import Wheels
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual, World
 from ddenv.world.pose import Pose
-from ddenv.world.sdf.read import read_model
+from ddenv.world.sdf.read import read_model, read_world
 from tests.conftest import ROOT
 
+ARM = ROOT / "docs/examples/arm"
 ROBOT = read_model(SDF / "robots" / "husky.sdf")
 
 
@@ -211,6 +212,24 @@ def test_trail_sends_only_its_last_piece_again(screen, scenery):
     assert changed == {"/world/trail/3", "/world/trail/4"}
     scenery.trail(rows[:1])
     assert not any(path.startswith("/world/trail") for path in screen.things)
+
+
+def test_each_link_at_a_joint_goes_its_own_way(screen, stage):
+    scenery = Scenery(stage, read_world(ARM / "world.dmd.yaml"), Wheels(ROBOT), [])
+    forearm = scenery.movers["arm::forearm"]
+    start = scenery._first["arm::forearm"]
+    assert f"/world/models/{forearm}/0" in screen.things
+    scenery.place_models({"arm::forearm": Pose((0, 0, 1)) @ start})
+    assert screen.poses[f"/world/models/{forearm}"][:3, 3] == pytest.approx((0, 0, 1))
+    assert f"/world/models/{scenery.movers['arm::wrist']}" not in screen.poses
+    scenery.place_models({})
+    assert screen.poses[f"/world/models/{forearm}"] == pytest.approx(np.eye(4))
+
+
+def test_what_is_drawn_around_a_small_robot_is_small():
+    assert scale_of((0, 0, 0), (6, 0, 0)) == 1
+    assert scale_of((0, 0, 0), (0.5, 0, 0)) < 0.5
+    assert view((0, 0, 0), (0.5, 0, 0)).radius < 1
 
 
 def test_path_on_ground_is_below_a_tilted_robot():

@@ -15,7 +15,7 @@ from ddenv.world.model import World
 WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0
 LEFT, TOP, RIGHT, BOTTOM = 64.0, 72.0, 28.0, 52.0
 CORNERS = 48  # of the polygon that stands for a circle
-LEAST = 4.0  # minimum extent of the world along each axis, m: a single crate must not fill the page
+LEAST = 2.0  # minimum extent of the world along each axis, m: a single crate must not fill the page
 MOST_LABELS = 60
 WHITE: RGB = (255, 255, 255)
 BLACK: RGB = (0, 0, 0)

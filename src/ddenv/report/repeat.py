@@ -13,14 +13,17 @@ from ddenv.text import plain
 from ddenv.world.access import ending_of
 
 LONGEST_VALUE = 120
+# Settings of our own simulation; a simulator of the user's own has others.
+OF_DRAKE = ("time_step", "contact")
 
 
 def settings(record: Record) -> Section:
     scenario, jobs = record.state.scenario, record.state.jobs
+    oracle = section(scenario, "oracle")
     rows = [
         (one.label, _read(scenario, record.asked, one), one.meaning)
         for one in SETTINGS.values()
-        if one.name in section(scenario, one.section) or not one.stored
+        if (one.name in section(scenario, one.section) or not one.stored) and not (oracle and one.name in OF_DRAKE)
     ]
     rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
     table = Table(

@@ -186,7 +186,7 @@ def in_short(record: Record) -> list[Paragraph]:
     if state.baseline is None:
         return []
     sure = "Fresh runs have not checked that yet." if found is None else f"{for_everyone(found)}."
-    runs = "1 simulated drive" if state.made == 1 else f"{thousands(state.made)} simulated drives"
+    runs = "1 simulated run" if state.made == 1 else f"{thousands(state.made)} simulated runs"
     cost = f"This took {runs} and {duration(spent(state, state.updated_at))} of computing."
     what = f" The robot {deed(state.failure)} before it reached its goal. "
     return [say(Strong("In short:"), what, *_enough(state), f" {sure} {cost}")]

@@ -48,7 +48,7 @@ WORDS = {
 WIDTH, HIGHEST, LEAST_HIGH = 880.0, 620.0, 180.0
 LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
 # The minimum drawn along each axis, m.
-LEAST = 4.0
+LEAST = 2.0
 # The maximum number of labels, and how many of the models drawn last they must not hide.
 MOST_LABELS, MOST_AVOIDED = 24, 1000
 # The maximum number of points on a path.

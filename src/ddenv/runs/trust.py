@@ -15,6 +15,7 @@ import shlex
 import stat
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from importlib.machinery import all_suffixes
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
@@ -98,7 +99,9 @@ def _named(folder: Path, command: str) -> list[Path]:
 
 def _modules(folder: Path, module: str) -> list[Path]:
     """The files of a module in `folder`, in every form that Python looks for; an installed one is the user's own choice."""
-    found = [*folder.glob(f"{module}.*"), *(folder / module).rglob("*")]
+    # A run file may have the module's name, too, and changes all the time.
+    alone = [path for path in folder.glob(f"{module}.*") if path.name.endswith(tuple(all_suffixes()))]
+    found = [*alone, *(folder / module).rglob("*")]
     # Python itself writes into this folder.
     return sorted(path for path in found if "__pycache__" not in path.parts and is_file(path))
 

@@ -11,6 +11,8 @@ from ddenv.scene.draw import WORLD
 from ddenv.scene.stage import DRAWN, Stage
 from ddenv.world.pose import Pose, Vector, vector
 
+# A robot whose start and goal are nearer to each other than this, m, is small itself, as the hand of an arm is.
+NEAR, SMALLEST = 1.5, 0.1
 FIELD_OF_VIEW = 38.0  # vertical, degrees
 ELEVATION = 32.0  # of the camera above the horizon, degrees
 ASIDE = 20.0  # rotation of the camera from perpendicular to the path towards the start, degrees
@@ -27,10 +29,16 @@ class View:
     radius: float
 
 
+def scale_of(start: Vector, goal: Vector) -> float:
+    """The size of what is drawn around a robot: 1 for one that drives, less for a small one."""
+    return min(1.0, max(SMALLEST, math.dist(start[:2], goal[:2]) / NEAR))
+
+
 def view(start: Vector, goal: Vector) -> View:
-    """The view of a robot that drives from `start` to `goal`."""
+    """The view of a robot that moves from `start` to `goal`."""
     dx, dy = goal[0] - start[0], goal[1] - start[1]
-    radius = max(2.5, 0.5 * math.hypot(dx, dy) + 1.8)
+    scale = scale_of(start, goal)
+    radius = max(2.5 * scale, 0.5 * math.hypot(dx, dy) + 1.8 * scale)
     along = math.atan2(dy, dx)
     center = vector(0.5 * (a + b) for a, b in zip(start, goal, strict=True))
     camera = _polar(2.2 * radius, along - math.radians(90 + ASIDE), ELEVATION)

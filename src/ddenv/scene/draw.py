@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from meshcat.geometry import Object
@@ -13,7 +14,7 @@ from ddenv.scene.mesh import Surface, edges_of, lines, merge, outline, paint, pl
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels
-from ddenv.world.model import Model, Plane, World, is_ground
+from ddenv.world.model import Model, Plane, World, is_ground, jointed_links
 from ddenv.world.pose import Pose, Vector
 
 WORLD: Path = ("world",)
@@ -37,11 +38,11 @@ def safe_name(number: int, name: str) -> str:
     return f"{number:03d} {kept}"
 
 
-def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
+def path_on_ground(samples: np.ndarray, lowest: float, above: float = ABOVE) -> np.ndarray:
     """Points (N, 3) below a robot at rows (t, x, y, z, qw, qx, qy, qz) whose lowest point has z = `lowest` in its frame."""
     w, x, y, z = samples[:, 4:8].T
     up = np.column_stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-    return samples[:, 1:4] + (lowest + ABOVE) * up
+    return samples[:, 1:4] + (lowest + above) * up
 
 
 # The letter of a partition over a model: the letter, its colour as in CSS, where it belongs, x, y, z in m, and what the browser
@@ -58,9 +59,11 @@ class Scenery:
     def __init__(self, stage: Stage, world: World, wheels: Wheels, elements: Iterable[str]) -> None:
         """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
+        self.scale = 1.0  # of lines, see `scale_of`
         self._first = {model.name: model.links[0].pose for model in world.models}
-        # What the browser calls the elements that can move.
+        # What the browser calls the elements that can move, and with these the links at joints.
         self.keys: dict[str, str] = {}
+        self.movers: dict[str, str] = {}
         self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
@@ -114,12 +117,12 @@ class Scenery:
             self._stage.move((*ROBOT, wheel.key), wheel.pose(turned), newest_only=True)
 
     def place_models(self, poses: Mapping[str, Pose]) -> None:
-        """Puts the first links of these elements at their poses, and all others where they start."""
+        """Puts the first links of these elements, and links at joints, at their poses, and all others where they start."""
         for name in self._placed - set(poses):
-            self._stage.move((*MODELS, self.keys[name]), Pose())
-        self._placed = frozenset(name for name in poses if name in self.keys)
+            self._stage.move((*MODELS, self.movers[name]), Pose())
+        self._placed = frozenset(name for name in poses if name in self.movers)
         for name in sorted(self._placed):
-            self._stage.move((*MODELS, self.keys[name]), self.moved(name, poses[name]), newest_only=True)
+            self._stage.move((*MODELS, self.movers[name]), self.moved(name, poses[name]), newest_only=True)
 
     def moved(self, name: str, pose: Pose) -> Pose:
         """How far a moving model is from its start once its first link is at `pose`."""
@@ -128,7 +131,7 @@ class Scenery:
     def way(self, samples: np.ndarray, ghost: bool) -> bytes:
         """The message that draws the robot's path in a whole run, for one browser."""
         path, color = (GHOST_TRAIL, colors.GHOST_TRAIL) if ghost else (TRAIL, colors.TRAIL)
-        return self._stage.drawn(path, _tube(path_on_ground(samples, self._lowest), color))
+        return self._stage.drawn(path, self._tube(self._points(samples), color))
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
@@ -158,20 +161,28 @@ class Scenery:
         return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
-        tube = None if samples is None else _tube(path_on_ground(samples, self._lowest), colors.EVIDENCE)
+        tube = None if samples is None else self._tube(self._points(samples), colors.EVIDENCE)
         self._stage.draw(EVIDENCE, tube, shadow=False)
 
     def trail(self, samples: np.ndarray) -> None:
         """Draws the robot's path so far; fewer `samples` than before start a new one."""
-        points = path_on_ground(samples, self._lowest)
+        points = self._points(samples)
         pieces = -(-max(0, len(points) - 1) // PIECE)
         if pieces < self._pieces or not pieces:
             self._stage.delete(TRAIL)
             self._pieces = 0
         for piece in range(max(0, self._pieces - 1), pieces):
-            tube = _tube(points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
+            tube = self._tube(points[piece * PIECE : (piece + 1) * PIECE + 1], colors.TRAIL)
             self._stage.draw((*TRAIL, str(piece)), tube, shadow=False)
         self._pieces = pieces
+
+    def _points(self, samples: np.ndarray) -> np.ndarray:
+        return path_on_ground(samples, self._lowest, self.scale * ABOVE)
+
+    def _tube(self, points: np.ndarray, color: Color) -> Object | None:
+        """A drawn trajectory; None for one without length."""
+        tube = mesh.tube(points, self.scale * LINE)
+        return plain(tube, color, glow=0.4) if len(tube.faces) else None
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
@@ -182,10 +193,16 @@ class Scenery:
             self._painted[model.name] = painted
             return shape
         key = safe_name(number, model.name)
-        for part, item in enumerate(painted):
-            self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
+        links = jointed_links(model)
+        pieces = {} if links else {key: painted}
+        for count, (name, link) in enumerate(links.items()):
+            self._first[name], self.movers[name] = link.pose, f"{key}/link {count}"
+            pieces[self.movers[name]] = paint(replace(model, links=(link,)))
+        for place, items in pieces.items():
+            for part, item in enumerate(items):
+                self._stage.draw((*MODELS, place, str(part)), item.thing(), shadow=item.alpha == 1)
         if element:
-            self.keys[model.name] = key
+            self.keys[model.name] = self.movers[model.name] = key
         return shape
 
     def _draw_ground(self) -> None:
@@ -217,12 +234,6 @@ class Scenery:
                 self._stage.move((*GHOST, *place), pose)
         self._stage.show(GHOST, False)
         return lowest
-
-
-def _tube(points: np.ndarray, color: Color) -> Object | None:
-    """A drawn trajectory; None for one without length."""
-    tube = mesh.tube(points, LINE)
-    return plain(tube, color, glow=0.4) if len(tube.faces) else None
 
 
 def _ground(world: World) -> Pose | None:
@@ -258,9 +269,16 @@ FLAG = (
 
 
 def mark(
-    stage: Stage, name: str, position: Vector, radius: float, color: Color, inside: tuple[Surface, ...] = ()
+    stage: Stage,
+    name: str,
+    position: Vector,
+    radius: float,
+    color: Color,
+    scale: float = 1.0,
+    inside: tuple[Surface, ...] = (),
 ) -> None:
     """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
     path = (*WORLD, name)
-    stage.draw(path, plain(merge([mesh.ring(radius, 0.05), *inside]), color, glow=0.35), shadow=False)
+    shapes = [mesh.ring(radius, 0.05 * scale), *(replace(one, vertices=scale * one.vertices) for one in inside)]
+    stage.draw(path, plain(merge(shapes), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))

@@ -19,8 +19,8 @@ from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh
 from ddenv.world.pose import Pose
 
 SIDES = 24  # of the polygon that stands for a circle
-# Minimum distance between points of a drawn trajectory, m: a robot that stands still leaves one point.
-TUBE_STEP = 0.04
+# Minimum distance between points of a drawn trajectory, as part of its radius: a robot that stands still leaves one point.
+TUBE_STEP = 1.6
 # A corner of a mesh looks smooth if its faces deviate by less than this from their mean normal, rad.
 SMOOTH = math.radians(30.0)
 
@@ -146,10 +146,10 @@ def creased(mesh: Mesh) -> Surface:
 
 
 def tube(points: np.ndarray, radius: float) -> Surface:
-    """A tube along the path `points` (N, 3), thinned to one point every `TUBE_STEP`; empty for a path without length."""
+    """A tube along the path `points` (N, 3), thinned by `TUBE_STEP`; empty for a path without length."""
     taken = list(points[:1])
     for point in points[1:]:
-        if np.linalg.norm(point - taken[-1]) >= TUBE_STEP:
+        if np.linalg.norm(point - taken[-1]) >= TUBE_STEP * radius:
             taken.append(point)
     if len(taken) < 2:
         return EMPTY

@@ -54,7 +54,7 @@ const length = () => Math.max(end(play), end(ghost));
 function draw() {
   if (play) {
     drive("robot", play, time);
-    for (const [key, rows] of Object.entries(play.moving)) put(node("models", key), rows, time);
+    for (const [key, rows] of Object.entries(play.moving)) put(node("models", ...key.split("/")), rows, time);
     if (ghost) drive("ghost", ghost, time);
     place("time").value = time;
     const words = `${time.toFixed(1)} s of ${length().toFixed(1)} s`;
@@ -165,8 +165,9 @@ function obey(messages) {
 // Models that a test moved go back to where they start.
 function reset() {
   for (const key of Object.keys(play ? play.moving : {})) {
-    node("models", key).position.set(0, 0, 0);
-    node("models", key).quaternion.set(0, 0, 0, 1);
+    const model = node("models", ...key.split("/"));
+    model.position.set(0, 0, 0);
+    model.quaternion.set(0, 0, 0, 1);
   }
 }
 

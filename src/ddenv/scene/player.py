@@ -21,7 +21,7 @@ from ddenv.runs.playback import played
 from ddenv.runs.reasons import Parting, nearest, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.scene import colors
-from ddenv.scene.camera import set_up, view
+from ddenv.scene.camera import scale_of, set_up, view
 from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
 from ddenv.scene.shot import Shot, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
@@ -67,9 +67,10 @@ class Player:
             for place in (scenario.robot.spawn, scenario.goal)
         )
         set_up(stage, view(start, end))
-        mark(stage, "start", start, 0.6, colors.START)
-        mark(stage, "goal", end, scenario.goal.tolerance, colors.GOAL, FLAG)
-        mark(stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL, PIN)
+        self._scenery.scale = scale = scale_of(start, end)
+        mark(stage, "start", start, 0.6 * scale, colors.START, scale)
+        mark(stage, "goal", end, scenario.goal.tolerance, colors.GOAL, scale, FLAG)
+        mark(stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25 * scale, colors.GHOST_TRAIL, scale, PIN)
         stage.show(PARTING, False)
         self._scenery.place_robot(self._start)
 
@@ -97,7 +98,7 @@ class Player:
         moving = {
             key: [_row(row[0], scenery.moved(name, pose_of(row[1:]))) for row in rows]
             for name, rows in one.moving.items()
-            if (key := scenery.keys.get(name)) is not None
+            if (key := scenery.movers.get(name)) is not None
         }
         return {
             "test": test,
@@ -224,7 +225,8 @@ class Player:
         samples = None if self._evidence is None else self._run.motion(self._evidence)
         self._scenery.evidence(None if samples is None else rows_of(samples))
         if self._state.f_position is not None:
-            mark(self._stage, "failure", self._state.f_position, self._epsilon, colors.FAILURE, PIN)
+            place, size = self._state.f_position, self._scenery.scale
+            mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
 
 
 def _row(time: float, pose: Pose) -> list[float]:

@@ -165,8 +165,8 @@ def _share(number: int, one: Claim | FreshRuns | Returned) -> str:
 def for_everyone(certificate: Certificate) -> str:
     """What a finished certificate shows, for readers who know no statistics; one sentence without a full stop."""
     left, *removals = certificate.claims
-    share = f"{percent(left.low)} to {percent(left.high)} of all drives, with 95 % confidence"
-    said = f"It failed so in {left.shown} of {count(left.runs, 'new drive')} with nothing else there ({share})"
+    share = f"{percent(left.low)} to {percent(left.high)} of all runs, with 95 % confidence"
+    said = f"It failed so in {left.shown} of {count(left.runs, 'new run')} with nothing else there ({share})"
     if not is_minimal(certificate):
         return f"{said}, but not every part of this result is shown to hold"
     if not removals:
@@ -174,7 +174,7 @@ def for_everyone(certificate: Certificate) -> str:
     most = max(removals, key=lambda claim: claim.high)
     one = "it" if len(removals) == 1 else "any one of them"
     if certificate.seeds:
-        return f"{said}; of the drives that were chosen, none of {most.runs} failed so without {one}"
+        return f"{said}; of the runs that were chosen, none of {most.runs} failed so without {one}"
     seldom = f"at most {most.shown}" if most.shown else "none"
     return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
 

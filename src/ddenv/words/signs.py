@@ -62,6 +62,12 @@ DROPS = "↓"
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
 
 
+def bar(part: float, aim: float, width: int = 20) -> str:
+    """A share as a bar of so many cells, with a mark where it has to come."""
+    filled, mark = round(part * width), min(width - 1, round(aim * width))
+    return "".join("┃" if cell == mark else "█" if cell < filled else "░" for cell in range(width))
+
+
 def signs(counts: Mapping[str, int]) -> str:
     """How tests ended, in signs with their counts, from the number of each outcome."""
     said = [f"{counts[name]}{OUTCOME[name][0]}" for name in _SIGNED if counts.get(name)]

@@ -188,6 +188,13 @@ def still_links(model: Model) -> tuple[Link, ...]:
     return tuple(link for link in model.links if model.static or link.name in held)
 
 
+def jointed_links(model: Model) -> dict[str, Link]:
+    """By Drake's names, such as `arm::forearm`, the links of a model with joints that move; empty for any other model."""
+    if model.static or all(is_fixed(joint) for joint in model.joints):
+        return {}
+    return {f"{model.name}::{link.name}": link for link in model.links}
+
+
 @dataclass(frozen=True, slots=True)
 class Note:
     """A part of the file that was replaced or ignored (`kind`).

@@ -8,7 +8,7 @@ from ddenv.robot.external import python_simulator
 from ddenv.robot.external.python_simulator import PythonSimulator
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import load_scenario, load_simulator
-from ddenv.world.scenario import Oracle
+from ddenv.world.scenario import Oracle, Spawn
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.wall import wall
@@ -57,6 +57,27 @@ class Mine:
             yield t, [t, 0, 0.3, 0, 0, 1, 0], ball
         return ddenv.Ended(seed > 5, took_part=("ball",))
 """
+
+
+JOINTED = """<sdf version="1.9"><world name="w"><model name="post"><static>true</static><link name="l">
+<collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision></link></model><model name="lever">
+<link name="base"/><link name="bar"/><joint name="j" type="revolute"><parent>base</parent><child>bar</child>
+<axis><xyz>0 0 1</xyz></axis></joint></model></world></sdf>"""
+
+
+def test_rows_may_have_the_poses_of_links_at_joints(tmp_path, made):
+    (tmp_path / "world.sdf").write_text(JOINTED)
+    at = {"world": tmp_path / "world.sdf", "robot": wall().robot.model_copy(update={"spawn": Spawn(x=9, y=9, z=1)})}
+
+    def run(name):
+        rows = f"yield 0.0, AT, {{'{name}': AT}}\n        yield 0.1, AT, {{'{name}': (2, 0, 0, 0, 0, 0, 1)}}\n        return END"
+        return made(written(tmp_path, rows).model_copy(update=at)).run(frozenset({"post", "lever"}), 1)
+
+    assert run("lever::bar").motions["lever::bar"][:, 1].tolist() == [1, 2]
+    # A part of a model without joints is none, and a link that is left out with its model neither.
+    for name in ("post::l", "lever::rod"):
+        with pytest.raises(UserError, match=f"there is no model '{name}'"):
+            run(name)
 
 
 def test_one_object_gets_the_world_of_each_test_and_its_rows_become_the_run(tmp_path, made):

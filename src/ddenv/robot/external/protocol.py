@@ -7,8 +7,8 @@ Each worker imports its class once and makes one object, which runs one test aft
         def run(self, world: SubWorld, seed: int, timeout: float) -> Iterator[Row] | Ended: ...
 
 `run` returns `Ended`, or yields rows while it goes on and returns `Ended` in the end. A row is (time, pose), or (time, pose,
-poses): the time in simulated s, the pose of the robot, and by name those of models that move. A pose is x, y, z (m), qx, qy, qz, qw
-in the world frame.
+poses): the time in simulated s, the pose of the robot, and by name those of models that move, or of the links of a model with
+joints, such as `arm::forearm`. A pose is x, y, z (m), qx, qy, qz, qw in the world frame.
 """
 
 from __future__ import annotations

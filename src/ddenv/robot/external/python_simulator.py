@@ -27,7 +27,7 @@ from ddenv.robot.result import PoseRow, Progress, RunResult, has_moved
 from ddenv.schemas import nearest
 from ddenv.text import plain
 from ddenv.world.command import start_folder
-from ddenv.world.model import World
+from ddenv.world.model import World, jointed_links
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
 from ddenv.world.whole import whole_of
@@ -85,7 +85,8 @@ class PythonSimulator:
         write_files(self._path.parent, {self._path: without(self._world, removed)})
         models = tuple(model.name for model in self._world.models if model.name not in removed)
         world = SubWorld(self._path, self._its_scenario, models)
-        poses = Poses(models, progress)
+        links = [link for model in self._world.models if model.name in models for link in jointed_links(model)]
+        poses = Poses(models, progress, links)
         if progress is not None:
             # The time of a test begins here, whatever came before it.
             start = spawn_pose(self._scenario.robot.spawn)
@@ -140,11 +141,14 @@ def _drained(rows: Generator[Row, None, Ended], poses: Poses) -> Ended:
 
 
 class Poses:
-    """The poses of one test: those of the robot, and those of models by name, each at most every 0.1 s. `progress` gets them."""
+    """The poses of one test: those of the robot, and those of models and of `links` by name, each at most every 0.1 s.
 
-    def __init__(self, models: Iterable[str], progress: Progress | None) -> None:
+    `progress` gets them.
+    """
+
+    def __init__(self, models: Iterable[str], progress: Progress | None, links: Iterable[str] = ()) -> None:
         self.robot = PoseLog()
-        self._models = tuple(models)
+        self._models, self._links = tuple(models), frozenset(links)
         self._progress = progress
         self._logs: dict[str, PoseLog] = {}
         self._now: dict[str, PoseRow] = {}
@@ -160,7 +164,8 @@ class Poses:
         t, pose, others = row[0], row[1], row[2] if len(row) == 3 else {}
         kept = self.robot.take(_numbers(t, pose, where), where)
         for name, its_pose in others.items():
-            self.check(name, where)
+            if name not in self._links:
+                self.check(name, where)
             its_row = self._logs.setdefault(name, PoseLog()).take(_numbers(t, its_pose, where), where)
             if its_row is not None:
                 self._now[name] = its_row[1:]

@@ -24,22 +24,47 @@ WIDTH = 15
 
 
 class LessonPane(VerticalScroll):
-    """Scrolls where a text is longer than its panel. A click on an answer gives it."""
+    """Scrolls where a text is longer than its panel. A click on an answer gives it; the arrows put a cursor on one."""
 
     _page: Page | None = None
+    # The answer under the cursor; None before an arrow was pressed.
+    cursor: int | None = None
 
     def compose(self) -> ComposeResult:
         yield Static("", id="lesson-text", markup=False)
 
     def show(self, page: Page) -> None:
+        if self._page is None or page.question != self._page.question or page.chosen is not None:
+            self.cursor = None
         self._page = page
-        room = self.scrollable_content_region.width
-        self.query_one("#lesson-text", Static).update(page_text(page, room))
+        self._draw(page)
         if page.chosen is None and not page.hint:
             self.scroll_home(animate=False)
         else:
             self.call_after_refresh(self.scroll_end, animate=False)
         self.call_after_refresh(self._say_what_is_next)
+
+    def _draw(self, page: Page) -> None:
+        room = self.scrollable_content_region.width
+        self.query_one("#lesson-text", Static).update(page_text(page, room, self.cursor))
+
+    def _choose(self, by: int) -> bool:
+        """Moves the cursor from answer to answer, once all is in sight; False if no question is open."""
+        page = self._page
+        if page is None or page.question is None or page.chosen is not None or self.scroll_y < self.max_scroll_y:
+            return False
+        last = len(page.question.answers) - 1
+        self.cursor = (0 if by > 0 else last) if self.cursor is None else max(0, min(self.cursor + by, last))
+        self._draw(page)
+        return True
+
+    def action_scroll_up(self) -> None:
+        if not self._choose(-1):
+            super().action_scroll_up()
+
+    def action_scroll_down(self) -> None:
+        if not self._choose(1):
+            super().action_scroll_down()
 
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
         super().watch_scroll_y(old_value, new_value)
@@ -53,7 +78,7 @@ class LessonPane(VerticalScroll):
         if self.scroll_y < self.max_scroll_y:
             said = "enter shows the rest"
         elif self._page is not None and self._page.question is not None and self._page.chosen is None:
-            said = f"{letters(self._page.question)} answers it, s skips"
+            said = f"{letters(self._page.question)}, or ↑ ↓ and enter; s skips"
         self.parent.border_subtitle = said
 
     def read_on(self) -> bool:
@@ -70,10 +95,10 @@ def letters(question: Question) -> str:
     return f"{used[0]} to {used[-1]}" if used[-1] <= "e" else " ".join(used)
 
 
-def page_text(page: Page, room: int = 0) -> Text:
+def page_text(page: Page, room: int = 0, cursor: int | None = None) -> Text:
     parts = [_blocks(page.text, room)]
     if page.question is not None:
-        parts.append(_question(page.question, page, room))
+        parts.append(_question(page.question, page, room, cursor))
     parts.append(_blocks(page.after, room))
     return Text("\n\n").join(part for part in parts if part)
 
@@ -106,10 +131,10 @@ def plain_words(words: str) -> str:
     return f"{' ' if lead else ''}{plain(words)}{' ' if tail and words.strip() else ''}"
 
 
-def _question(question: Question, page: Page, room: int) -> Text:
+def _question(question: Question, page: Page, room: int, cursor: int | None) -> Text:
     text = Text().append(plain(question.text), "bold")
     for place, answer in enumerate(question.answers):
-        mark, style = " ", ""
+        mark, style = ("▸", "reverse") if place == cursor else (" ", "")
         if page.chosen is not None:
             mark = "✓" if answer.right else "✗" if place == page.chosen else " "
             style = "bold" if answer.right or place == page.chosen else "dim"

@@ -219,8 +219,11 @@ class LessonScreen(LearnScreen[bool]):
             self._moved()
         elif self._opened is None:
             self.action_move("moment", 1)
-        elif not self.course.is_open:
-            # Of an open question the frame says how to answer.
+        elif self.course.is_open:
+            # Without a cursor the frame says how to answer.
+            if (place := self.query_one(LessonPane).cursor) is not None:
+                self.action_answer(place)
+        else:
             self.say("this is the end of the lesson: escape leaves it, backspace goes back")
 
     def action_back(self) -> None:

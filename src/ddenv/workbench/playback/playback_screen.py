@@ -192,7 +192,9 @@ class Playback(Screen[None]):
         self.map.show(snapshot_with(state, both, groups), without(both, differ) if differ else None)
         lacks = dict.fromkeys(line for one in self._tests for line in one.lacks)
         self.query_one(Met).put(tuple(one.test for one in self._tests), tuple(lacks))
-        moves = f"{count(len(first.moving), 'model')} that moved" if first.moving else "no model moved"
+        # Links at joints are no models.
+        moved = len(first.moving.keys() & self._place.movable.keys())
+        moves = f"{count(moved, 'model')} that moved" if moved else "no model moved"
         self.query_one("#playback-world").border_title = Text(f"World · {moves}" if first.rows else "World")
         lines = [f"test {one.test.id}: {plain(one.words)}, seed {one.test.seed}" for one in self._tests]
         if len(lines) == 2:

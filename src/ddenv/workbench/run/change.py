@@ -104,7 +104,14 @@ class Change(ModalScreen[course.Change | None]):
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",
             "algorithm": kinds["algorithm"],
         }
-        asked |= {one.name: course.typed(one.name, self._text(one)) for one in OTHERS}
+        wrong = []
+        for one in OTHERS:
+            try:
+                asked[one.name] = course.typed(one.name, self._text(one))
+            except UserError as error:
+                wrong.append(str(error))
+        if wrong:
+            raise UserError("; ".join(wrong))
         command = course.Change(course.Change(asked).new(self._state))
         if why := command.refusal(Situation(self._state)):
             raise UserError(why)

@@ -85,7 +85,7 @@ def value(field: Field, text: str) -> Value:
     if field.empty and text in ("", field.empty):
         return None
     if not text:
-        raise FieldError(field.id, f"{field.label}: is missing")
+        raise FieldError(field.id, f"{field.label}: is missing; {_wanted(field)}")
     try:
         found = str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
@@ -94,6 +94,13 @@ def value(field: Field, text: str) -> Value:
     if allowed := _out_of_range(field, found):
         raise FieldError(field.id, f"{field.label}: expected {allowed}, found {text[:40]}")
     return found
+
+
+def _wanted(field: Field) -> str:
+    """What an empty field asks for."""
+    if field in PLACES:
+        return f"press {'s for the start' if field in SPAWN else 'g for the goal'}, on the map"
+    return f"type {field.setting.range}" if field.setting is not None and field.setting.range else "type one"
 
 
 def _out_of_range(field: Field, found: Value) -> str:
