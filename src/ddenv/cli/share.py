@@ -151,8 +151,8 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool) -> int:
     """Runs what is left of RUN (a name or a file) until it is clear whether it still fails at the rate of its certificate.
 
-    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 it cannot be
-    said: the runs do not decide, or something is wrong.
+    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 undecided:
+    the runs do not decide, or something is wrong.
     """
     from ddenv.cli.test import line
     from ddenv.engine.single_test import expected, reproduce, subject_in
