@@ -140,4 +140,4 @@ def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_pat
     assert "rare" not in notes(7)
     words = notes(5)["rare"]
     assert words.startswith("f shows in 5 of 10 runs: keeping its rate takes about ")
-    assert words.endswith("accept_rate exact (--exact)")
+    assert words.endswith("(accept_rate exact, --exact)")
