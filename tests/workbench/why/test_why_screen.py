@@ -97,7 +97,7 @@ async def test_where_all_could_stay_away_there_is_nothing_to_look_at(run):
     run.certify_all(2, None, 6 * "s")
     run.finish_certificate((None, "kept", 6 * "s"))
     async with Attached(run) as session:
-        assert "Nothing is left that could be left out" in words(await opened(session), "#why-empty")
+        assert "No model is left to leave out" in words(await opened(session), "#why-empty")
 
 
 async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run):
