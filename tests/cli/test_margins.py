@@ -19,7 +19,7 @@ from tests.waiting import PATIENCE
 from tests.workbench import fake_moments
 
 FRICTION = (
-    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), which is as far as was tried; f up to 0.2 (5 of 5 runs), the robot "
+    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the farthest value tried; f up to 0.2 (5 of 5 runs), the robot "
     "reaches its goal from 0.4 (7 of 7 runs)"
 )
 FIX = (

@@ -47,7 +47,7 @@ TITLES = {
 
 # The keys that guide the run: key, name of the offer, word in the footer, what the help says.
 _GUIDES = (
-    ("space", "pause", "pause", "pause: start no new test; again to go on; starts an engine if none is running"),
+    ("space", "pause", "pause", "pause: start no new test; again to resume; starts an engine if none is running"),
     ("s", "step", "step", "run one test, then pause"),
     ("S", "step_round", "round", "run to the end of the round, then pause"),
     (
@@ -126,7 +126,7 @@ KEYS: list[BindingType] = [
         ("reduction_before", "{", "browse('reduction', -1)", "", "to the reduction before", "{"),
         ("next_reduction", "}", "browse('reduction', 1)", "", "to the next reduction", "}"),
         ("rounds", "b", "open('rounds')", "rounds", "the list of all rounds so far: go to the end of any"),
-        ("facts", "F", "open('facts')", "facts", "the raw facts of a test, and the command that makes it again"),
+        ("facts", "F", "open('facts')", "facts", "the raw facts of a test, and the command that repeats it"),
         ("play", "P", "open('play')", "play", "play a finished test of the row under the cursor back on the map"),
         ("signs", "k", "app.signs", "signs", "what the signs and letters on this screen mean"),
         ("runs", "R", "app.runs", "runs", "the list of all runs"),
