@@ -66,7 +66,7 @@ ALONE = (
 """
 )
 WRONG_ALONE = [
-    ("oracle: delivery.oracle.json\n", "", 19, "steps[3].try: needs to know how every part of the world ends"),
+    ("oracle: delivery.oracle.json\n", "", 19, "steps[3].try: needs the outcome of every part of the world"),
     ("budget: 12", "budget: 0", 20, "steps[3].try.budget: expected a number from 1 to 600, found '0'"),
     ("budget: 12", "tests: 12", 20, "steps[3].try.tests: unknown key; allowed are budget"),
     ("try:\n      budget: 12", "try: 12", 19, "steps[3].try: expected keys such as budget"),

@@ -170,7 +170,7 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
     run.live((run.start(0, 2), 0.4))
     words = told(run)[1]
     assert "Run 3 of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in words
-    assert "It is taken once its runs show that it keeps the rate of f" in words
+    assert "It is accepted once its runs show that it keeps the rate of f" in words
 
 
 def test_a_certificate_comes_before_the_end(run):
