@@ -99,7 +99,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
             await session.look()
             happening = session.text("#happening")
             assert "Pinned crate_04." in happening
-            assert "Nothing showed f" not in happening
+            assert "No candidate showed f in the last" not in happening
 
 
 async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
@@ -162,7 +162,7 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert "17 of about 40 to 150 runs" in str(session.screen.query_one("#round").border_subtitle)
         await session.press("p", "enter")
         assert isinstance(session.app.screen, Question)
-        assert "breaks off certificate 1 after 17 runs" in session.dialog()
+        assert "aborts certificate 1 after 17 runs" in session.dialog()
         await session.press("n", "v")
         assert session.asked() == []
         assert "the rounds are over" in session.said()
