@@ -1,4 +1,4 @@
-"""Writes the table of settings in docs/user-guide.md again, from `ddenv.settings`.
+"""Writes the table of settings in docs/reference.md again, from `ddenv.settings`.
 
 python docs/settings_table.py
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ddenv.settings import SETTINGS, Setting
 
-PAGE = Path(__file__).resolve().with_name("user-guide.md")
+PAGE = Path(__file__).resolve().with_name("reference.md")
 TABLE = re.compile(r"(<!-- settings -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

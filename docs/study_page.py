@@ -1,10 +1,10 @@
 """Writes the results of studies into the pages: tables between marks in docs/study.md and README.md, and the first study's figures.
 
-    python -m docs.study_page SEEDS[,SEEDS...] [AS_PRINTED [ALL]]
+    python -m docs.study_page STUDY[,STUDY...] [AS_PRINTED]
 
-These are folders of `ddenv study`: with --seeds, several for several scenarios; as printed in the paper; and with --pairs all
---algorithms all. The tables of a folder that is not given stay as they are. A mark is <!-- NAME --> ... <!-- end -->. The README's
-`headline` has the ranges of the table `nine`.
+These are folders of `ddenv study`: with today's defaults, several for several scenarios; and as printed in the paper. The table of
+a folder that is not given stays as it is. A mark is <!-- NAME --> ... <!-- end -->. `headline` and `printed` have a row for each
+scenario, with the ranges of its methods.
 """
 
 from __future__ import annotations
@@ -16,28 +16,25 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 STUDY, README = DOCS / "study.md", DOCS.parent / "README.md"
 FIGURES = DOCS / "study"
-# The tables of a scenario: tests, reduction and time; what is behind them.
-NUMBERS, BEHIND = 0, 1
+# The first table of a scenario: tests, reduction and time.
+NUMBERS = 0
 CERTIFIED = "certified"
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 def main() -> None:
-    if not 2 <= len(sys.argv) <= 4:
+    if not 2 <= len(sys.argv) <= 3:
         sys.exit(__doc__)
     nine = [Path(name) for name in sys.argv[1].split(",")]
     others = [Path(name) for name in sys.argv[2:]]
     tables = {
         "nine": _scenarios(nine, NUMBERS),
-        "behind": _scenarios(nine, BEHIND),
         "made": _table(nine[-1], "How it was made", 1),
     }
     tables["headline"] = headline(tables["nine"])
     if others:
-        tables["printed"] = _scenarios([others[0]], NUMBERS)
-    if len(others) > 1:
-        tables["best"] = _table(others[1], "Which is best where", 0)
+        tables["printed"] = headline(_scenarios(others, NUMBERS))
     for page in (STUDY, README):
         page.write_text(filled(page.read_text(), tables))
     FIGURES.mkdir(exist_ok=True)

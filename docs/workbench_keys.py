@@ -12,8 +12,9 @@ from ddenv.workbench.config import Action, actions
 from ddenv.workbench.help.key_names import shown_key
 
 PAGE = Path(__file__).resolve().with_name("keys.md")
-# A table is between these; the sections are the first parts of the actions' names.
-TABLE = re.compile(r"(<!-- keys: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+# A table is between these: with a row for each key of the sections, or with a row for each section. Sections are the first parts of
+# the actions' names.
+TABLE = re.compile(r"(<!-- (keys|screens): ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def main() -> None:
@@ -22,23 +23,44 @@ def main() -> None:
 
 def filled(page: str) -> str:
     """The page with all tables up to date."""
-    return TABLE.sub(lambda found: f"{found[1]}{table(found[2].split())}{found[3]}", page)
+    return TABLE.sub(lambda found: f"{found[1]}{_TABLES[found[2]](found[3].split())}{found[4]}", page)
 
 
 def sections(page: str) -> list[str]:
     """The sections that have tables in the page."""
-    return [section for found in TABLE.finditer(page) for section in found[2].split()]
+    return [section for found in TABLE.finditer(page) for section in found[3].split()]
 
 
-def table(sections: list[str]) -> str:
-    """The lines of a table, each with its end."""
-    rows = [row(action) for section in sections for action in actions().values() if _section(action.id) == section]
+def keys_table(sections: list[str]) -> str:
+    """A row for each action, each line with its end."""
+    rows = [
+        f"| {keys(action)} | {action.words} | `{action.id}` |"
+        for section in sections
+        for action in actions().values()
+        if _section(action) == section
+    ]
     return "\n".join(["| key | | name |", "|---|---|---|", *rows, ""])
 
 
-def row(action: Action) -> str:
-    keys = " ".join(f"`{_typed(key)}`" for key in action.keys)
-    return f"| {keys} | {action.words} | `{action.id}` |"
+def screens_table(sections: list[str]) -> str:
+    """A row for each section with all of its keys, each line with its end."""
+    found = list(actions().values())
+    rows = [
+        f"| `{section}` | {' · '.join(_in_brief(action) for action in found if _section(action) == section)} |"
+        for section in sections
+    ]
+    return "\n".join(["| screen | keys |", "|---|---|", *rows, ""])
+
+
+_TABLES = {"keys": keys_table, "screens": screens_table}
+
+
+def keys(action: Action) -> str:
+    return " ".join(f"`{_typed(key)}`" for key in action.keys)
+
+
+def _in_brief(action: Action) -> str:
+    return f"{keys(action)} {action.words} (`{action.id.partition('.')[2]}`)"
 
 
 def _typed(key: str) -> str:
@@ -46,8 +68,8 @@ def _typed(key: str) -> str:
     return key if len(key) == 1 else shown_key(key)
 
 
-def _section(id: str) -> str:
-    return id.partition(".")[0]
+def _section(action: Action) -> str:
+    return action.id.partition(".")[0]
 
 
 if __name__ == "__main__":

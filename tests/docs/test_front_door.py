@@ -14,7 +14,7 @@ OTHERS = {"No matching distribution found for drake"}
 
 
 def test_the_readme_is_short():
-    assert len(README.read_text(encoding="utf-8").splitlines()) <= 120
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 100
 
 
 def test_the_readme_has_the_test_command_in_one_line():

@@ -1,7 +1,9 @@
 """The pages name every key and option there is, with its default, and their links lead somewhere."""
 
 import re
+import shlex
 
+import click
 import pytest
 
 from ddenv.cli.command_line import app
@@ -19,7 +21,7 @@ from ddenv.world.scenario import (
 )
 from tests.conftest import ROOT
 
-GUIDE = (ROOT / "docs/user-guide.md").read_text()
+REFERENCE = (ROOT / "docs/reference.md").read_text()
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "tests").glob("*.md"), *(ROOT / "docs").glob("*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
@@ -40,13 +42,19 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_programs_and_examples_that_pages_name_are_there(page):
+    named = re.findall(r"\b(?:benchmarks|docs)/[\w/.-]*\w", page.read_text())
+    assert [file for file in named if "NAME" not in file and not (ROOT / file).exists()] == []
+
+
 @pytest.mark.parametrize(
     "section",
     [Scenario, Sensors, Lidar, Controller, Planner, FailureSpec, Reduction, Simulation],
     ids=lambda section: section.__name__,
 )
-def test_the_guide_names_every_key(section):
-    named = {key for words in re.findall(r"`([\w.]+)`", GUIDE) for key in words.split(".")}
+def test_the_reference_names_every_key(section):
+    named = {key for words in re.findall(r"`([\w.]+)`", REFERENCE) for key in words.split(".")}
     assert section.model_fields.keys() - named == set()
 
 
@@ -65,18 +73,18 @@ def test_the_guide_names_every_key(section):
         *((f"lidar.{key}", Lidar) for key in ("rate", "range", "noise", "x")),
     ],
 )
-def test_the_guide_has_the_defaults(key: str, section: type[Section]):
-    row = next(line for line in GUIDE.splitlines() if line.startswith(f"| `{key}`"))
+def test_the_reference_has_the_defaults(key: str, section: type[Section]):
+    row = next(line for line in REFERENCE.splitlines() if line.startswith(f"| `{key}`"))
     default = section.model_fields[key.rpartition(".")[2]].default
     assert float(re.match(r"[\d.]+", row.split(" | ")[-1]).group()) == default
 
 
 @pytest.mark.parametrize("command", ["run", "test", "study"])
-def test_the_guide_names_every_option(command):
+def test_the_reference_names_every_option(command):
     options = {
         option for parameter in app.commands[command].params for option in parameter.opts if option.startswith("--")
     }
-    assert {option for option in options if f"`{option}" not in GUIDE} == set()
+    assert {option for option in options if f"`{option}" not in REFERENCE} == set()
 
 
 @pytest.mark.parametrize("page", ["how-it-works.md", "glossary.md"])
@@ -84,3 +92,17 @@ def test_the_guide_names_every_option(command):
 def test_pages_name_every_schema_and_algorithm(page, kind):
     text = (ROOT / "docs" / page).read_text()
     assert {name for name in names(kind) if f"`{name}`" not in text} == set()
+
+
+COMMAND = re.compile(r"^    (?:\$ )?ddenv\b(.*)$", re.MULTILINE)
+COMMANDS = sorted({line for page in PAGES for line in COMMAND.findall(page.read_text())})
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_the_commands_of_the_pages_exist_with_their_options(line):
+    command, words = app, shlex.split(re.split(r" {2,}", line.strip())[0], comments=True)
+    while isinstance(command, click.Group) and words and words[0] in command.commands:
+        command = command.commands[words.pop(0)]
+    assert command is not app, line
+    options = {option for each in command.params for option in each.opts + each.secondary_opts}
+    assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} - options == set()

@@ -85,7 +85,7 @@ def test_without_this_ddenv_nothing_is_said_of_the_failure(run, tmp_path):
     program = [sys.executable, "handed/repro.py"]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (125, "")
-    assert "repro.py: needs ddenv" in done.stderr
+    assert "repro.py: needs ddenv-workbench" in done.stderr
     assert "pip install ddenv" not in (tmp_path / "handed" / "ISSUE.md").read_text()
 
 

@@ -117,7 +117,7 @@ def test_without_the_package_it_says_what_to_install(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "textual_serve", None)
     monkeypatch.setitem(sys.modules, "textual_serve.server", None)
-    with pytest.raises(UserError, match=r"pip install '\.\[serve\]' in ddenv's clone"):
+    with pytest.raises(UserError, match=r"pip install '\.\[serve\]' in a checkout of ddenv-workbench"):
         serve(8000)
 
 

@@ -36,7 +36,7 @@ def test_the_nearest_other_failure_is_the_one_to_accept(run):
     run.start_round(2)
     tests = [run.test(0, "other", away, number, "tipped over") for number, away in enumerate((2.0, 0.5, 3.0))]
     state = run.state
-    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1], "instead": False})
+    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1]})
 
 
 def test_what_the_cursor_only_follows_is_not_accepted(run):

@@ -24,7 +24,7 @@ async def test_another_failure_is_accepted_after_a_question(run):
         await session.press("n")
         assert session.asked() == []
         await session.press("a", "y")
-        assert session.asked() == [("accept_other", {"test": row.tests[0], "instead": False})]
+        assert session.asked() == [("accept_other", {"test": row.tests[0]})]
 
 
 async def test_a_branch_reduces_another_failure(run):

@@ -1,7 +1,6 @@
-"""What the user guide's table says is refused: each in one line, with exit code 2, and where it stands."""
+"""What docs/worlds.md says is rejected: each in one line, with exit code 2, and where it stands."""
 
 import re
-from itertools import takewhile
 
 import pytest
 
@@ -369,12 +368,13 @@ def test_what_no_thing_has_is_refused_where_it_stands(check, words, text):
     assert re.match(rf":2: /sdf/world/{place}", line) and re.search(words, line), line
 
 
-def test_every_row_of_the_guides_table_is_tried():
-    rows = (ROOT / "docs" / "user-guide.md").read_text().split("| refused | remedy |\n|---|---|\n")[1].splitlines()
-    table = [line.strip("| ").split(" | ")[0] for line in takewhile(str.strip, rows)]
+def test_everything_that_the_page_lists_is_tried():
+    page = (ROOT / "docs" / "worlds.md").read_text().split("## What is rejected\n")[1]
+    groups = re.findall(r"^- \*\*[\w ]+:\*\* (.+(?:\n  .+)*)", page, re.MULTILINE)
+    listed = [each for group in groups for each in re.sub(r"\n +", " ", group).split(" · ")]
     tried = [*OF_THE_FILE, *AT_A_PLACE]
-    assert all(any(row.startswith(start) for start in tried) for row in table), table
-    assert len(table) == len(tried)
+    assert all(any(each.startswith(start) for start in tried) for each in listed), listed
+    assert len(listed) == len(tried)
 
 
 def test_a_byte_order_mark_is_no_harm(check):

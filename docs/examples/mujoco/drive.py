@@ -1,6 +1,6 @@
 """The robot of a scenario in MuJoCo, with the sensors, the pose estimate and the controller that it has in Drake.
 
-simulator.yaml names the class MuJoCo. drive.py SCENARIO prints world and robot as MJCF. Needs ddenv and `pip install mujoco`.
+simulator.yaml names the class MuJoCo. drive.py SCENARIO prints the MJCF. Needs ddenv-workbench and `pip install mujoco`.
 """
 
 from __future__ import annotations

@@ -72,6 +72,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 def world_report(world: World) -> dict[str, Any]:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.placement import inside
+    from ddenv.world.sdf.official import refused
 
     removable = frozenset(world.elements())
     return {
@@ -82,6 +83,7 @@ def world_report(world: World) -> dict[str, Any]:
         "models": [_described(model, world, removable) for model in world.models],
         "notes": _notes(world, ""),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
+        "refused": [{"why": why, "place": place} for why, place in refused(world)],
     }
 
 
@@ -140,11 +142,24 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     table = _table((_row(model, ", ".join(by_model.get(model.name, ()))) for model in world.models), columns)
     notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
     below = ["", "notes", *notes] if notes else []
-    wrong = [line for words in _inside(world) for line in wrapped(words, columns)]
+    wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
     gravity = " ".join(f"{part:g}" for part in world.gravity)
     what = world.version if is_directives(world.path) else f"SDF {world.version}"
     title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
     return [*wrapped(title, columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
+
+
+def _refused(world: World) -> list[str]:
+    """A line for each reason for which the official checker would refuse the file."""
+    from ddenv.world.sdf.official import refused
+
+    places: dict[str, list[str]] = {}
+    for why, place in refused(world):
+        places.setdefault(why, []).append(place)
+    times = {why: f", and {len(at) - 1} more" if len(at) > 1 else "" for why, at in places.items()}
+    return [
+        printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{times[why]}") for why, at in places.items()
+    ]
 
 
 def _inside(world: World) -> list[str]:

@@ -29,7 +29,7 @@ from ddenv.world.access import ending_of, write_file
 RUN, SCENARIO = BUNDLED_RUN, "scenario.yaml"
 REPORT, ISSUE, AGAIN = "report.html", "ISSUE.md", "repro.py"
 MOST_NAMES = 20
-NEEDS = f"needs ddenv {__version__}: {how_to_install()}"
+NEEDS = f"needs ddenv-workbench {__version__}: {how_to_install()}"
 # What is written of each bundle; `$words` are filled in.
 TEMPLATES = Path(__file__).with_name("bundled")
 

@@ -128,4 +128,4 @@ def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
 def how_to_install(extra: str = "") -> str:
     """What to type for ddenv, or for one of its extras, in words."""
     what = f"'.[{extra}]'" if extra else "."
-    return f"pip install {what} in ddenv's clone (the ddenv on PyPI is another program)"
+    return f"pip install {what} in a checkout of ddenv-workbench (PyPI's ddenv is another program)"

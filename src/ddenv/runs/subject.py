@@ -223,7 +223,7 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     if not world.elements(frozenset(scenario.protected)):
         raise UserError(f"{scenario.world}: has no model that can be removed")
     if scenario.reading.inside and not any(model.inside for model in world.models):
-        why = next((note.why for note in world.notes if note.what == "--inside"), "each has one collision at most")
+        why = next((note.why for note in world.notes if note.what == "--inside"), "no model that never moves has several collisions of its own")
         raise UserError(f"{scenario.world}: --inside: no model has parts that can be removed: {why}")
     check_spawn(world, robot, scenario.robot.spawn)
 

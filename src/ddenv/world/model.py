@@ -213,10 +213,11 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A byte range (start, end) of a world's text that goes when all of `models` are gone."""
+    """A byte range (start, end) of a world's text that goes when all of `models` are gone, and what is written `instead`."""
 
     span: tuple[int, int]
     models: frozenset[str]
+    instead: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

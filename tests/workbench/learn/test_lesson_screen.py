@@ -228,3 +228,14 @@ async def test_the_algorithm_is_shown_from_the_step_that_speaks_of_it_on():
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
         await pilot.pause()
         assert pilot.app.screen.query_one("#lesson-now").display
+
+
+async def test_arrows_choose_an_answer_and_enter_takes_it():
+    keep_score("what-delta-debugging-is", Score(step=2))
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        course = pilot.app.screen.course
+        await pilot.press("down", "down", "up", "down")
+        assert "▸ b" in text(pilot)
+        await pilot.press("enter")
+        assert course.page.chosen == 1 and "▸" not in text(pilot)

@@ -1,4 +1,4 @@
-"""What the official SDF checker says of our files and of those that we write."""
+"""What the official SDF checker says of our files and of those that we write, and what we foretell of it."""
 
 import random
 import re
@@ -10,9 +10,11 @@ import pytest
 from docs.lessons.record import world_of
 from docs.lessons.toys import TOYS
 
+from ddenv.cli.world import world_lines, world_report
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.store import RunFile
 from ddenv.world.scenario import Reading
+from ddenv.world.sdf.official import refused
 from ddenv.world.sdf.read import parse_world, read_world
 from ddenv.world.write import convert, without, write_converted
 from tests.conftest import DATA, ROOT
@@ -51,9 +53,49 @@ def official(tmp_path):
 BOX = "<geometry><box><size>1 1 1</size></box></geometry>"
 
 
+def model(name, parts, static=1):
+    return f"<model name='{name}'><static>{static}</static><link name='l'>{parts}</link></model>"
+
+
 def inertia(*moments):
     tags = "".join(f"<{tag}>{value}</{tag}>" for tag, value in zip(("ixx", "iyy", "izz", "ixy"), moments, strict=False))
     return f"<inertial><mass>1</mass><inertia>{tags}</inertia></inertial>"
+
+
+def test_what_the_official_checker_refuses_is_noted(tmp_path):
+    same = f"<collision name='a'>{BOX}</collision><visual name='a'>{BOX}</visual>"
+    inside = [
+        model("first", same),
+        model("second", same),
+        model("plate", inertia(1, 1, 2.0001), static=0),
+        model("turned", inertia(1, 1, 1, 2), static=0),
+        model("huge", inertia("1e308", "1e308", "1e308", "1e307")),
+        model("__odd__", ""),
+        model("a::b", ""),
+        "<light name='first' type='point'/><plugin name='second' filename='f'/>",
+    ]
+    world = parse_world(
+        "\n".join(["<sdf version='1.9'><world name='w'>", *inside, "</world></sdf>"]).encode(), tmp_path / "w.sdf"
+    )
+    found = [(entry["why"], entry["place"].split(":")[1]) for entry in world_report(world)["refused"]]
+    twice = "a <{}> with two parts of the same name"
+    assert Counter(found) == Counter(
+        [
+            *((twice.format("link"), "2"), (twice.format("link"), "3"), (twice.format("world"), "9")),
+            *(("an inertia that no body has", "4"), ("an inertia that no body has", "5")),
+            *(("a name that is reserved", "7"), ("'::' in a name", "8")),
+        ]
+    )
+    (line,) = (line for line in world_lines(world) if "refuses a <link>" in line)
+    assert "w.sdf:2: " in line and line.endswith(", and 1 more")
+    assert refused(parse_world(convert(world, "m").text, tmp_path / "clean.sdf")) == []
+    old = world.text.replace(b"1.9", b"1.6")
+    assert not any("::" in why for why, _ in refused(parse_world(old, tmp_path / "old.sdf")))
+
+
+@pytest.mark.parametrize("path", [path for path in WORLDS if path.name != "ditch.sdf"], ids=lambda path: path.stem)
+def test_our_worlds_have_nothing_to_note(path):
+    assert refused(read_world(path)) == []
 
 
 @pytest.mark.programs
@@ -121,10 +163,18 @@ def generated(dice):
 
 
 @pytest.mark.programs
-def test_generated_worlds_are_valid_once_converted(official, tmp_path):
+def test_generated_worlds_are_judged_as_foretold(official, tmp_path):
     valid = 0
     for seed in range(25):
-        world = parse_world(generated(random.Random(seed)), tmp_path / "made.sdf")
-        valid += not official(world.text)
+        dice = random.Random(seed)
+        world = parse_world(generated(dice), tmp_path / "made.sdf")
+        removed = frozenset(name for name in world.elements() if dice.random() < 0.5)
+        smaller = parse_world(without(world, removed), tmp_path / "smaller.sdf")
+        for each in (world, smaller):
+            said = official(each.text)
+            assert bool(said) == bool(refused(each)), (seed, said, refused(each))
+        valid += not refused(world)
+        # The checker names only the first mistakes, so those of the smaller world are counted by what we foretell.
+        assert Counter(why for why, _ in refused(smaller)) <= Counter(why for why, _ in refused(world)), seed
         assert official(convert(world, "meshes").text) == Counter(), seed
     assert 5 <= valid <= 15

@@ -1,4 +1,4 @@
-"""Reads Drake's model directives (`.dmd.yaml`) with those of the files that `add_directives` opens, and writes them as one text.
+"""Reads Drake's model directives (`.dmd.yaml`) as YAML nodes that know their place; opens the files that `add_directives` names.
 
 Frames and models have the names that Drake gives them: `model::frame`, with a namespace before. What Drake refuses is refused.
 """
@@ -6,289 +6,344 @@ Frames and models have the names that Drake gives them: `model::frame`, with a n
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from copy import deepcopy
+from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import yaml
-from pydantic import Field, ValidationError, model_validator
-from pydantic_core import PydanticCustomError
-from yaml.nodes import MappingNode, Node, SequenceNode
+from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.text import printable
 from ddenv.world.access import Missing, Unusable
-from ddenv.world.load import complaint
-from ddenv.world.model import Note
 from ddenv.world.pose import Pose
-from ddenv.world.scenario import Coordinate, Corner, Finite, Section
 from ddenv.world.sdf.context import Context
+from ddenv.world.sdf.frames import FARTHEST
 
+Span = tuple[int, int]
 # Maximum number of directives: a few files that open each other could ask for more than any machine can hold.
 MOST = 50_000
 WORLD, WORLD_INSTANCE = "world", "WorldModelInstance"
-FILTERS = "add_collision_filter_group"
-ROTATIONS = ("!Identity", "!Rpy", "!AngleAxis")
-Name = Annotated[str, Field(min_length=1)]
-
-
-class Rotation(Section):
-    """`!Rpy` with `deg`, or `!AngleAxis` with `angle_deg` and `axis`; nothing of these turns nothing."""
-
-    deg: Corner | None = None
-    angle_deg: Finite | None = None
-    axis: Corner | None = None
-
-    @model_validator(mode="after")
-    def _one_way(self) -> Rotation:
-        rpy, angle, axis = (each is not None for each in (self.deg, self.angle_deg, self.axis))
-        if angle != axis or (rpy and axis):
-            raise PydanticCustomError("rotation", "should be !Rpy with deg, or !AngleAxis with angle_deg and axis")
-        if self.axis is not None and not 1e-9 < math.hypot(*self.axis) < 1e9:
-            raise PydanticCustomError("rotation", "the axis has no usable length")
-        return self
-
-    @property
-    def pose(self) -> Pose:
-        if self.deg is not None:
-            return Pose.from_rpy(0.0, 0.0, 0.0, *map(math.radians, self.deg))
-        if self.axis is None or self.angle_deg is None:
-            return Pose()
-        half, length = math.radians(self.angle_deg) / 2, math.hypot(*self.axis)
-        x, y, z = (part / length * math.sin(half) for part in self.axis)
-        return Pose((0.0, 0.0, 0.0), (math.cos(half), x, y, z))
-
-
-class Offset(Section):
-    """A place in m and degrees."""
-
-    translation: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
-    rotation: Rotation = Rotation()
-
-    @property
-    def pose(self) -> Pose:
-        return Pose(self.translation, self.rotation.pose.quaternion)
-
-
-class Transform(Offset):
-    """A place in the frame `base_frame`, by default the world."""
-
-    base_frame: Name | None = None
-
-
-class AddModel(Section):
-    """The joints named stand at their positions, rad or m; the bodies named, which are free, at their places."""
-
-    name: Name
-    file: Name
-    default_joint_positions: Mapping[str, tuple[Finite]] = Field(default={})
-    default_free_body_pose: Mapping[str, Transform] = Field(default={})
-
-
-class AddModelInstance(Section):
-    name: Name
-
-
-class AddFrame(Section):
-    name: Name
-    X_PF: Transform
-
-
-class AddWeld(Section):
-    parent: Name
-    child: Name
-    X_PC: Offset = Offset()
-
-
-class AddDirectives(Section):
-    file: Name
-    model_namespace: str = ""
-
-
-KINDS: dict[str, type[Section]] = {
-    "add_model": AddModel,
-    "add_model_instance": AddModelInstance,
-    "add_frame": AddFrame,
-    "add_weld": AddWeld,
-    "add_directives": AddDirectives,
+# The keys of each directive; those with a star are required.
+KEYS = {
+    kind: tuple(keys.split())
+    for kind, keys in {
+        "add_model": "*name *file default_joint_positions default_free_body_pose",
+        "add_model_instance": "*name",
+        "add_frame": "*name *X_PF",
+        "add_weld": "*parent *child X_PC",
+        "add_collision_filter_group": "*name members member_groups ignored_collision_filter_groups",
+        "add_directives": "*file model_namespace",
+    }.items()
 }
+_DASH = re.compile(r"^[ \t]*(-)(?=\s)", re.MULTILINE)
+_COMMENT = re.compile(r"[ \t]*(#[^\n\r]*)?(?=[\n\r]|\Z)")
+_COMMA = re.compile(r"\s*,")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file of directives as text; `namespace` is that of its names."""
+
+    path: Path
+    text: str
+    namespace: str = ""
+
+    def complain(self, node: Node, message: str) -> UserError:
+        """A UserError with file and line of `node`."""
+        return UserError(f"{self.path}:{node.start_mark.line + 1}: {printable(message)}")
+
+    def scoped(self, name: str) -> str:
+        """`name` with the namespace before it; `world` has none."""
+        return name if name == WORLD or not self.namespace else f"{self.namespace}::{name}"
+
+    def bytes_of(self, span: Span) -> Span:
+        """Byte positions in the encoded text for positions in the text."""
+        if self.text.isascii():
+            return span
+        start, end = (len(self.text[:at].encode()) for at in span)
+        return start, end
+
+    def text_of(self, node: Node) -> str:
+        """The text of a scalar. Raises UserError for anything else, and for an empty one."""
+        if not isinstance(node, ScalarNode) or not node.value.strip():
+            raise self.complain(node, "expected a name or a file")
+        return str(node.value)
+
+    def pairs(self, node: Node) -> dict[str, Node]:
+        """The values of a mapping by key. Raises UserError for anything else, and for a key that stands twice."""
+        if not isinstance(node, MappingNode):
+            raise self.complain(node, "expected keys with values")
+        found: dict[str, Node] = {}
+        for key, value in node.value:
+            name = self.text_of(key)
+            if name in found:
+                raise self.complain(key, f"the key '{name[:80]}' stands twice")
+            found[name] = value
+        return found
+
+    def keys(self, node: Node, what: str, keys: tuple[str, ...]) -> dict[str, Node]:
+        """The same with only `keys`, of which those with a star are required. Raises UserError."""
+        found, known = self.pairs(node), [key.lstrip("*") for key in keys]
+        for key in found:
+            if key not in known:
+                near = nearest(key[:80], known)
+                raise self.complain(node, f"{what}: unknown key '{key[:80]}'{near}; allowed are {', '.join(known)}")
+        for key in keys:
+            if key.startswith("*") and key[1:] not in found:
+                raise self.complain(node, f"{what}: {key[1:]} is missing")
+        return found
+
+    def items(self, node: Node) -> list[Node]:
+        """The items of a list. Raises UserError for anything else."""
+        if not isinstance(node, SequenceNode):
+            raise self.complain(node, "expected a list")
+        return list(node.value)
+
+    def numbers(self, node: Node, count: int) -> tuple[float, ...]:
+        """A list of `count` finite numbers. Raises UserError."""
+        found = [self.number(item) for item in self.items(node)]
+        if len(found) != count:
+            raise self.complain(node, f"expected {count} numbers, found {len(found)}")
+        return tuple(found)
+
+    def number(self, node: Node) -> float:
+        """A finite number. Raises UserError."""
+        try:
+            number = float(node.value) if isinstance(node, ScalarNode) and "_" not in node.value else math.nan
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            said = node.value[:60] if isinstance(node, ScalarNode) else "something else"
+            raise self.complain(node, f"expected a finite number, found {said!r}")
+        return number
+
+    def pose(self, node: Node | None, *, with_base: bool = True) -> tuple[Node | None, Pose]:
+        """The `base_frame` of a transform, which may be missing, and its pose in that: m, and degrees. Raises UserError."""
+        if node is None:
+            return None, Pose()
+        keys = self.keys(node, "pose", ("base_frame",) * with_base + ("translation", "rotation"))
+        for value in keys.values():
+            if value.tag == "!Uniform" or value.tag.startswith("!Gaussian"):
+                raise self.complain(value, f"{value.tag} is random; only fixed poses are read")
+        x, y, z = self.numbers(keys["translation"], 3) if "translation" in keys else (0.0, 0.0, 0.0)
+        if max(abs(x), abs(y), abs(z)) > FARTHEST:
+            raise self.complain(node, f"is farther than {FARTHEST:g} m away")
+        turn = self._rotation(keys["rotation"]) if "rotation" in keys else Pose()
+        return keys.get("base_frame"), Pose((x, y, z), turn.quaternion)
+
+    def _rotation(self, node: Node) -> Pose:
+        if node.tag == "!Rpy":
+            angles = self.numbers(self.keys(node, "!Rpy", ("*deg",))["deg"], 3)
+            return Pose.from_rpy(0.0, 0.0, 0.0, *map(math.radians, angles))
+        if node.tag == "!AngleAxis":
+            keys = self.keys(node, "!AngleAxis", ("*angle_deg", "*axis"))
+            half, axis = math.radians(self.number(keys["angle_deg"])) / 2, self.numbers(keys["axis"], 3)
+            length = math.hypot(*axis)
+            if not 1e-9 < length < 1e9:
+                raise self.complain(node, "the axis has no usable length")
+            x, y, z = (part / length * math.sin(half) for part in axis)
+            return Pose((0.0, 0.0, 0.0), (math.cos(half), x, y, z))
+        if node.tag in ("!Identity", "tag:yaml.org,2002:map") and not node.value:
+            return Pose()
+        raise self.complain(node, f"expected a rotation !Rpy or !AngleAxis, found {node.tag[:40]}")
 
 
 @dataclass(frozen=True)
 class Directive:
-    """A directive with its names as seen from the outermost file, and its place; `span` (start, end) are bytes of the one text."""
+    """One directive: its `kind`, its values by key, and its place; `span` (start, end) are bytes of the outermost file."""
 
-    value: Section
-    path: Path
-    line: int
-    span: tuple[int, int] = (0, 0)
+    kind: str
+    keys: Mapping[str, Node]
+    node: Node
+    source: Source
+    span: Span
 
-    def complain(self, message: str) -> UserError:
-        """A UserError with file and line."""
-        return _wrong(self.path, self.line, message)
-
-
-def _wrong(path: Path, line: int, message: str) -> UserError:
-    return UserError(f"{path}:{line}: {printable(message)}")
+    @property
+    def line(self) -> int:
+        return int(self.node.start_mark.line) + 1
 
 
-class _Loader(yaml.BaseLoader):
-    """Reads all scalars as text. An alias could stand for endless text, and without its anchor it stands for nothing."""
+@dataclass
+class Opened:
+    """The directives of a file and of all that it opens, in order. `flat` is one text for all of them, if others were opened.
+
+    `files` are the parsed ones: the items with their places, and whether commas separate them.
+    """
+
+    directives: list[Directive] = field(default_factory=list)
+    flat: bytes | None = None
+    files: dict[Path, list[tuple[Node, Span, bool]]] = field(default_factory=dict)
+
+
+class _Loader(yaml.SafeLoader):
+    """Composes nodes; an alias could stand for endless text, and without its anchor it stands for nothing."""
 
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
         if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]  # the stubs lack it
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
             raise yaml.MarkedYAMLError(problem="aliases (*name) are not read; write the value out", problem_mark=mark)
         return super().compose_node(parent, index)
 
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        if node.tag.startswith("!") and node.tag not in ROTATIONS:
-            raise yaml.MarkedYAMLError(
-                problem=f"{node.tag[:40]}: only fixed poses are read", problem_mark=node.start_mark
-            )
-        found: dict[Any, Any] = super().construct_mapping(node, deep)
-        if len(found) < len(node.value):
-            raise yaml.MarkedYAMLError(problem="a key stands twice", problem_mark=node.start_mark)
-        return found
+
+def opened(text: bytes, path: Path, context: Context) -> Opened:
+    """The directives in `text`, the content of `path`. Raises UserError with file and line."""
+    found = Opened()
+    pieces = _open(Source(path, _decoded(text, path)), (path,), context, found)
+    if any(one.kind == "add_directives" for one in found.directives):
+        found.flat = _joined(text.decode(), pieces)
+    return found
 
 
-def opened(text: bytes, path: Path, context: Context) -> tuple[list[Directive], bytes]:
-    """All directives in `text`, the content of `path`, and in the files that it opens; and one text that has them, a line each.
-
-    Raises UserError with file and line.
-    """
-    found: list[Directive] = []
-    lines, at = [b"directives: ["], len(b"directives: [")
-    for one in _all(text, path, "", (path,), {}, context):
-        if len(found) >= MOST:
-            raise one.complain(f"more than {MOST} directives")
-        if not isinstance(one.value, AddDirectives):
-            lines.append(f"{_written(one.value)},".encode())
-            one = replace(one, span=(at + 1, at + 1 + len(lines[-1])))
-            at = one.span[1]
-        found.append(one)
-    return found, b"\n".join([*lines, b"]", b""])
-
-
-Items = list[tuple[Section, int]]
-
-
-def _all(
-    text: bytes, path: Path, namespace: str, files: tuple[Path, ...], parsed: dict[Path, Items], context: Context
-) -> Iterator[Directive]:
-    """The directives of a file and, after each that opens another one, those of that."""
-    if path not in parsed:
-        parsed[path] = list(_items(text, path, context))
-    for value, line in parsed[path]:
-        one = Directive(_scoped(value, namespace, path if len(files) > 1 else None), path, line)
-        yield one
-        if isinstance(one.value, AddDirectives):
-            inner, content = _file(one, one.value.file, context)
-            if inner in files:
-                chain = " opens ".join(each.name for each in (*files[files.index(inner) :], inner))
-                raise one.complain(f"add_directives form a cycle: {chain}")
-            yield from _all(content, inner, one.value.model_namespace, (*files, inner), parsed, context)
+def _open(source: Source, files: tuple[Path, ...], context: Context, found: Opened) -> list[tuple[Span, str]]:
+    """Adds the directives of `source` to `found`; returns what to write in place of each `add_directives` of the outermost file."""
+    pieces = []
+    if source.path not in found.files:
+        found.files[source.path] = list(_nodes(source))
+    for node, (start, end), in_flow in found.files[source.path]:
+        if len(source.pairs(node)) != 1:
+            raise source.complain(node, f"expected one directive: {', '.join(KEYS)}")
+        ((kind, value),) = source.pairs(node).items()
+        if kind not in KEYS:
+            raise source.complain(node, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KEYS))}")
+        one = Directive(kind, source.keys(value, kind, KEYS[kind]), node, source, source.bytes_of((start, end)))
+        if len(found.directives) >= MOST:
+            raise source.complain(node, f"more than {MOST} directives")
+        found.directives.append(one)
+        if kind == "add_directives":
+            first = len(found.directives)
+            inner = _inner(one, files, context)
+            _open(inner, (*files, inner.path), context, found)
+            if len(files) > 1:
+                continue
+            texts = [_flat(each) for each in found.directives[first:] if each.kind != "add_directives"]
+            new_line = "\n" + " " * (start - source.text.rfind("\n", 0, start) - 1)
+            block = new_line.join(f"- {each}" for each in texts)
+            pieces.append(((start, end), "".join(f"{each}, " for each in texts) if in_flow else block))
+    return pieces
 
 
-def _items(text: bytes, path: Path, context: Context) -> Iterator[tuple[Section, int]]:
-    """The directives of a file with their lines; collision filters are noted."""
-    try:
-        loader = _Loader(text.decode())
-        root = loader.get_single_node()
-    except (yaml.YAMLError, ValueError) as error:
-        raise _not_yaml(path, error) from None
-    key, listed = root.value[0] if isinstance(root, MappingNode) and len(root.value) == 1 else (None, None)
-    if key is None or key.value != "directives" or not isinstance(listed, SequenceNode):
-        raise UserError(f"{path}: expected 'directives:' with a list, and nothing else")
-    for node in listed.value:
-        line = node.start_mark.line + 1
-        try:
-            data = loader.construct_object(node, deep=True)
-        except yaml.YAMLError as error:
-            raise _not_yaml(path, error) from None
-        if not isinstance(data, dict) or len(data) != 1:
-            raise _wrong(path, line, f"expected one directive: {', '.join(KINDS)}")
-        ((kind, content),) = data.items()
-        if kind == FILTERS:
-            why = "collision filters are not simulated, nor written with what is left"
-            context.notes.append(Note("ignored", "", f"{path}:{line}", kind, why))
-            continue
-        if kind not in KINDS:
-            raise _wrong(path, line, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KINDS))}")
-        try:
-            yield KINDS[kind].model_validate(content), line
-        except ValidationError as error:
-            # A misspelled key, before the one that is missing.
-            first = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
-            words, what = complaint(first, KINDS[kind])
-            raise _wrong(path, line, ": ".join(each for each in (kind, words, what) if each)) from None
-
-
-def _not_yaml(path: Path, error: Exception) -> UserError:
-    mark = getattr(error, "problem_mark", None)
-    line = "" if mark is None else f":{mark.line + 1}"
-    return UserError(f"{path}{line}: not valid YAML: {getattr(error, 'problem', None) or 'not UTF-8 text'}")
-
-
-def _file(one: Directive, uri: str, context: Context) -> tuple[Path, bytes]:
+def _file(one: Directive, context: Context) -> tuple[Path, bytes]:
     """Path and content of the directives that `one` opens. Raises UserError."""
+    node = one.keys["file"]
+    uri = one.source.text_of(node)
     try:
-        return context.resources.sdf(uri, one.path.parent)
+        return context.resources.sdf(uri, one.source.path.parent)
     except Missing as missing:
-        raise one.complain(f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path") from None
+        why = f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path"
+        raise one.source.complain(node, why) from None
     except Unusable as error:
-        raise one.complain(f"'{uri[:200]}' cannot be opened: {error}") from None
+        raise one.source.complain(node, f"'{uri[:200]}' cannot be opened: {error}") from None
 
 
-def _scoped(value: Section, namespace: str, inner: Path | None) -> Section:
-    """`value` with its names as seen from outside the namespace, and where the file `inner` names another one, with its path."""
-
-    def full(name: str) -> str:
-        return f"{namespace}::{name}" if namespace and name != WORLD else name
-
-    def based(pose: Transform) -> Transform:
-        return pose if pose.base_frame is None else pose.model_copy(update={"base_frame": full(pose.base_frame)})
-
-    match value:
-        case AddModel(name=name, file=file, default_free_body_pose=places):
-            there = {body: based(place) for body, place in places.items()}
-            if inner is not None and "://" not in file:
-                file = f"file://{(inner.parent / file).absolute()}"
-            changed: dict[str, Any] = {"name": full(name), "file": file, "default_free_body_pose": there}
-        case AddFrame(name=name, X_PF=place):
-            # A frame of the world is in no namespace.
-            changed = {"name": full(name) if "::" in name else name, "X_PF": based(place)}
-        case AddWeld(parent=parent, child=child):
-            changed = {"parent": full(parent), "child": full(child)}
-        case AddDirectives(model_namespace=own):
-            changed = {"model_namespace": full(own) if own else namespace}
-        case AddModelInstance(name=name):
-            changed = {"name": full(name)}
-        case _:
-            raise TypeError(type(value).__name__)
-    return value.model_copy(update=changed)
+def _inner(one: Directive, files: tuple[Path, ...], context: Context) -> Source:
+    path, text = _file(one, context)
+    if path in files:
+        chain = " opens ".join(each.name for each in (*files[files.index(path) :], path))
+        raise one.source.complain(one.keys["file"], f"add_directives form a cycle: {chain}")
+    own = one.keys.get("model_namespace")
+    namespace = one.source.namespace if own is None else one.source.scoped(one.source.text_of(own))
+    return Source(path, _decoded(text, path), namespace)
 
 
-class _Dumper(yaml.SafeDumper):
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
+def _decoded(text: bytes, path: Path) -> str:
+    try:
+        return text.decode()
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: cannot be decoded; save it as UTF-8") from None
 
 
-def _mapping(dumper: yaml.SafeDumper, value: Section) -> Node:
-    tag = "tag:yaml.org,2002:map"
-    if isinstance(value, Rotation):
-        tag = ROTATIONS[1 if value.deg is not None else 2 if value.axis is not None else 0]
-    given = {name: each for name, each in value if name in value.model_fields_set and each not in (None, {})}
-    return dumper.represent_mapping(tag, given)
+def _nodes(source: Source) -> Iterator[tuple[Node, Span, bool]]:
+    """The items of `directives:` with their places in the text, and whether they are separated by commas."""
+    try:
+        root = _Loader(source.text).get_single_node()
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise UserError(
+            f"{source.path}{line}: not valid YAML: {getattr(error, 'problem', None) or 'not text'}"
+        ) from None
+    if root is None:
+        raise UserError(f"{source.path}: the file is empty; expected directives")
+    listed: Any = source.keys(root, "file", ("*directives",))["directives"]
+    source.items(listed)
+    for node, span in spans_of(source, listed):
+        yield node, span, bool(listed.flow_style)
 
 
-_Dumper.add_multi_representer(Section, _mapping)
+def spans_of(source: Source, listed: Any) -> list[tuple[Any, Span]]:
+    """The items of a list, or the pairs of keys and values, each with the text that goes with it: its dash or its comma, too."""
+    found: list[tuple[Any, Span]] = []
+    before = listed.start_mark.index
+    for item in listed.value:
+        node, last = item if isinstance(item, tuple) else (item, item)
+        start, end = node.start_mark.index, _end(last)
+        if isinstance(listed, SequenceNode) and not listed.flow_style:
+            dash = _DASH.search(source.text, before) if found else None
+            # The list itself begins with the first dash, which may stand behind another one.
+            start = before if dash is None else dash.start(1)
+        after = (_COMMA if listed.flow_style else _COMMENT).match(source.text, end)
+        end = end if after is None else after.end()
+        found.append((item, (start, end)))
+        before = end
+    return found
 
 
-def _written(value: Section) -> str:
-    kind = next(kind for kind, section in KINDS.items() if isinstance(value, section))
-    return yaml.dump(
-        {kind: value}, Dumper=_Dumper, default_flow_style=True, width=math.inf, allow_unicode=True, sort_keys=False
-    ).strip()
+def _end(node: Any) -> int:
+    """Where the last word of `node` ends: PyYAML ends a block where the next one begins."""
+    if isinstance(node, ScalarNode) or node.flow_style or not node.value:
+        return int(node.end_mark.index)
+    last = node.value[-1]
+    return _end(last[1] if isinstance(node, MappingNode) else last)
+
+
+def _joined(text: str, pieces: list[tuple[Span, str]]) -> bytes:
+    for (start, end), piece in reversed(pieces):
+        text = text[:start] + piece + text[end:]
+    return text.encode()
+
+
+def _flat(one: Directive) -> str:
+    """A directive on one line, its names as seen from the outermost file."""
+    node, source = deepcopy(one.node), one.source
+    keys = source.pairs(source.pairs(node)[one.kind])
+    for named in _names(one.kind, keys, source):
+        named.value = source.scoped(named.value)
+    if one.kind == "add_collision_filter_group":
+        # Drake takes no scopes in the names of groups.
+        lists = [keys[key].value for key in ("member_groups", "ignored_collision_filter_groups") if key in keys]
+        for group in (keys["name"], *chain(*lists)):
+            group.value = group.value.replace("::", ".")
+    if one.kind == "add_model" and "://" not in keys["file"].value:
+        keys["file"].value = f"file://{(source.path.parent / keys['file'].value).absolute()}"
+    return _on_one_line(node)
+
+
+def _names(kind: str, keys: dict[str, Node], source: Source) -> Iterator[Node]:
+    """The names in a directive that are seen from the namespace of its file."""
+    listed = [keys[key] for key in ("members", "member_groups", "ignored_collision_filter_groups") if key in keys]
+    yield from (node for each in listed for node in each.value)
+    # A frame of the world is in no namespace.
+    if "name" in keys and (kind != "add_frame" or "::" in keys["name"].value):
+        yield keys["name"]
+    yield from (keys[key] for key in ("parent", "child") if key in keys)
+    poses = [keys["X_PF"]] if "X_PF" in keys else []
+    poses += source.pairs(keys["default_free_body_pose"]).values() if "default_free_body_pose" in keys else ()
+    yield from (base for pose in poses if (base := source.pairs(pose).get("base_frame")) is not None)
+
+
+def _on_one_line(node: Any) -> str:
+    left = [node]
+    while left:
+        each = left.pop()
+        if isinstance(each, ScalarNode):
+            each.style = "'" if each.style in ("|", ">") else each.style
+            continue
+        each.flow_style = True
+        left += [one for pair in each.value for one in pair] if isinstance(each, MappingNode) else each.value
+    return str(yaml.serialize(node, Dumper=yaml.SafeDumper, width=math.inf, allow_unicode=True)).strip()

@@ -8,36 +8,28 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from yaml.nodes import Node
+
 from ddenv.schemas import nearest
-from ddenv.world.model import Joint, Link, Model, World, held_with
+from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.assemble import assemble
 from ddenv.world.sdf.context import Context
-from ddenv.world.sdf.directives import (
-    FILTERS,
-    WORLD,
-    WORLD_INSTANCE,
-    AddDirectives,
-    AddFrame,
-    AddModel,
-    AddModelInstance,
-    AddWeld,
-    Directive,
-    opened,
-)
+from ddenv.world.sdf.directives import WORLD, WORLD_INSTANCE, Directive, Source, Span, opened, spans_of
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.includes import included
 from ddenv.world.sdf.joints import check_tree, link_of
 from ddenv.world.sdf.urdf import is_urdf, without_mass
-from ddenv.world.sdf.xml import Element
+from ddenv.world.sdf.xml import Element, complain
 
 GRAVITY = (0.0, 0.0, -9.81)  # Drake's default, m/s^2
 OWN_FRAME = "__model__"
 VERSION = "model directives"
+Group = tuple[str, str]  # a model and the root of those of its links that joints connect
 
 
 @dataclass(frozen=True)
@@ -55,17 +47,14 @@ class Frame:
 
 @dataclass(frozen=True)
 class Fixing:
-    """What places a model: its frame `own` stands at `pose` in the frame `base`, by a weld or as a free body.
-
-    `root` is the link that all others of the model hang on.
-    """
+    """What places a group of links: its frame `own` stands at `pose` in the frame `base`, by a weld or as a free body."""
 
     own: Frame
     base: Frame
     pose: Pose
-    directive: Directive
+    source: Source
+    node: Node
     weld: bool
-    root: str = ""
 
 
 @dataclass
@@ -78,10 +67,12 @@ class _Builder:
     scopes: dict[int, Scope] = field(default_factory=dict)
     frames: dict[str, Frame] = field(default_factory=lambda: {f"{WORLD_INSTANCE}::{WORLD}": Frame()})
     instances: set[str] = field(default_factory=lambda: {WORLD_INSTANCE})
-    fixings: dict[str, Fixing] = field(default_factory=dict)
-    spans: dict[str, list[tuple[int, int]]] = field(default_factory=lambda: defaultdict(list))
-    places: dict[str, Pose | None] = field(default_factory=dict)
-    finished: dict[str, Model] = field(default_factory=dict)
+    roots: dict[Group, str] = field(default_factory=dict)
+    fixings: dict[Group, Fixing] = field(default_factory=dict)
+    spans: dict[str, list[Span]] = field(default_factory=lambda: defaultdict(list))
+    filters: list[Directive] = field(default_factory=list)
+    places: dict[Group, Pose | None] = field(default_factory=dict)
+    finished: dict[str, Model | None] = field(default_factory=dict)
     # By model: the one that it is a part of, and the joint that holds it there.
     carriers: dict[str, tuple[str, Joint]] = field(default_factory=dict)
     ties: dict[tuple[str, str], None] = field(default_factory=dict)
@@ -89,40 +80,50 @@ class _Builder:
 
     def take(self, one: Directive) -> None:
         """Adds what `one` says. Raises UserError."""
-        match one.value:
-            case AddModel():
-                self._add_model(one, one.value)
-            case AddModelInstance(name=name):
-                self._claim(name, one)
-            case AddFrame():
-                self._add_frame(one, one.value)
-            case AddWeld():
-                self._add_weld(one, one.value)
-            case AddDirectives(model_namespace=name):
+        source, keys = one.source, one.keys
+        match one.kind:
+            case "add_model":
+                self._add_model(one)
+            case "add_model_instance":
+                self._claim(source.scoped(source.text_of(keys["name"])), source, keys["name"])
+            case "add_frame":
+                self._add_frame(one)
+            case "add_weld":
+                self._add_weld(one)
+            case "add_collision_filter_group":
+                self.filters.append(one)
+            case _:
+                own = keys.get("model_namespace")
+                name = source.namespace if own is None else source.scoped(source.text_of(own))
                 if name and name not in self.instances:
-                    raise one.complain(f"there is no model instance '{name[:80]}' for the namespace")
+                    raise source.complain(
+                        own or one.node, f"there is no model instance '{name[:80]}' for the namespace"
+                    )
 
-    def _claim(self, name: str, one: Directive) -> None:
+    def _claim(self, name: str, source: Source, node: Node) -> None:
         if name in self.instances or name == "DefaultModelInstance":
-            raise one.complain(f"the model '{name[:80]}' is added twice")
+            raise source.complain(node, f"the model '{name[:80]}' is added twice")
         self.instances.add(name)
 
-    def _add_model(self, one: Directive, value: AddModel) -> None:
-        name = value.name
-        self._claim(name, one)
-        include, uri = (_element(tag, one.path, one.line, one.span) for tag in ("add_model", "uri"))
-        uri.text = value.file
+    def _add_model(self, one: Directive) -> None:
+        source, keys = one.source, one.keys
+        name = source.scoped(source.text_of(keys["name"]))
+        self._claim(name, source, keys["name"])
+        include, uri = _element("add_model", one), _element("uri", one)
+        uri.text = source.text_of(keys["file"])
         include.set("name", name)
         include.append(uri)
         self.context.model = name
-        part = included(include, (one.path,), self.context)
+        part = included(include, (source.path,), self.context)
         self.context.model = ""
         if part is None:
             return
         part = replace(part, name=name)
-        outer = Scope(_element(WORLD, one.path), (one.path,), self.context, self.scopes)
+        outer = Scope(_element(WORLD, one), (source.path,), self.context, self.scopes)
         model = assemble(part, name, outer, None, self.context)
-        model, turned = _at_positions(without_mass(model, part.element), value, one)
+        model = without_mass(model, part.element)
+        positions = source.pairs(keys["default_joint_positions"]) if "default_joint_positions" in keys else {}
+        model, turned = _at_positions(model, positions, source)
         self.models[name], self.elements[name] = model, include
         self.spans[name].append(one.span)
         for own, pose, link in _frames(outer.inside(part), outer.placed(part), "", self.context):
@@ -130,35 +131,42 @@ class _Builder:
                 continue
             self.frames[f"{name}::{own}"] = Frame(name, link, turned.get(link, HERE) @ pose, frozenset([name]))
             self.instances.add(f"{name}::{own}".rpartition("::")[0])
-        for body, there in value.default_free_body_pose.items():
+        self.roots |= {(name, link): root for link, root in _roots(model).items()}
+        free = source.pairs(keys["default_free_body_pose"]) if "default_free_body_pose" in keys else {}
+        for body, value in free.items():
             frame = self.frames.get(f"{name}::{body}")
             if frame is None or "::" in body:
-                raise one.complain(f"there is no body '{body[:80]}' in '{name[:80]}'")
-            base = Frame() if there.base_frame is None else self._frame(there.base_frame, one)
-            self._fix(Fixing(frame, base, there.pose, one, weld=False))
+                raise source.complain(value, f"there is no body '{body[:80]}' in '{name[:80]}'")
+            base, pose = source.pose(value)
+            there = Frame() if base is None else self._frame(base, source)
+            self._fix(Fixing(frame, there, pose, source, value, weld=False))
 
-    def _frame(self, name: str, one: Directive) -> Frame:
-        """The frame called `name`. Raises UserError."""
+    def _frame(self, node: Node, source: Source) -> Frame:
+        """The frame that `node` names. Raises UserError."""
+        name = source.scoped(source.text_of(node))
         if "::" in name:
             found = [name] if name in self.frames else []
         else:
             found = [each for each in self.frames if each.rpartition("::")[2] == name]
-        if not found:
-            near = nearest(name[:80], list(self.frames)[:500])
-            raise one.complain(f"there is no frame '{name[:80]}' here{near}")
-        if len(found) > 1:
-            raise one.complain(f"'{name[:80]}' may be {' or '.join(found[:3])}")
+        if len(found) != 1:
+            many = (
+                f"'{name[:80]}' may be {' or '.join(found[:3])}" if found else f"there is no frame '{name[:80]}' here"
+            )
+            raise source.complain(node, many + ("" if found else nearest(name[:80], list(self.frames)[:500])))
         return self.frames[found[0]]
 
-    def _add_frame(self, one: Directive, value: AddFrame) -> None:
-        if value.X_PF.base_frame is None:
-            raise one.complain("X_PF: base_frame is missing")
-        there = self._frame(value.X_PF.base_frame, one)
-        instance, _, last = value.name.rpartition("::")
+    def _add_frame(self, one: Directive) -> None:
+        source = one.source
+        base, pose = source.pose(one.keys["X_PF"])
+        if base is None:
+            raise source.complain(one.keys["X_PF"], "base_frame is missing")
+        there = self._frame(base, source)
+        instance, _, last = source.text_of(one.keys["name"]).rpartition("::")
         owners = there.owners
         if instance:
+            instance = source.scoped(instance)
             if instance not in self.instances:
-                raise one.complain(f"there is no model instance '{instance[:80]}'")
+                raise source.complain(one.keys["name"], f"there is no model instance '{instance[:80]}'")
             words = instance.split("::")
             owners |= {name for end in range(len(words)) if (name := "::".join(words[: end + 1])) in self.models}
         else:
@@ -166,90 +174,100 @@ class _Builder:
             instance = "::".join(each for each in (there.model or WORLD_INSTANCE, inner) if each)
         full = f"{instance}::{last}"
         if full in self.frames:
-            raise one.complain(f"there already is a frame '{full[:80]}'")
-        self.frames[full] = Frame(there.model, there.link, there.pose @ value.X_PF.pose, owners)
+            raise source.complain(one.keys["name"], f"there already is a frame '{full[:80]}'")
+        self.frames[full] = Frame(there.model, there.link, there.pose @ pose, owners)
         for owner in owners:
             self.spans[owner].append(one.span)
 
-    def _add_weld(self, one: Directive, value: AddWeld) -> None:
-        parent, child = self._frame(value.parent, one), self._frame(value.child, one)
+    def _add_weld(self, one: Directive) -> None:
+        source = one.source
+        parent, child = (self._frame(one.keys[end], source) for end in ("parent", "child"))
+        _, pose = source.pose(one.keys.get("X_PC"), with_base=False)
         if not child.model:
-            raise one.complain("the world cannot be welded to a model; make it the parent")
-        self._fix(Fixing(child, parent, value.X_PC.pose, one, weld=True))
+            raise source.complain(one.keys["child"], "the world cannot be welded to a model; make it the parent")
+        self._fix(Fixing(child, parent, pose, source, one.node, weld=True))
         for owner in child.owners:
             self.spans[owner].append(one.span)
 
     def _fix(self, fixing: Fixing) -> None:
         name, link = fixing.own.model, fixing.own.link
-        model, before = self.models[name], self.fixings.get(name)
-        if model.static or any(joint.parent == WORLD for joint in model.joints):
-            raise fixing.directive.complain(f"'{name[:80]}' is fixed to the world by its own file")
+        key, model = (name, self.roots[name, link]), self.models[name]
+        before = self.fixings.get(key)
+        if model.static or any(
+            joint.parent == WORLD for joint in model.joints if self.roots[name, joint.child] == key[1]
+        ):
+            raise fixing.source.complain(fixing.node, f"'{name[:80]}' is fixed to the world by its own file")
         if before is not None and (before.weld or not fixing.weld or before.base.model):
-            raise fixing.directive.complain(f"'{name[:80]}' is placed twice")
-        hung = {joint.child for joint in model.joints}
-        first, *others = (each.name for each in model.links if each.name not in hung)
-        if others:
-            raise fixing.directive.complain(f"'{name[:80]}' has parts that no joint connects; add each as a model")
-        # A weld of a link that others hold would turn their joints round; what is fixed to the first one moves with it.
-        if link not in held_with(model, first):
-            raise fixing.directive.complain(f"'{link[:80]}' hangs on a joint; only '{first[:80]}' can be placed")
-        self.fixings[name] = replace(fixing, root=first)
+            raise fixing.source.complain(fixing.node, f"'{name[:80]}' is placed twice")
+        if not (fixing.weld or fixing.base.model or link == key[1]):
+            raise fixing.source.complain(fixing.node, f"'{link[:80]}' is not free: joints hold it")
+        self.fixings[key] = fixing
 
     # Where all of it is.
 
-    def _place(self, name: str) -> Pose:
-        """How far a model moves from the place where its own file puts it. Raises UserError."""
-        fixing = self.fixings.get(name)
+    def _place(self, key: Group) -> Pose:
+        """How far a group of links moves from the place where its own file puts it. Raises UserError."""
+        fixing = self.fixings.get(key)
         if fixing is None:
             return HERE
-        if name not in self.places:
-            self.places[name] = None
-            self.places[name] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
-        place = self.places[name]
+        if key not in self.places:
+            self.places[key] = None
+            self.places[key] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
+        place = self.places[key]
         if place is None:
-            raise fixing.directive.complain(f"the place of '{name[:80]}' depends on itself")
+            raise fixing.source.complain(fixing.node, f"the place of '{key[0][:80]}' depends on itself")
         return place
 
     def _pose(self, frame: Frame) -> Pose:
         """The pose of `frame` in the world."""
-        return self._place(frame.model) @ frame.pose if frame.model else frame.pose
+        if not frame.model:
+            return frame.pose
+        return self._place((frame.model, self.roots[frame.model, frame.link])) @ frame.pose
 
     def finish(self, name: str) -> Model:
-        """The model `name` at its place, with its weld to what does not move. Raises UserError."""
+        """The model `name` at its place, with its welds to what does not move. Raises UserError."""
         if name not in self.finished:
+            self.finished[name] = None
             self.finished[name] = self._finished(name)
-        return self.finished[name]
+        model = self.finished[name]
+        if model is None:
+            raise complain(self.elements[name], "its welds form a loop")
+        return model
 
     def _finished(self, name: str) -> Model:
-        model, fixing, place = self.models[name], self.fixings.get(name), self._place(name)
-        joints = [_moved_joint(joint, place) for joint in model.joints]
-        if fixing is not None:
-            others = dict.fromkeys((name, other) for other in sorted((fixing.own.owners | fixing.base.owners) - {name}))
-            if fixing.weld:
-                self.ties |= others
-                joints += self._welds(name, fixing)
+        model = self.models[name]
+        place = {link.name: self._place((name, self.roots[name, link.name])) for link in model.links}
+        joints = [_moved_joint(joint, place[joint.child]) for joint in model.joints]
+        groups = dict.fromkeys((name, self.roots[name, link.name]) for link in model.links)
+        for fixing in (self.fixings[group] for group in groups if group in self.fixings):
+            base = fixing.base
+            others = (fixing.own.owners | base.owners) - {name}
+            if not fixing.weld:
+                self.anchors |= others
+                continue
+            at = fixing.own.link
+            joints = _hung_from(at, joints)
+            if base.model == name:
+                joints.append(Joint(f"{at} (weld)", "fixed", base.link, at, self._pose(base)))
+            elif base.model and not _holds(self.finish(base.model), base.link):
+                if name in self.carriers:
+                    why = f"'{name[:80]}' is welded to two models that can move"
+                    raise fixing.source.complain(fixing.node, why)
+                outer, parent = base.model, base.link
+                if outer in self.carriers:
+                    outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
+                at = f"{name}::{at}"
+                self.carriers[name] = outer, Joint(f"{at} (weld)", "fixed", parent, at, self._pose(base))
             else:
-                self.anchors |= {other for _, other in others}
-        links = tuple(_moved_link(link, place) for link in model.links)
-        model = replace(
-            model, pose=place @ model.pose, links=links, joints=tuple(joints), spans=tuple(self.spans[name])
-        )
+                joints.append(Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base)))
+            self.ties |= dict.fromkeys((name, other) for other in sorted(others))
+        links = tuple(_moved_link(link, place[link.name]) for link in model.links)
+        pose = place[model.links[0].name] @ model.pose
+        model = replace(model, pose=pose, links=links, joints=tuple(joints), spans=tuple(self.spans[name]))
         if name not in self.carriers and not model.static and all(_holds(model, link.name) for link in links):
             bare = tuple(replace(link, inertia=None) for link in links)
             return replace(model, static=True, links=bare, joints=(), gravity=True)
         return model
-
-    def _welds(self, name: str, fixing: Fixing) -> list[Joint]:
-        """The weld of a model to the world or to what does not move; what is welded to something that can move gets a carrier."""
-        base, at = fixing.base, fixing.root
-        if not base.model or _holds(self.finish(base.model), base.link):
-            return [Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base))]
-        outer, parent = base.model, base.link
-        if outer in self.carriers:
-            outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
-        at = f"{name}::{at}"
-        self.carriers[name] = outer, Joint(f"{at} (weld)", "fixed", parent, at, self._pose(base))
-        return []
 
     def all(self) -> tuple[Model, ...]:
         """The models in the order of their directives, each with those that are parts of it. Raises UserError."""
@@ -280,28 +298,77 @@ class _Builder:
         """The model that `name` is a part of: itself, unless it is welded to one that can move."""
         return self.carriers[name][0] if name in self.carriers else name
 
+    def shared(self) -> Iterator[Shared]:
+        """What of collision filter groups goes when all of some models are gone. Raises UserError."""
+        groups: dict[str, Directive] = {}
+        for one in self.filters:
+            name = one.source.scoped(one.source.text_of(one.keys["name"]))
+            if name in groups:
+                raise one.source.complain(one.node, f"the group '{name[:80]}' is added twice")
+            groups[name] = one
+        owners = {name: self._owners(one, "members", {}) for name, one in groups.items()}
+        before: dict[str, frozenset[str]] = {}
+        while before != owners:
+            before = owners
+            owners = {name: owners[name] | self._owners(one, "member_groups", owners) for name, one in groups.items()}
+        for name, one in groups.items():
+            if not owners[name]:
+                raise one.source.complain(one.node, "a group needs members or member_groups")
+            yield Shared(one.span, owners[name])
+            value = one.source.pairs(one.node)[one.kind]
+            for (key, listed), span in spans_of(one.source, value):
+                if key.value == "name":
+                    continue
+                for node, inner in spans_of(one.source, listed):
+                    yield Shared(one.source.bytes_of(inner), self._owner(node, key.value, one.source, owners))
+                if names := self._owners(one, key.value, owners):
+                    yield Shared(one.source.bytes_of(span), names)
+
+    def _owners(self, one: Directive, key: str, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
+        nodes = one.source.items(one.keys[key]) if key in one.keys else []
+        return frozenset[str]().union(*(self._owner(node, key, one.source, groups) for node in nodes))
+
+    def _owner(self, node: Node, key: str, source: Source, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
+        """The models of a member, which is a body, or of a group. Raises UserError."""
+        if key == "members":
+            return frozenset(map(self.carrier, self._frame(node, source).owners))
+        name = source.scoped(source.text_of(node))
+        if name not in groups:
+            raise source.complain(node, f"there is no group '{name[:80]}'{nearest(name[:80], list(groups)[:500])}")
+        return groups[name]
+
 
 def parse_directives(text: bytes, path: Path, context: Context) -> World:
     """The world that the directives in `text`, the content of `path`, make. Raises UserError with file and line.
 
-    Its text has all of them, a line each, with those of the files that they open in place of `add_directives`.
+    Its text is that of the file; if that opens others, with their directives in place of `add_directives`.
     """
-    directives, joint_text = opened(text, path, context)
+    found = opened(text, path, context)
     builder = _Builder(context)
-    for one in directives:
+    for one in found.directives:
         builder.take(one)
     models = builder.all()
+    shared = list(builder.shared())
     context.complain_of_missing()
-    if any(isinstance(one.value, AddDirectives) for one in directives):
+    if found.flat is not None:
         # Again, for the places in that text; what is wrong was said with the places in the files.
-        filters = [note for note in context.notes if note.what == FILTERS]
-        return parse_directives(joint_text, path, Context(context.resources, context.reading, filters))
-    context.note_unused(_element(WORLD, path))
+        again = Context(context.resources, context.reading)
+        return parse_directives(found.flat, path, again)
+    going = {span for spans in builder.spans.values() for span in spans} | {one.span for one in builder.filters}
+    if (
+        models
+        and text[found.directives[0].span[0] :].startswith(b"-")
+        and all(one.span in going for one in found.directives)
+    ):
+        # Drake takes an empty list, but not a missing one.
+        span = found.directives[0].span[0], found.directives[-1].span[1]
+        shared.append(Shared(span, frozenset(model.name for model in models), b"\n  []"))
+    context.note_unused(_element(WORLD, Source(path, "")))
     ties = ((builder.carrier(name), builder.carrier(other)) for name, other in builder.ties)
     return World(
         path=path,
         name=path.name.split(".")[0],
-        text=joint_text,
+        text=text,
         gravity=GRAVITY,
         models=models,
         version=VERSION,
@@ -309,13 +376,16 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
         anchors=frozenset(map(builder.carrier, builder.anchors)),
         resources=context.resources.taken,
         ties=tuple(dict.fromkeys((name, other) for name, other in ties if name != other)),
+        shared=tuple(shared),
     )
 
 
-def _element(tag: str, path: Path, line: int = 1, span: tuple[int, int] = (0, 0)) -> Element:
+def _element(tag: str, one: Directive | Source) -> Element:
     """An element at the place of a directive, for all that reads SDF."""
     made = Element(tag)
-    made.source, made.line, (made.start, made.end), made.parent = path, line, span, None
+    made.source = one.path if isinstance(one, Source) else one.source.path
+    made.line, (made.start, made.end) = (1, (0, 0)) if isinstance(one, Source) else (one.line, one.span)
+    made.parent = None
     return made
 
 
@@ -330,15 +400,30 @@ def _frames(scope: Scope, here: Pose, prefix: str, context: Context) -> Iterator
         yield from _frames(scope.inside(part), here @ scope.placed(part), f"{prefix}{part.name}::", context)
 
 
-def _at_positions(model: Model, value: AddModel, one: Directive) -> tuple[Model, dict[str, Pose]]:
-    """`model` with joints at their positions, and how far each link moves. Raises UserError."""
+def _roots(model: Model) -> dict[str, str]:
+    """For each link the one that joints hang it and others from: no joint holds that, or only one to the world."""
+    parents = {joint.child: joint.parent for joint in model.joints if joint.parent != WORLD}
+    found = {}
+    for link in model.links:
+        root = link.name
+        while root in parents:
+            root = parents[root]
+        found[link.name] = root
+    return found
+
+
+def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -> tuple[Model, dict[str, Pose]]:
+    """`model` with joints at `positions` (rad, or m), and how far each link moves. Raises UserError."""
     joints = {joint.name: joint for joint in model.joints}
     turns: dict[str, tuple[float, Pose]] = {}
-    for name, (at,) in value.default_joint_positions.items():
+    for name, node in positions.items():
         joint = joints.get(name)
         if joint is None or joint.kind not in ("revolute", "continuous", "prismatic"):
-            near = nearest(name[:80], list(joints)[:500])
-            raise one.complain(f"there is no joint '{name[:80]}' with one position{near}")
+            why = "there is no joint" if joint is None else f"only joints with one position are read; {joint.kind} is"
+            raise source.complain(
+                node, f"{why} '{name[:80]}'" + ("" if joint else nearest(name[:80], list(joints)[:500]))
+            )
+        (at,) = source.numbers(node, 1)
         x, y, z = joint.axis
         if joint.kind == "prismatic":
             turns[joint.child] = at, Pose((x * at, y * at, z * at))
@@ -375,6 +460,21 @@ def _moved_joint(joint: Joint, by: Pose, position: float = 0.0) -> Joint:
     second = None if joint.axis2 is None else by.rotate(joint.axis2)
     lower, upper = joint.lower - position, joint.upper - position
     return replace(joint, pose=by @ joint.pose, axis=by.rotate(joint.axis), axis2=second, lower=lower, upper=upper)
+
+
+def _hung_from(link: str, joints: list[Joint]) -> list[Joint]:
+    """The joints of a model that hangs from `link`: those between that and the root turn the other way round."""
+    holding = {joint.child: joint for joint in joints if joint.parent != WORLD}
+    turned = {}
+    while link in holding:
+        joint = holding.pop(link)
+        x, y, z = joint.axis
+        turned[joint.name] = replace(joint, parent=link, child=joint.parent, axis=(-x, -y, -z))
+        if joint.axis2 is not None:
+            a, b, c = joint.axis2
+            turned[joint.name] = replace(turned[joint.name], axis=(-a, -b, -c), axis2=(-x, -y, -z))
+        link = joint.parent
+    return [turned.get(joint.name, joint) for joint in joints]
 
 
 def _holds(model: Model, link: str) -> bool:
