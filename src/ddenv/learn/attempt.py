@@ -87,7 +87,7 @@ def read_oracle(path: Path) -> Oracle:
     if not all(0 <= rate <= 1 for rate in rates.values()):
         raise UserError(f"{path}: rates: expected numbers from 0 to 1")
     if not frozenset().union(*outcomes, *rates).issubset(models):
-        raise UserError(f"{path}: outcomes: a set has a model that is not among the models")
+        raise UserError(f"{path}: outcomes: a set names a model that is not listed")
     return Oracle(models, outcomes, otherwise, rates, rounds)
 
 

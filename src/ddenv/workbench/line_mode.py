@@ -43,7 +43,7 @@ GUIDES = {
     "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
     "without": ("without", "w", "try the environment without models: 'without crate_01'"),
     "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
-    "drop": ("leave_out", "H", "leave out the model that only helps, by the certificate"),
+    "drop": ("leave_out", "H", "leave out the model that only helps, as certified"),
     "undo": ("undo", "u", "take back the last reduction"),
     "isolate": ("isolate", "i", "find a nearest world that passes; again stops that"),
     "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),

@@ -61,7 +61,7 @@ _GUIDES = (
     ("p", "pin", "pins", "choose the models that always stay; the selected ones are marked, pinned ones are unpinned"),
     ("w", "without", "try without", "try by hand: test the environment without the selected models, or those you name"),
     ("o", "only", "try only", "try by hand: test the selected models alone, or those you name"),
-    ("H", "leave_out", "leave out", "leave out the model that only helps, by the certificate; a new search begins"),
+    ("H", "leave_out", "leave out", "leave out the model that only helps, as certified; a new search begins"),
     ("u", "undo", "undo", "undo: take back the last reduction; it is not made again"),
     ("c", "change", "settings", "change pair, algorithm, iterations or budget, from the next round on"),
     ("t", "mode", "ask", "accept reductions automatically, or ask before each one"),
@@ -104,7 +104,7 @@ KEYS: list[BindingType] = [
         ("follow", "escape", "follow", "follow", "back to now; select nothing; cursor and map follow the run again"),
         *MAP_KEYS,
         ("back", "comma", "browse('moment', -1)", "back", "back in the run: to the moment before this one", ","),
-        ("on", "full_stop", "browse('moment', 1)", "on", "on to the next moment; after the last one comes now", "."),
+        ("on", "full_stop", "browse('moment', 1)", "on", "on to the next moment; after the last one, back to now", "."),
         (
             "round_before",
             "less_than_sign",

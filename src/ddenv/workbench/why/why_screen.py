@@ -288,6 +288,6 @@ class MarginsDialog(Reading):
             ]
         if known is not None and found:
             groups += [
-                ("What this says", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
+                ("What this means", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
             ]
         super().__init__("Margins", groups)
