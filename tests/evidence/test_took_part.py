@@ -66,7 +66,7 @@ def test_the_workbench_teaches_what_is_implied(moments):
     recorded, _, implied = first(moments, "implied")
     said = " ".join(explain(Snapshot(implied, (), "alive")).sentences)
     assert (
-        f"Test {recorded.event.test} is implied by test {recorded.event.by}: no model that it lacks can have affected that run."
+        f"Test {recorded.event.test} is implied by test {recorded.event.by}: no model it lacks affected that run."
         in said
     )
 

@@ -222,7 +222,7 @@ def _place(candidate: Candidate, current: Round) -> str:
 def _first_run(place: str, options: Settings) -> tuple[str, ...]:
     return (
         f"First run of {place}.",
-        f"It shows f if the robot misses its goal for {options.timeout:g} s and ends within {options.epsilon:g} m of f's end.",
+        f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within {options.epsilon:g} m of f's end.",
     )
 
 
@@ -351,7 +351,7 @@ def implied(state: RunState) -> tuple[str, ...]:
     last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
-    return (f"Test {last.id} is implied by test {last.implied_by}: no model that it lacks can have affected that run.",)
+    return (f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",)
 
 
 def refuted(state: RunState) -> tuple[str, ...]:

@@ -156,7 +156,7 @@ MEANINGS = {
     "removed": "where removed models stood",
     "pinned": "which models are pinned",
     "sensed": "the order in which the robot sensed the models",
-    "participants": "bright: models that affected the last similar run",
+    "participants": "models that affected the last similar run",
     "path": "the robot's path on the last similar run",
     "original": "the robot's path in f itself",
     "failure": "where the robot ended in f",
