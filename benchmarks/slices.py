@@ -2,7 +2,7 @@
 
     python benchmarks/slices.py [--worlds N] [--tests N] [--from NUMBER]
     python benchmarks/slices.py ditch|friction|rubble [--seconds S] [--tests N]
-    python benchmarks/slices.py WORLD --spawn X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE] [--seconds S] [--tests N]
+    python benchmarks/slices.py WORLD --spawn X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE] [--inside] [--seconds S] [--tests N]
     python benchmarks/slices.py ... --forget KIND
 
 Without a name: small random worlds (`small_worlds.py`), N of each kind. Of each world, random parts run, and then random parts of
@@ -68,6 +68,7 @@ def main() -> int:
     parser.add_argument("--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file")
     parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
     parser.add_argument("--stand-in", action="append", default=[], help="as in `ddenv run`; with a world file")
+    parser.add_argument("--inside", action="store_true", help="as in `ddenv run`; with a world file")
     parser.add_argument("--seconds", type=float, help="simulated time of a run; the scenario's by default")
     parser.add_argument("--tests", type=int, default=36, help="implied tests of each world, at most")
     parser.add_argument("--worlds", type=int, default=10, help="small worlds of each kind")
@@ -97,7 +98,7 @@ def named(options: argparse.Namespace) -> tuple[World, Model, Scenario]:
         x, y, z, yaw = map(float, options.spawn.split(","))
         goal_x, goal_y = map(float, options.goal.split(","))
         scenario = scenario_for_world(Path(options.world), (x, y, z, yaw), (goal_x, goal_y))
-        scenario = with_options(scenario, reading=reading_of(stand_in=options.stand_in))
+        scenario = with_options(scenario, reading=reading_of(stand_in=options.stand_in, inside=options.inside))
     scenario = with_options(scenario, timeout=options.seconds)
     return *load_parts(scenario), scenario
 
