@@ -222,7 +222,8 @@ def _place(candidate: Candidate, current: Round) -> str:
 def _first_run(place: str, options: Settings) -> tuple[str, ...]:
     return (
         f"First run of {place}.",
-        f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within {options.epsilon:g} m of f's end.",
+        f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within {options.epsilon:g} m of "
+        "f's end.",
     )
 
 
