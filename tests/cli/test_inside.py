@@ -39,7 +39,7 @@ def test_what_a_run_has_left_is_reduced_inside_to_the_parts_that_stop_the_robot(
     assert ddenv("run", world, *PLACES, "--output", tmp_path / "whole.ddenv").returncode == 0
     minimal = tmp_path / "minimal.sdf"
     done = ddenv("run", tmp_path / "whole.ddenv", "--inside", "--output", tmp_path / "inside.ddenv", "--json")
-    assert json.loads(done.stdout)["environment"] == ["yard/left", "yard/right"]
+    assert json.loads(done.stdout)["kept"] == ["yard/left", "yard/right"]
     scenario = tmp_path / "minimal.yaml"
     assert ddenv("export", tmp_path / "inside.ddenv", "--output", minimal, "--scenario", scenario).returncode == 0
     assert [len(model.collisions) for model in read_world(minimal).models] == [1, 2]

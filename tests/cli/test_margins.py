@@ -19,7 +19,7 @@ from tests.waiting import PATIENCE
 from tests.workbench import fake_moments
 
 FRICTION = (
-    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), which is as far as was tried; f up to 0.2 (5 of 5 runs), the robot "
+    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the farthest value tried; f up to 0.2 (5 of 5 runs), the robot "
     "reaches its goal from 0.4 (7 of 7 runs)"
 )
 FIX = (
@@ -37,7 +37,7 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch,
     assert said[0].split() == ["number", "now", "f", "until", "goal", "from", "runs"]
     assert said[1].split() == ["crate_00.friction", "0.1", "0", "(all)", "…", "0.2", "goal", "≥", "0.4", "17"]
     assert f"{FRICTION}." in said
-    assert "f not at 0.31 (0 of 7 runs), was lost in 7 instead" in done.stdout
+    assert "no f at 0.31 (0 of 7 runs), was lost in 7 instead" in done.stdout
     assert "1.25 is not possible: crate_01 would be 0.20 m inside crate_00" in done.stdout
     assert FIX in done.stdout
     assert "at most 5 %" in said[-1]

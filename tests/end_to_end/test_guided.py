@@ -38,7 +38,7 @@ def test_a_reduction_is_guided_by_keys_alone(terminal, baseline, tmp_path):
     _branch(bench, run)
     _export(bench, tmp_path)
     bench.press("q")
-    bench.see("Let it run on")
+    bench.see("Keep it running")
     bench.press("l")
     # Whoever comes back finds all of it.
     kinds = [one.kind for one in state_of(run).decisions]

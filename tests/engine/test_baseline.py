@@ -198,7 +198,10 @@ def test_a_search_judges_by_the_rate_of_the_runs_that_chose_nothing(tmp_path):
     assert (state.nodes[0].shown, len(state.nodes[0].runs)) == (sum(shown), len(shown))
     said = baseline(state)
     assert f" in {sum(shown)} of 10 runs" in said
-    assert "The first 10 runs only chose f, and showed other failures: 2. stuck at (2.00, 0.00) in 3 runs" in said
+    assert (
+        "The first 10 runs served only to choose f, and showed other failures: 2. stuck at (2.00, 0.00) in 3 runs"
+        in said
+    )
 
 
 def test_the_papers_baseline_never_goes_on(tmp_path):

@@ -73,7 +73,7 @@ def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_t
     lines, kinds = lines_and_kinds(path)
     first, last = (number for number, kind in enumerate(kinds) if kind == "disk_space")
     assert "test_started" not in kinds[first:last] and "test_started" in kinds[:first]
-    assert "no room on the disk: waits until 32 MB are free" in lines and "there is room on the disk again" in lines
+    assert "out of disk space: waiting until 32 MB are free" in lines and "there is disk space again" in lines
 
 
 def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path, monkeypatch, capsys, undisturbed):

@@ -146,7 +146,7 @@ def test_the_command_offers_to_go_on_or_to_make_all_tests_again(home):
     assert "give one of them" in ddenv("resume", run, "--mixed", "--again").stderr
     mixed = ddenv("resume", run, "--mixed")
     assert mixed.returncode == 1, mixed.stderr
-    assert "other bits: from here on the tests are mixed" in mixed.stdout
+    assert "different bits: from here on the tests are mixed" in mixed.stdout
     again = ddenv("resume", run, "--again")
     assert "wall-2.ddenv" in again.stderr and again.returncode == 1
     state = state_of(home / "runs" / "wall-2.ddenv")

@@ -118,7 +118,7 @@ def test_it_shows_that_it_takes_long(tmp_path, world, monkeypatch):
         before, state = state, fold([event], state)
         said.append(news(event.kind, before, state))
         assert state.settling == (event.kind == "supports_started")
-    first = said.index("finding which models rest on which")
+    first = said.index("finding models that support others")
     assert said[first + 1] == "2 models of the world rest on others"
 
 

@@ -52,21 +52,21 @@ def test_a_slice_is_told_with_the_chance_that_a_fresh_run_meets_what_went(moment
     gone = len(before.environment) - len(after.environment)
     line = news("sliced", before, after)
     assert line.startswith(
-        f"  reduced to {len(after.environment)} models without a test: {gone} models took part in none of 3 runs"
+        f"  reduced to {len(after.environment)} models: {gone} models cannot have affected any of the 3 runs"
     )
-    assert "the chance that a fresh run meets a model that no run met is " in line
+    assert "the chance that a fresh run meets a model not met before is " in line
     assert slice_in_short(after, after.here).startswith(f"none of 3 runs met the other {gone}; a fresh run meets one: ")
 
 
 def test_the_workbench_teaches_what_is_implied(moments):
     _, _, sliced = first(moments, "sliced")
     said = " ".join(explain(Snapshot(sliced, (), "alive")).sentences)
-    assert "What took no part in a run can go without changing a bit of it" in said
+    assert "Removing models that cannot have affected a run changes no bit of it" in said
     assert "u takes it back" in said
     recorded, _, implied = first(moments, "implied")
     said = " ".join(explain(Snapshot(implied, (), "alive")).sentences)
     assert (
-        f"Test {recorded.event.test} is implied by test {recorded.event.by}: nothing that it lacks took part there."
+        f"Test {recorded.event.test} is implied by test {recorded.event.by}: no model it lacks affected that run."
         in said
     )
 

@@ -84,7 +84,7 @@ def test_a_test_that_tells_nothing_costs_nothing():
     with pytest.raises(UserError, match="test 1 was the same"):
         attempt.test(["sign", "crate", "barrel", "cone"])
     assert attempt.test(["pallet"]) == "other" and len(attempt.held) == 8
-    with pytest.raises(UserError, match="no test is left"):
+    with pytest.raises(UserError, match="no tests are left"):
         attempt.test(["sign"])
     with pytest.raises(UserError, match="all models are there"):
         attempt.back()

@@ -75,7 +75,7 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
         assert figures("here_left") == f"{sum(ran[state.node, run] for run in mine)} of {len(mine)} runs"
         assert figures("here_bound") == percent(shown) and before < shown < 2 / 3
         before = shown
-    with pytest.raises(UserError, match="no fresh run has left 'gate' out"):
+    with pytest.raises(UserError, match="no fresh run has yet left 'gate' out"):
         figures("here_bound without gate")
     ended = Figures(position.end, position.state(places.event("claims 3")))
     assert (ended("here_aim"), ended("here_bound")) == ("80 %", "80 %")

@@ -66,7 +66,7 @@ def of_winner(position, moment, found):
     for answer in found.question.answers[:-1]:
         one = labels[answer.text.partition(":")[0]]
         assert ("did not show f" in answer.why) == (one.verdict != "similar" and not untried(end, one)), answer
-        assert ("not tried any more" in answer.why) == untried(end, one), answer
+        assert ("no longer tried" in answer.why) == untried(end, one), answer
     assert len(round.candidates) == len(end.candidates)
 
 

@@ -81,14 +81,14 @@ def test_a_run_file_has_the_search_that_was_recorded():
 
 
 def test_only_runs_of_one_world_race(tmp_path):
-    with pytest.raises(UserError, match=f"{DITCH}: has another world than {DELIVERY}"):
+    with pytest.raises(UserError, match=f"{DITCH}: its world is not that of {DELIVERY}"):
         plays_of_runs([DELIVERY, DITCH])
     with pytest.raises(UserError, match="needs different runs"):
         plays_of_runs([DELIVERY, DELIVERY])
     shutil.copy(DELIVERY, new := tmp_path / "new.ddenv")
     with sqlite3.connect(new) as database:
         database.execute("DELETE FROM event WHERE id > 9")
-    with pytest.raises(UserError, match="has no tests of a search yet"):
+    with pytest.raises(UserError, match="has no search tests yet"):
         plays_of_runs([DELIVERY, new])
 
 
@@ -109,7 +109,7 @@ def test_the_winner_and_the_reason_come_from_the_tests():
     )
     assert result([plays["ddmin"], plays["ddmin"]]) == ("All needed 9 tests.",)
     half = Play("half", recorded.begins, recorded.turns[:3], ended=False)
-    assert result([half, recorded])[0].startswith("half did not come to an end")
+    assert result([half, recorded])[0].startswith("half did not finish")
     assert result([half, recorded])[-1] == "So there is no winner."
 
 

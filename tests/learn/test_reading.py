@@ -36,7 +36,7 @@ WRONG = [
     ("{models}", "{model}", 6, "unknown figure '{model}'"),
     ("{models}", "{__import__('os')}", 6, "unknown figure"),
     ("test 4", "test 999", 5, "steps[1].at: the run has no test 999; the last one is test"),
-    ("- at: test 4", "- at: test four", 5, "'test four' is no place in a run; expected start"),
+    ("- at: test 4", "- at: test four", 5, "'test four' is not a place in a run; expected start"),
     ("test 4", "round 1", 5, "to foretell the outcome it must be a test"),
     ("foretell: outcome", "foretell: all", 7, "use one of outcome, winner, parts"),
     ("right: true", "right: maybe", 12, "steps[2].answers[1].right: expected true or false"),
@@ -66,7 +66,7 @@ ALONE = (
 """
 )
 WRONG_ALONE = [
-    ("oracle: delivery.oracle.json\n", "", 19, "steps[3].try: needs to know how every part of the world ends"),
+    ("oracle: delivery.oracle.json\n", "", 19, "steps[3].try: needs the outcome of every part of the world"),
     ("budget: 12", "budget: 0", 20, "steps[3].try.budget: expected a number from 1 to 600, found '0'"),
     ("budget: 12", "tests: 12", 20, "steps[3].try.tests: unknown key; allowed are budget"),
     ("try:\n      budget: 12", "try: 12", 19, "steps[3].try: expected keys such as budget"),
@@ -78,7 +78,7 @@ WRONG_ALONE = [
     ),
     ("[ddmin, splitting]", "ddmin", 22, "steps[4].race: expected a list with at least one entry"),
     ("[ddmin, splitting]", "[ddmin]", 22, "steps[4].race: expected 2 to 4 algorithms or pairs, found 1"),
-    ("[ddmin, splitting]", "[ddmin, ddmin]", 22, "steps[4].race[2]: 'ddmin' stands twice"),
+    ("[ddmin, splitting]", "[ddmin, ddmin]", 22, "steps[4].race[2]: 'ddmin' appears twice"),
     (
         "[ddmin, splitting]",
         "[ddmin, spliting]",

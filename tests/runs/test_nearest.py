@@ -84,8 +84,8 @@ ENDS = {
         "; not shown that each of them has to go: undecided with crate_01 put back",
     ),
     "the worst": ((PASSES, *EACH_NEEDED), 1, True, "with any one of these 3 put back in at most 0 of 9 fresh runs"),
-    "no world": ((), None, False, "no world was found that passes: the robot does not reach its goal"),
-    "no world of all": ((), None, False, "all 11 models that may go"),
+    "no world": ((), None, False, "no passing world was found: the robot does not reach its goal"),
+    "no world of all": ((), None, False, "all 11 models that may be removed"),
 }
 
 

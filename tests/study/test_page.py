@@ -60,9 +60,7 @@ def test_several_seeds_are_told_as_median_and_range(study):
 def test_what_went_wrong_is_told_with_its_seed(study):
     page, text, rows, *_ = study
     assert "3 cells not certified: the tables say why." in page.text
-    doubt = (
-        "not shown that each model is needed: undecided without crate_07; with all that is left f in 5 of 5 fresh runs"
-    )
+    doubt = "not shown that each model is needed: undecided without crate_07; with everything that is left f in 5 of 5 fresh runs"
     for words in (
         "Not certified: model2model/sequential, seed 0: there is no failure to reduce.",
         f"Not certified: model2model/sequential, seed 100000: {doubt} (41 % to 100 %).",

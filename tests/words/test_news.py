@@ -66,8 +66,8 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
     state = states(*happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}})[-1]
     assert baseline(state) == (
         "Baseline: the robot got stuck in 1 of 3 runs (33 %, 95 % interval 10 % to 70 %); 2 more runs broke. "
-        "Other failures: 2. fell or lost at (3.00, 0.00) in 1 run (--failure reduces another one). "
-        "The chance that 4 runs of a candidate miss f is 20 % (at most 66 %); a 95 % chance to see f needs --iterations 7."
+        "Other failures: 2. fell or lost at (3.00, 0.00) in 1 run (--failure selects another one). "
+        "The chance that 4 runs of a candidate miss f is 20 % (at most 66 %); for a 95 % chance of seeing f, use --iterations 7."
     )
 
 

@@ -37,7 +37,7 @@ def test_a_starting_engine_is_not_called_dead(run):
 
 def test_it_is_said_that_the_piles_settle(run):
     run.created().write("supports_started")
-    assert told(run)[1].startswith("Finding which models rest on which")
+    assert told(run)[1].startswith("Finding models that support others")
     run.supports()
     assert "rests on" not in told(run)[1]
 
@@ -126,7 +126,7 @@ def test_a_round_without_f_is_line_15(run):
 def test_a_full_disk_comes_first(run):
     fake_moments.mid_round(run).write("disk_space", enough=False, needed=32_000_000, free=1)
     assert told(run)[1].startswith("The disk is full: no new test starts until 32 MB are free.")
-    assert facts(snapshot(run))["state"][0] == "! no room on the disk"
+    assert facts(snapshot(run))["state"][0] == "! out of disk space"
     run.write("disk_space", enough=True, needed=32_000_000, free=10**9)
     assert "disk" not in told(run)[1]
 
@@ -170,7 +170,7 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
     run.live((run.start(0, 2), 0.4))
     words = told(run)[1]
     assert "Run 3 of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in words
-    assert "It is taken once its runs show that it keeps the rate of f" in words
+    assert "It is accepted once its runs show that it keeps the rate of f" in words
 
 
 def test_a_certificate_comes_before_the_end(run):
@@ -178,7 +178,7 @@ def test_a_certificate_comes_before_the_end(run):
     assert line == 21
     assert "they have to show that what is left keeps 67 % of the whole world's rate" in words
     assert "So far f shows in 11 of 12 runs of what is left." in words
-    assert "Now run 5 of all that is left except crate_00." in words
+    assert "Now: run 5 of everything that is left except crate_00." in words
 
 
 def test_minimal_is_said_with_what_it_means(run):
@@ -210,7 +210,7 @@ def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
 
 def test_other_failures_in_the_baseline_are_named_and_counted(run):
     state = fold(run.created().baseline(others=2).file.events())
-    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs (--failure reduces another one)." in baseline(
+    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs (--failure selects another one)." in baseline(
         state
     )
 
@@ -221,10 +221,7 @@ def test_a_baseline_that_goes_on_says_why(run):
         run.test(None, "failed" if number == 1 else "pass", run=number, failure="stuck" if number == 1 else "")
     assert "The robot runs in the whole world 4 times" in told(run)[1]
     run.start(run=4)
-    assert (
-        "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."
-        in told(run)[1]
-    )
+    assert "Few runs of the whole world show f, or they show several failures, so more runs are made." in told(run)[1]
     assert "Of 4 runs so far 1 failed and 3 reached the goal." in told(run)[1]
 
 
@@ -254,7 +251,7 @@ def test_a_killed_engine_is_named_with_the_key_that_resumes(run):
 
 def test_the_chance_to_miss_f_names_the_cure(run):
     state = fold(run.created().baseline(failures=1).file.events())
-    words = "a 95 % chance to see f needs --iterations 2"
+    words = "for a 95 % chance of seeing f, use --iterations 2"
     assert words not in baseline(state)
     state.scenario["reduction"] = {"iterations": 1}
     assert words in baseline(state)

@@ -65,7 +65,7 @@ def leave_out(run, *groups, kept=None):
 BEGINNINGS = {
     "ddmin": "the 11 models of E are cut into parts of equal size, in the order of the world file",
     "probdd": "of the 11 models of E, the group with the greatest expected gain is left out",
-    "splitting": "the farthest undecided ones are left out; failure-proximal says what is far",
+    "splitting": "the farthest undecided ones are left out; failure-proximal defines how far",
     "theirs": "theirs chooses candidates from the 11 models of E",
 }
 
@@ -108,7 +108,7 @@ def test_ddmin_says_how_n_changes(run_by):
 
 
 FRUITLESS = {
-    ("probdd", 2): "each model that was left out is more likely to be needed",
+    ("probdd", 2): "each model left out is now more likely to be needed",
     ("splitting", 2): "at least one of the models left out is needed; of several, half are left out next",
 }
 

@@ -51,7 +51,7 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "there is nothing to accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
-        assert "without B is vetoed: it is not tried in any round; v again takes that back" in session.said()
+        assert "without B is vetoed: it will not be tried in any round; v again undoes that" in session.said()
         run.write("vetoed", candidate=3, verdict="vetoed")
         await session.look()
         await session.press("v")
@@ -61,7 +61,7 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "part A is dissimilar already" in said
         assert session.asked() == [("undo", {})]
         assert "part A is taken back. A new search begins from 11 models." in said
-        assert "It does not take these 6 again, in any branch, unless you allow it: v on their row" in said
+        assert "It will not reduce to these 6 again, in any branch, unless you allow it: v on their row" in said
         await session.press("u")
         assert session.asked() == []
         assert "the last undo is not done yet" in session.said()
@@ -99,7 +99,7 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
             await session.look()
             happening = session.text("#happening")
             assert "Pinned crate_04." in happening
-            assert "Nothing showed f" not in happening
+            assert "No candidate showed f in the last" not in happening
 
 
 async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
@@ -162,7 +162,7 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert "17 of about 40 to 450 runs" in str(session.screen.query_one("#round").border_subtitle)
         await session.press("p", "enter")
         assert isinstance(session.app.screen, Question)
-        assert "breaks off certificate 1 after 17 runs" in session.dialog()
+        assert "aborts certificate 1 after 17 runs" in session.dialog()
         await session.press("n", "v")
         assert session.asked() == []
         assert "the rounds are over" in session.said()
@@ -235,7 +235,7 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
     fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("r", "space", "s")
-        assert session.said().count("the run is finished; u, h, f, c, p, w and o go on from there") == 3
+        assert session.said().count("the run is finished; u, h, f, c, p, w and o continue from here") == 3
         await session.press("w", *"01", "enter")
         assert session.asked() == [("try", {"models": [0]})]
         assert len(started) == 1

@@ -65,7 +65,7 @@ async def test_the_history_follows_the_run_and_compares(run):
         await session.press("c")
         assert "mark one environment first" in session.said()
         await session.press("m", "c")
-        assert "this one is marked" in session.said()
+        assert "this is the marked one" in session.said()
         await session.press("up", "c")
         assert isinstance(session.app.screen, SideBySide)
         first, second = session.screen.snapshot.state.nodes[3], session.screen.snapshot.state.nodes[2]

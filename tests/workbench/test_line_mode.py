@@ -35,7 +35,7 @@ def test_it_begins_with_where_the_run_is_and_goes_on_with_what_happens(run):
     fake_moments.mid_round(run).hold()
     before = said(run)
     assert "running · round 2, n 3 · 6 of 11 models · 10 tests, 2 running" in before
-    assert "an engine is at work" in before
+    assert "an engine is running" in before
     events = iter([lambda: run.finish(11, "pass"), lambda: run.judge(1, "dissimilar", [10, 11])])
     now = said(run, "", "", between=lambda: next(events, lambda: None)())
     assert now.endswith("  without A (4 models): dissimilar after 2 tests (2 pass)\n")

@@ -38,7 +38,7 @@ async def test_a_branch_reduces_another_failure(run):
         await session.press("enter")
         assert isinstance(session.app.screen, Question)
         words = " ".join(session.dialog().split())
-        assert "Reduce this failure in place of f? The run branches" in words
+        assert "Reduce this failure instead of f? The run branches" in words
         await session.press("n")
         assert session.asked() == []
         await session.press("f", "enter", "y")

@@ -43,7 +43,7 @@ def test_everything_is_said_where_there_is_room(run):
 
 def test_it_is_said_that_the_piles_settle(run):
     run.created().write("supports_started")
-    assert said(snapshot(run))["state"] == "▶ finding which models rest on which"
+    assert said(snapshot(run))["state"] == "▶ finding models that support others"
 
 
 @pytest.mark.parametrize("width", [200, 120, 100, 80])

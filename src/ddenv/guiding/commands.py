@@ -56,12 +56,12 @@ def question(command: Command, state: RunState) -> str:
     if now is not None and _begins_anew(command, state):
         made = count(fresh_runs_made(state, now), "run")
         lost = (
-            f"This breaks off certificate {now.number} after {made}, which then count for nothing. "
-            "A new search begins, and another certificate ends it."
+            f"This aborts certificate {now.number} after {made}, which then no longer count. "
+            "A new search begins and ends with another certificate."
         )
     if not lost:
         return own
-    return f"{own}\n\n{lost}" if own else f"{lost}\n\n{command.words(state).brief.capitalize()} all the same?"
+    return f"{own}\n\n{lost}" if own else f"{lost}\n\n{command.words(state).brief.capitalize()} anyway?"
 
 
 def said(command: Command, now: Situation) -> str:

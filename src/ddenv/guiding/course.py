@@ -101,7 +101,7 @@ class Isolate(Asked):
         if state.status != "finished" and state.isolating is None:
             return "its search is not over; let it end first"
         if now.engine != "absent":
-            return "an engine is at work on the run; let it end first"
+            return "an engine is working on the run; let it end first"
         known = state.isolated is not None and state.isolating is None and not self.again
         return (
             "a nearest world that passes is known: W shows it; 'ddenv isolate RUN --again' searches again"
@@ -125,7 +125,7 @@ class Undo(Asked):
             return Words("undo")
         after = len(state.nodes[here.parent].environment)
         said = f"{here.what} is taken back. {new_search(state, after)}"
-        again = f"It does not take these {len(here.environment)} again, in any branch, unless you allow it"
+        again = f"It will not reduce to these {len(here.environment)} again, in any branch, unless you allow it"
         return Words("undo", f"{said}. {again}: v on their row, or h and enter on #{here.number}")
 
 
@@ -146,7 +146,7 @@ class GoBack(Asked):
         there = place(state.nodes[self.node])
         question = (
             f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o); then press space to go on. "
-            "What was found since then stays in the history, and you can come back to it. No test is made twice."
+            "Later results stay in the history, and you can come back to them. No test is repeated."
         )
         return Words("go back", f"back to {there}; the run pauses there, and space begins a new search", question)
 

@@ -13,7 +13,7 @@ from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.text import count, printable, shortened
 
-NONE_HELPS = "there is no model that only helps, by a certificate"
+NONE_HELPS = "no certificate shows a model that only helps"
 
 
 class OfCandidate(Asked):
@@ -74,7 +74,7 @@ class Veto(OfCandidate):
         return f"{one.label} is {one.verdict} already" if one.verdict else ""
 
     def words(self, state: RunState) -> Words:
-        return Words("veto", f"{self.label(state)} is vetoed: it is not tried in any round; v again takes that back")
+        return Words("veto", f"{self.label(state)} is vetoed: it will not be tried in any round; v again undoes that")
 
 
 class Unveto(OfCandidate):
@@ -87,7 +87,7 @@ class Unveto(OfCandidate):
         return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
 
     def words(self, state: RunState) -> Words:
-        return Words("allow it again", f"{self.label(state)} is allowed again: it is tried after all")
+        return Words("allow it again", f"{self.label(state)} is allowed again and will be tried after all")
 
 
 def round_over(state: RunState) -> str:
@@ -276,8 +276,8 @@ def _question(state: RunState, test: Test, instead: bool) -> str:
     near = test.distance is not None and math.isfinite(test.distance)
     apart = f", {test.distance:.2f} m from f's end" if near else ""
     branch = (
-        "Reduce this failure in place of f? The run branches: these models become the environment, and only this failure counts as "
-        "f in the branch. Going back in the history (h) restores f, and all that was found for it."
+        "Reduce this failure instead of f? The run branches: these models become the environment, and only this failure counts as "
+        "f in the branch. Going back in the history (h) restores f and everything found for it."
     )
     too = "Count this failure as f, too? Then these models become the environment. u takes it back."
     return (

@@ -16,7 +16,7 @@ Row = Candidate | Trial
 # Maximum number of models that a line names, and maximum width of each name in cells.
 NAMED, LONGEST = 2, 32
 
-FINISHED = "the run is finished; u, h, f, c, p, w and o go on from there"
+FINISHED = "the run is finished; u, h, f, c, p, w and o continue from here"
 NO_FAILURE = "f is not known yet: the baseline comes first"
 NO_MODELS = "no such models"
 

@@ -79,7 +79,7 @@ def read_oracle(path: Path) -> Oracle:
         rates = {frozenset(key.split()): float(value) for key, value in data.get("rates", {}).items()}
         rounds = {str(name): tuple(map(_round, each)) for name, each in data.get("plays", {}).items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise UserError(f"{path}: is not an oracle; expected models, outcomes and otherwise") from None
+        raise UserError(f"{path}: not an oracle; expected models, outcomes and otherwise") from None
     if len(models) > MOST_MODELS or len(set(models)) != len(models):
         raise UserError(f"{path}: models: expected up to {MOST_MODELS} different names")
     if not {*outcomes.values(), otherwise}.issubset(OUTCOMES) or otherwise == "similar":
@@ -87,7 +87,7 @@ def read_oracle(path: Path) -> Oracle:
     if not all(0 <= rate <= 1 for rate in rates.values()):
         raise UserError(f"{path}: rates: expected numbers from 0 to 1")
     if not frozenset().union(*outcomes, *rates).issubset(models):
-        raise UserError(f"{path}: outcomes: a set has a model that is not among the models")
+        raise UserError(f"{path}: outcomes: a set names a model that is not listed")
     return Oracle(models, outcomes, otherwise, rates, rounds)
 
 
@@ -152,7 +152,7 @@ class Attempt:
             if there == frozenset(earlier.kept):
                 raise UserError(f"test {number} was the same")
         if self.tests_left <= 0:
-            raise UserError("no test is left: m says that you are done")
+            raise UserError("no tests are left: press m for the verdict")
         names = tuple(name for name in self.held if name in there)
         outcome = self.oracle.outcome(names)
         self.tried.append(Tried(names, tuple(name for name in self.held if name not in there), outcome))

@@ -19,7 +19,7 @@ from ddenv.text import count
 
 SAID = {
     "similar": "f again: it fails as in the whole world",
-    "other": "another failure: elsewhere, or otherwise",
+    "other": "another failure: elsewhere, or of another kind",
     "pass": "the goal is reached",
 }
 # Candidates of a round to choose from, and models of a candidate that are named there.
@@ -142,7 +142,7 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
     why = "No candidate showed f." if round.winner is None else f"{_name(round.candidates[round.winner])} showed f."
     answers.append(Answer("none of them", none, why, "" if none else "stuck"))
     order = (
-        "tested in this order" if shown == listed else f"of which {len(shown)} stand here in the order of their tests"
+        "tested in this order" if shown == listed else f"of which {len(shown)} are listed, in the order of their tests"
     )
     question = Question(
         f"Round {round.number}: {count(len(listed), 'candidate')}, {order}. Which is the first to show f?",
@@ -162,7 +162,7 @@ def _candidate_answer(one: Candidate, round: Round) -> Answer:
     if round.winner == one.index:
         return Answer(words, True, f"{_name(one)} showed f, so it becomes E.")
     if round.winner is not None and one.index > round.winner:
-        return Answer(words, False, "It was not tried any more: the first candidate that shows f wins.")
+        return Answer(words, False, "It was no longer tried: the first candidate that shows f wins.")
     belief = "alone" if one.kind == "partition" else "part"
     return Answer(words, False, f"{_name(one)} did not show f: something that f needs is missing in it.", belief)
 
@@ -234,7 +234,7 @@ def _goes(candidate: Candidate, options: Settings) -> str:
     """What f without some models says of these."""
     gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
     if options.accept_rate == "kept":
-        return f"f can show without {gone}. Whether it shows often enough, more runs will say."
+        return f"f can show without {gone}. More runs will tell whether it shows often enough."
     if options.most_runs > 1:
         return f"f showed without {gone}. Here the first run with f decides, so they go."
     return f"f shows without {gone}: they can go."

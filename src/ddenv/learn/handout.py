@@ -23,7 +23,7 @@ def handout(opened: Opened) -> Report:
         Section("What you saw", tuple(_texts(opened))),
         Section("Models left after each test", (steps, say("What is left: ", opened.text("{kept}", end), "."))),
         Section("Questions and answers", tuple(_questions(opened))),
-        Section("What is often mixed up", (Table(("belief", "what is right"), beliefs),)),
+        Section("Common misconceptions", (Table(("belief", "what is right"), beliefs),)),
     )
     figures = tuple((opened.text(f"{{{name}}}", end), words) for name, words in FIGURES)
     return Report("ddenv lesson", lesson.title, lead, figures, sections, "Made by ddenv learn.")

@@ -16,8 +16,8 @@ from ddenv.learn.shelf import Opened
 from ddenv.runfile.position import Position, Step
 
 FREE = (
-    "Step through the run: forward, back, to the next decision, to the next reduction. The marked line of the algorithm acts; "
-    "the variables have the values of this moment. Press `p` to predict what comes next."
+    "Step through the run: forward, back, to the next decision or reduction. The marked line of the algorithm is at work; "
+    "the variables show their values at this moment. Press `p` to predict what comes next."
 )
 # Without f, which is the failure, and h, the key of the hint.
 LETTERS = "abcdegi"
@@ -126,7 +126,7 @@ class Course:
             return " ".join(result(self._opened.racers(here)))
         attempt = self.attempt
         if attempt is None or not attempt.ended:
-            return "Your search is not finished: `t` goes on with it."
+            return "Your search is not finished: `t` continues it."
         return f"**{attempt.verdict}**\n\n{in_one_sentence(attempt.oracle, self.plays, attempt)}"
 
     @property

@@ -69,7 +69,7 @@ def _fresh_whole(state: RunState) -> str:
 def _now(state: RunState) -> Certificate:
     """The certificate that is made, or was made last. Raises UserError before the first."""
     if state.certificate is None:
-        raise UserError("no certificate has begun at the place of the step")
+        raise UserError("no certificate has begun at this step")
     return state.certificate
 
 
@@ -77,7 +77,7 @@ def _bound(state: RunState, without: str | None = None) -> str:
     """What it has shown by now of what is left, or of that without a model. Raises UserError if it has not left that out."""
     claim = so_far(state, _now(state)).get(without)
     if claim is None:
-        raise UserError(f"at the place of the step no fresh run has left '{without}' out")
+        raise UserError(f"at this step, no fresh run has yet left '{without}' out")
     return percent(claim.bound or 0.0)
 
 
@@ -109,7 +109,7 @@ def _sliced(state: RunState) -> int:
 
 def _slice(state: RunState) -> str:
     node = _first_slice(state)
-    return "nothing was left out without a test" if node is None else slice_words(state, node)
+    return "nothing was removed without testing" if node is None else slice_words(state, node)
 
 
 # Over the whole run, from its end.
@@ -189,7 +189,7 @@ def check(text: str) -> None:
         other, bare = _parts(name)
         about = _ABOUT_CLAIM.fullmatch(bare) or _OF_SET.fullmatch(name)
         if bare not in (OF_RUN if other else names()) and not about:
-            meant = nearest(name, names()) or f"; known are {', '.join(names())}"
+            meant = nearest(name, names()) or f"; known figures are {', '.join(names())}"
             raise UserError(f"unknown figure '{{{name}}}'{meant}")
     bare = _FIGURE.sub("", text)
     for term in TERMS:

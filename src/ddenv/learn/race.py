@@ -24,7 +24,7 @@ from ddenv.text import count, first_of
 # The least and the most searches of a race, and how many searches a sentence names.
 RACERS = (2, 4)
 NAMED = 5
-BOUND = "The last line: how many answers of yes or no it takes to single out such a set if nothing is known beforehand."
+BOUND = "The last line: how many yes-or-no answers it takes to single out such a set without prior knowledge."
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
     environment, turns = oracle.models, list[Turn]()
     for number, round in enumerate(oracle.rounds[name], 1):
         if sorted(model for part in round.parts for model in part) != sorted(environment) or not round.tested:
-            raise UserError(f"plays: {name}: round {number}: its parts are not what was left")
+            raise UserError(f"plays: {name}: round {number}: its parts do not make up the models that were left")
         split = Split(environment, round.parts)
         candidates = {one.label: one for one in _candidates(split)}
         for label in round.tested:
@@ -107,7 +107,7 @@ def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
         with RunFile(run) as file:
             play, here = _play_of_run(run, file.events()), file.document("world")
         if world is not None and (here, set(play.begins)) != world:
-            raise UserError(f"{run}: has another world than {runs[0]}; a race needs runs of one world")
+            raise UserError(f"{run}: its world is not that of {runs[0]}; a race needs runs of one world")
         world = world or (here, set(play.begins))
         found.append(play)
     names = [play.name for play in found]
@@ -132,7 +132,7 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
         elif turns and state.environment is not turns[-1].left:
             turns[-1] = replace(turns[-1], left=state.environment)
     if not turns:
-        raise UserError(f"{run}: has no tests of a search yet")
+        raise UserError(f"{run}: has no search tests yet")
     # While fresh runs certify its end, no test of the search is left.
     ended = state.status == "finished" or state.confirming
     return Play(run.stem, state.elements, tuple(turns), ended, _method(state))
@@ -213,7 +213,7 @@ def result(plays: Sequence[Play]) -> tuple[str, ...]:
     """Who won and why, in sentences; a search that did not end cannot win."""
     ended = sorted((play for play in plays if play.ended), key=lambda play: play.tests)
     open_ones = [play.name for play in plays if not play.ended]
-    said = [f"{_and(open_ones)} did not come to an end, so the number of tests says nothing."] if open_ones else []
+    said = [f"{_and(open_ones)} did not finish, so the number of tests says nothing."] if open_ones else []
     if len(ended) < 2:
         return (*said, "So there is no winner.")
     first, last = ended[0], ended[-1]
@@ -255,7 +255,7 @@ def bet(plays: Sequence[Play]) -> Question:
     return Question(
         "Which of them needs the fewest tests?",
         tuple(answers),
-        "What does each know of the world before its first test?",
+        "What does each know about the world before its first test?",
     )
 
 
@@ -299,7 +299,7 @@ def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> 
         luck = f"{found}, fewer than {least}: luck or a look at the map helped you."
         return f"{luck} The algorithms: {others}." if others else luck
     if not done:
-        return f"{found}; who knows nothing in advance needs at least {least}."
+        return f"{found}; without prior knowledge it takes at least {least}."
     quicker = [play.name for play in done if play.tests < len(attempt.tried)]
     if not quicker:
         return f"{found}, and no algorithm needed fewer: {others}."

@@ -113,7 +113,7 @@ class _Node:
                 mine = _Node(self.file, key, path[:80])
                 raise mine.wrong(f"unknown key{nearest(name, known)}; allowed are {', '.join(known)}")
             if name in found:
-                raise _Node(self.file, key, path).wrong("stands twice")
+                raise _Node(self.file, key, path).wrong("appears twice")
             found[name] = one
         for key in needed:
             if key not in found:
@@ -177,7 +177,7 @@ def _step(node: _Node, find: Find, has_oracle: bool) -> Step:
         raise keys[does[1]].wrong(f"a step has one of {', '.join(_DOES)}, found {' and '.join(does)}")
     for key in ("try", "race"):
         if key in keys and not has_oracle:
-            raise keys[key].wrong("needs to know how every part of the world ends; give the lesson the key 'oracle'")
+            raise keys[key].wrong("needs the outcome of every part of the world; give the lesson the key 'oracle'")
     for key in ("answers", "hint"):
         if key in keys and "ask" not in keys:
             raise keys[key].wrong("belongs to a question; the key 'ask' is missing")
@@ -208,7 +208,7 @@ def _racers(node: _Node) -> tuple[str, ...]:
     for each in entries:
         found.append(each.one_of((*names("algorithm"), *pairs())))
         if found[-1] in found[:-1]:
-            raise each.wrong(f"{found[-1]!r} stands twice")
+            raise each.wrong(f"{found[-1]!r} appears twice")
     return tuple(found)
 
 
@@ -278,7 +278,7 @@ class Places:
         """The event that `words` name. Raises UserError."""
         found = _WORDS.fullmatch(words.strip())
         if found is None:
-            raise UserError(f"'{words[:40]}' is no place in a run; {EXPECTED}")
+            raise UserError(f"'{words[:40]}' is not a place in a run; {EXPECTED}")
         key = (found[1], 0) if found[1] else (found[2], int(found[3]))
         if key not in self._found:
             most = self._most(key[0])

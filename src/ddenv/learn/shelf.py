@@ -121,7 +121,7 @@ def _plays(lesson: Lesson, oracle: Oracle) -> dict[str, Play]:
             if name not in oracle.rounds:
                 raise UserError(
                     f"{lesson.file}:{step.line}: race: {name!r} is not recorded yet; "
-                    f"'python -m docs.lessons.record_plays {lesson.file}' does it, in a checkout of ddenv-workbench"
+                    f"'python -m docs.lessons.record_plays {lesson.file}' records it, in a checkout of ddenv-workbench"
                 )
     try:
         return {name: recorded_play(name, oracle) for name in oracle.rounds}

@@ -35,8 +35,8 @@ def main() -> int:
     parent = os.getppid()
     parser = _Parser(prog="python -m ddenv.scene", description="Serves the 3-D scene of a run on this machine.")
     parser.add_argument("run", type=Path, metavar="RUN", help="a run file")
-    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 takes a free one from 7000 up")
-    parser.add_argument("--pointed", action="store_true", help="read from standard input what to show")
+    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 picks a free one from 7000 upwards")
+    parser.add_argument("--pointed", action="store_true", help="read what to show from standard input")
     try:
         arguments = parser.parse_args()
         with RunFile(arguments.run) as run:

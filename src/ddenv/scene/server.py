@@ -178,7 +178,7 @@ class _Stranger(tornado.web.RequestHandler):
 
     def prepare(self) -> None:
         self.set_status(403)
-        self.finish("the address of this scene has a token; take all of it from ddenv\n")
+        self.finish("the address of this scene has a token; copy all of it from ddenv\n")
 
 
 class _Feed(tornado.websocket.WebSocketHandler):

@@ -20,7 +20,7 @@ def baseline(state: RunState) -> str:
     broke = f"; {count(found.broken, 'more run')} broke" if found.broken else ""
     said = [f"Baseline: the robot {failed_in(state, found)} in {how_often(found)}{broke}."]
     if also := other_failures(found):
-        said.append(as_sentence(f"{also} (--failure reduces another one)"))
+        said.append(as_sentence(f"{also} (--failure selects another one)"))
     if found.rate < 1.0:
         said.append(as_sentence(missed(state)))
     return " ".join(said)
@@ -40,7 +40,7 @@ def failed_in(state: RunState, found: BaselineFinished) -> str:
 def other_failures(found: BaselineFinished) -> str:
     """The failures besides f of the runs that chose f, with their numbers; "" if there is none."""
     listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
-    chose = f"the first {count(found.chose, 'run')} only chose f, and showed " if found.chose else ""
+    chose = f"the first {count(found.chose, 'run')} served only to choose f, and showed " if found.chose else ""
     return f"{chose}other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
 
 
@@ -50,9 +50,9 @@ def missed(state: RunState) -> str:
     if base is None:
         return ""
     if asked.accept_rate == "exact":
-        return f"each candidate runs with the seeds of {count(min(asked.exact_seeds, base.failures), 'failing run')} of these"
+        return f"each candidate runs with the seeds of {min(asked.exact_seeds, base.failures)} of these failing runs"
     middle, most = (percent(miss_chance(rate, asked.iterations)) for rate in (base.rate, base.low))
     chance = middle if middle == most else f"{middle} (at most {most})"
     rare = base.iterations_95 > asked.iterations
-    enough = f"; a 95 % chance to see f needs --iterations {base.iterations_95}" if rare else ""
+    enough = f"; for a 95 % chance of seeing f, use --iterations {base.iterations_95}" if rare else ""
     return f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is {chance}{enough}"

@@ -19,13 +19,13 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
     if state.isolating is not None:
         now = plain(isolating(state))
         return (
-            "Isolation: as few models as can be are removed from the whole world so that the robot reaches its goal.",
-            f"Now {now}. The result of the reduction stays as it is.",
+            "Isolation: removing as few models as possible from the whole world so that the robot reaches its goal.",
+            f"Now {now}. The result of the reduction does not change.",
         )
     if state.margining is not None:
         return (
-            "Margins: one number after the other is changed, to see how far it may go before f no longer shows.",
-            f"Now {plain(finding(state))}. The result of the reduction stays as it is.",
+            "Margins: each number is changed in turn, to see how far it can go before f disappears.",
+            f"Now {plain(finding(state))}. The result of the reduction does not change.",
         )
     certificate = state.certificate
     if certificate is None:
@@ -36,7 +36,7 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
     return (
         *(() if certificate.seeds else (_bar(state, certificate),)),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
-        f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
+        f"By the runs so far, this takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} done.",
         *_so_far(state),
         *_now(snapshot, certificate),
     )
@@ -66,18 +66,18 @@ def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
     running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
     if not running:
         return ()
-    return (f"Now run {running[0].run - certificate.first_run + 1} of {_what(running[0], certificate)}.",)
+    return (f"Now: run {running[0].run - certificate.first_run + 1} of {_what(running[0], certificate)}.",)
 
 
 def _what(test: Test, certificate: Certificate) -> str:
     if test.without is not None:
-        return f"all that is left except {plain(test.without)}"
+        return f"everything that is left except {plain(test.without)}"
     if test.node == certificate.node:
-        return "all that is left"
+        return "everything that is left"
     return environment_named(test.node)
 
 
 def _after(certificate: Certificate) -> str:
     if certificate.claims[0].verdict == "lost":
-        return "What is left keeps too little of the rate. Earlier environments run, to find the last one not shown to lose it."
+        return "What is left keeps too little of the rate. Earlier ones are run to find the last one not shown to have lost it."
     return "The certificate is finished."

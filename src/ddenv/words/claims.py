@@ -49,7 +49,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     ):
         names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
         if names:
-            return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
+            return f"{start} {first_of(names, MOST_NAMES)}; with everything that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
     if certificate.seeds:
         return f"{_exactly(certificate)}; with other seeds {rate(left)}{but}"
@@ -166,15 +166,15 @@ def for_everyone(certificate: Certificate) -> str:
     """What a finished certificate shows, for readers who know no statistics; one sentence without a full stop."""
     left, *removals = certificate.claims
     share = f"{percent(left.low)} to {percent(left.high)} of all runs, with 95 % confidence"
-    said = f"It failed so in {left.shown} of {count(left.runs, 'new run')} with nothing else there ({share})"
+    said = f"It failed like this in {left.shown} of {count(left.runs, 'new run')} with nothing else there ({share})"
     if not is_minimal(certificate):
-        return f"{said}, but not every part of this result is shown to hold"
+        return f"{said}, but not every part of this result has been shown"
     if not removals:
         return said
     most = max(removals, key=lambda claim: claim.high)
     one = "it" if len(removals) == 1 else "any one of them"
     if certificate.seeds:
-        return f"{said}; of the runs that were chosen, none of {most.runs} failed so without {one}"
+        return f"{said}; none of the {most.runs} chosen runs failed like this without {one}"
     seldom = f"at most {most.shown}" if most.shown else "none"
     return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
 
@@ -191,7 +191,7 @@ def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Clai
     verdicts = {
         True: f"fails in {name}, too",
         False: f"does not fail in {name} as it did",
-        None: f"the runs do not say whether it fails in {name} as it did",
+        None: f"the runs do not show whether it fails in {name} as it did",
     }
     return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
 
@@ -221,22 +221,22 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
         "needed": f"needed: without it f shows {often}",
         "helps": "helps: without it f is rarer, but not by much",
         "not needed": "not needed: f shows about as often without it",
-        "not shown": "not shown: the runs do not decide",
+        "not shown": "not shown: the runs are inconclusive",
         "unknown": "unknown: too many runs broke",
     }.get(claim.verdict, "")
 
 
 def _whole_rate(certificate: Certificate) -> str:
     """The rate that what is left has to keep a part of."""
-    return "the rate where its branch begins" if certificate.branch else "the whole world's rate"
+    return "the rate at the start of its branch" if certificate.branch else "the whole world's rate"
 
 
 def of_passing(state: RunState, one: Isolation) -> str:
     """What an isolation that has ended shows, in one sentence without a full stop."""
     if not one.checks:
         return (
-            "no world was found that passes: the robot does not reach its goal often enough even without all "
-            f"{count(len(_may_go(state, one)), 'model')} that may go"
+            "no passing world was found: the robot does not reach its goal often enough even without all "
+            f"{count(len(_may_go(state, one)), 'model')} that may be removed"
         )
     check = one.checks[-1]
     gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
@@ -284,7 +284,7 @@ def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence
     )
     if smaller:
         return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
-    return f"{known}. No smaller set shows f, either; only a look at all sets can tell"
+    return f"{known}. No smaller set shows f either; only checking all sets can tell"
 
 
 def usual_runs(state: RunState, now: Certificate) -> str:
@@ -314,7 +314,7 @@ def short(claim: Claim) -> str:
 def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
     if certificate.seeds:
-        return f"they say how often what is left shows f with other seeds than {seeds_of(certificate)}"
+        return f"they measure how often what is left shows f with seeds other than {seeds_of(certificate)}"
     aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
     return f"they have to show that what is left keeps {aim}, and that f is rarer without {_any_one(pinned)}"
 
@@ -323,8 +323,8 @@ def promise(state: RunState, certificate: Certificate) -> str:
     """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
     if certificate.seeds:
         return (
-            "minimal means: for the chosen seeds this is exact, since a run repeats for its seed; for others fresh runs say how "
-            "often f shows, and nothing more"
+            "minimal means: for the chosen seeds this is exact, since a seed repeats its run exactly; for other seeds, fresh "
+            "runs measure how often f shows, and nothing more"
         )
     kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
     most = _at_most(certificate)

@@ -21,8 +21,8 @@ CAME_BY = {
     "accepted": ("another failure, accepted by hand", "another failure, accepted as f, too"),
     "instead": ("a branch to its failure", "a branch: the failure of this test is f here"),
     "certified": ("by a certificate", "reduced by a certificate: fresh runs show f as often"),
-    "left_out": ("left out by hand", "left out by hand: by the certificate it only helped"),
-    "sliced": ("without a test", "reduced without a test to what took part"),
+    "left_out": ("left out by hand", "left out by hand: it only helped (certificate)"),
+    "sliced": ("without a test", "reduced to the models that affected runs"),
 }
 # Decisions that change the environment or the search.
 _CHANGES = ("go_back", "undo", "pin", "unpin", "change", "adopt", "leave_out", "accept_other")
@@ -61,7 +61,7 @@ def _under_way(state: RunState, trial: Trial) -> str:
     running = [test.outcome == "running" for test in state.tests_of(trial.tests)]
     what = f"{trial.label} ({count(trial.size, 'model')})"
     if not any(running):
-        return f"{what} is the next test, before the round goes on."
+        return f"{what} is tested next, before the round goes on."
     number = running.index(True)
     again = f"re-run {number} of {settings(state).most_runs - 1}" if number else "first run"
     return f"{what} is being tested: {again}."
@@ -104,5 +104,5 @@ def older_engine(snapshot: Snapshot) -> tuple[str, ...]:
     if not version or snapshot.engine != "alive":
         return ()
     return (
-        f"Another version of ddenv works on this run ({plain(version)}): it may not know every command of this one.",
+        f"Another version of ddenv works on this run ({plain(version)}): it may not know all commands of this version.",
     )

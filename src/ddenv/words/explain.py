@@ -27,8 +27,8 @@ NAMED_ENDS = 2
 # An end within so many epsilon of f's end may be the same failure to the user.
 NEAR = 3
 _SETTLING = (
-    "Finding which models rest on which: the piles fall and settle once, without the robot. "
-    "Then it is known what a removal would drop.",
+    "Finding models that support others: the piles fall and settle once, without the robot. "
+    "This shows which models a removal would drop.",
 )
 
 
@@ -130,11 +130,11 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     reached = sum(test.outcome == "pass" for test in tests)
     failed = sum(test.outcome == "failed" for test in tests)
     first = (
-        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. The failure that "
-        "most of them end in is f: only worlds that show it are kept."
+        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. f is the "
+        "failure that most runs end in: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
-        first = "Few runs of the whole world show f, or they show several failures: the robot runs in it more often."
+        first = "Few runs of the whole world show f, or they show several failures, so more runs are made."
     # The last one first: that the world is slow.
     noted = tuple(as_sentence(plain(words)) for _, words in reversed(state.notes))
     if not tests:
@@ -169,7 +169,7 @@ def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
     if test is None or not metres(test.distance, 2):
         return "the robot failed as in f."
     did = deed(test.failure) if test.failure in DEEDS else "ended"
-    return f"the robot {did} {metres(test.distance, 2)} from f's end (similar is up to {options.epsilon:g} m)."
+    return f"the robot {did} {metres(test.distance, 2)} from f's end (up to {options.epsilon:g} m is similar)."
 
 
 def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening:
@@ -203,7 +203,7 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
 def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
     if shown := _shown_of(state, candidate):
         if options.accept_rate != "kept" and _last(state, candidate) == _last(state, candidate, "similar"):
-            return f"{place}: {shown}, and the first time decides."
+            return f"{place}: {shown}, and once is enough."
         return f"Next is one more run of {place}: {shown}."
     if not candidate.tests:
         return f"Next is {place}."
@@ -222,7 +222,8 @@ def _place(candidate: Candidate, current: Round) -> str:
 def _first_run(place: str, options: Settings) -> tuple[str, ...]:
     return (
         f"First run of {place}.",
-        f"It shows f if the goal is not reached in {options.timeout:g} s and it ends within {options.epsilon:g} m of f's end.",
+        f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within {options.epsilon:g} m of "
+        "f's end.",
     )
 
 
@@ -230,7 +231,7 @@ def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, option
     if shown := _shown_of(state, candidate):
         return (
             f"Run {_number(candidate, test) + 1} of {place}: {shown}.",
-            "It is taken once its runs show that it keeps the rate of f, and given up once that is unlikely.",
+            "It is accepted once its runs show that it keeps the rate of f, and dropped once that is unlikely.",
         )
     before = _last(state, candidate)
     return (
@@ -292,7 +293,7 @@ def _finished(state: RunState) -> Happening:
     if not state.certified:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else helping(found)
-        out = (f"{plain(helps[0])} only helps: press H to leave it out, and search on.",) if helps else ()
+        out = (f"{plain(helps[0])} only helps: press H to leave it out and search again.",) if helps else ()
         return "returned", (_reason(state, "The run ended early."), *out, *out_of_budget(state), left)
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
@@ -351,7 +352,7 @@ def implied(state: RunState) -> tuple[str, ...]:
     last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
-    return (f"Test {last.id} is implied by test {last.implied_by}: nothing that it lacks took part there.",)
+    return (f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",)
 
 
 def refuted(state: RunState) -> tuple[str, ...]:

@@ -27,8 +27,8 @@ FINDING = "finding margins"
 HEAD = ("number", "now", "f until", "goal from", "runs")
 # What a bar shows. It is drawn over the root of the change, so that small changes are seen.
 BAR_WORDS = (
-    "█ f, + goal, · something else or undecided, x not possible; between two values that were tried: like the one farther out. "
-    "From the middle to each end: the change as a share of the number's scale, drawn as its root; half way is 25 %."
+    "█ f, + goal, · something else or undecided, x not possible; between two values tried: as at the farther one. "
+    "From the middle outwards: the change as a share of the number's scale, on a square-root axis; half way is 25 %."
 )
 _SIGNS = {"f": "█", "goal": "+", "impossible": "x"}
 
@@ -75,12 +75,12 @@ def _said(side: Side) -> str:
     """What the values on one side show: only of these."""
     words = []
     if side.until is not None:
-        all_of_them = ", which is as far as was tried" if _all(side) else ""
+        all_of_them = ", the farthest value tried" if _all(side) else ""
         words.append(f"f {'up' if side.up else 'down'} to {_in(side.until, 'similar')}{all_of_them}")
     if side.gone is not None and side.gone.verdict == "impossible":
         words.append(f"{side.gone.value:.4g} is not possible: {side.gone.why}")
     elif side.gone is not None and side.gone.verdict == "other":
-        words.append(f"f not at {_in(side.gone, 'similar')}, {_instead(side.gone)} instead")
+        words.append(f"no f at {_in(side.gone, 'similar')}, {_instead(side.gone)} instead")
     if side.goal is not None:
         words.append(f"the robot reaches its goal {'from' if side.up else 'at'} {_in(side.goal, 'pass')}")
     if side.again is not None:
@@ -118,7 +118,7 @@ def nearest_fix(margins: Margins) -> str:
 def sureness(margins: Margins) -> str:
     less = "" if margins.asked.certified else " No certificate has shown yet how often f shows in what is left."
     return (
-        "Claims are about the values that were tried, not those between; the chance that any claim of a call is wrong is at most "
+        "Claims hold for the values tried, not for those in between; the chance that any claim of a call is wrong is at most "
         f"{percent(ERROR)}.{less}"
     )
 
@@ -193,4 +193,4 @@ def impossible(_: RunState, after: RunState) -> str:
 
 def started(_: RunState, after: RunState) -> str:
     assert after.margins is not None
-    return f"{finding(after)}; how far may each of {count(len(after.margins.wanted), 'number')} change before f goes?"
+    return f"{finding(after)}; how far can each of {count(len(after.margins.wanted), 'number')} change before f disappears?"

@@ -162,13 +162,13 @@ def beginning(options: Settings, models: int) -> str:
     names = chosen(options.algorithm, options.pair)
     match options.algorithm:
         case "ddenv":
-            return f"{kept} are split by {names['partitioning']}, then put in order by {names['prioritization']}."
+            return f"{kept} are split by {names['partitioning']}, then ordered by {names['prioritization']}."
         case "ddmin":
             return f"{kept} are cut into parts of equal size, in the order of the world file."
         case "probdd":
             return f"of {kept}, the group with the greatest expected gain is left out."
         case "splitting":
-            return f"of {kept}, the farthest undecided ones are left out; {names['prioritization']} says what is far."
+            return f"of {kept}, the farthest undecided ones are left out; {names['prioritization']} defines how far."
     return f"{plain(options.algorithm)} chooses candidates from {kept}."
 
 
@@ -177,7 +177,7 @@ def follows(options: Settings, last: Round) -> str:
     # The user may have changed something in the middle of the round, perhaps while a reduction waited.
     if last.winner is not None or any(one.verdict in ("", "similar") for one in last.candidates):
         return ""
-    reason = "Nothing showed f in the last round"
+    reason = "No candidate showed f in the last round"
     return f"{reason}, so {SMALLER[options.algorithm]}." if options.algorithm in SMALLER else f"{reason}."
 
 
@@ -196,6 +196,6 @@ def fruitless(options: Settings, current: Round, models: int) -> str:
 SMALLER = {
     "ddenv": "the next round splits E into smaller parts",
     "ddmin": "n doubles, and the parts get smaller",
-    "probdd": "each model that was left out is more likely to be needed",
+    "probdd": "each model left out is now more likely to be needed",
     "splitting": "at least one of the models left out is needed; of several, half are left out next",
 }

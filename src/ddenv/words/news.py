@@ -41,7 +41,7 @@ def headline(state: RunState, simulated: float | None = None) -> str:
     """The state in one line, cut to the terminal's width. The running test that is farthest has `simulated` so much time, s."""
     models = f"{len(state.environment)} of {len(state.elements)} models"
     running = state.tally["running"]
-    status = "waits for room on the disk" if state.needs_room and not state.ended else state.status
+    status = "waiting for disk space" if state.needs_room and not state.ended else state.status
     line = f"{status} · {_where(state)} · {models} · {state.tests_done} tests, {running} running"
     if running and simulated is not None:
         line += f", {simulated:.1f} s simulated"
@@ -92,24 +92,24 @@ def _engine_started(before: RunState, after: RunState) -> str:
 
 def _comparing(_: RunState, after: RunState) -> str:
     if after.physics.now == after.physics.proven:
-        return "a failing run is made again with its seed, to see whether it repeats"
-    return f"made with {after.physics.proven}, now {after.physics.now}: the first run is made again and compared"
+        return "a failing run is rerun with its seed, to see whether it repeats exactly"
+    return f"made with {after.physics.proven}, now {after.physics.now}: the first run is repeated and compared"
 
 
 def _compared(before: RunState, after: RunState) -> str:
     same = after.physics.mixed == before.physics.mixed
-    return f"  {'the same bits' if same else 'other bits: from here on the tests are mixed'}"
+    return f"  {'identical bits' if same else 'different bits: from here on the tests are mixed'}"
 
 
 def _disk_space(before: RunState, after: RunState) -> str:
     if after.needs_room:
-        return f"  no room on the disk: waits until {after.needs_room / 1e6:.0f} MB are free"
-    return "  there is room on the disk again" if before.needs_room else ""
+        return f"  out of disk space: waiting until {after.needs_room / 1e6:.0f} MB are free"
+    return "  there is disk space again" if before.needs_room else ""
 
 
 def _supports(_: RunState, after: RunState) -> str:
     if after.unsettled:
-        return f"it is not known which models rest on which: {after.unsettled}"
+        return f"it is unknown which models support others: {after.unsettled}"
     resting = len({upper for upper, _ in after.supports})
     return f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others" if resting else ""
 
@@ -158,7 +158,7 @@ def _certificate_started(_: RunState, after: RunState) -> str:
     last = after.certificates[-1]
     what = f"fresh runs of what is left ({_left(after)}), without each model, and of the whole world"
     if last.seeds:
-        what = f"the chosen seeds show what is left ({_left(after)}); fresh runs show how often f shows with others"
+        what = f"the chosen seeds check what is left ({_left(after)}); fresh runs measure how often others show f"
     return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
 
 
@@ -193,9 +193,7 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
     "trial_judged": lambda before, after: _judged(after, (one for one in after.trials if one not in before.trials)),
     "waiting": _waiting,
     "reduced": lambda _, after: f"  reduced to {_left(after)} after {after.tests_done} tests",
-    "sliced": lambda _, after: (
-        f"  reduced to {_left(after)} without a test: {slice_words(after, after.nodes[after.node])}"
-    ),
+    "sliced": lambda _, after: f"  reduced to {_left(after)}: {slice_words(after, after.nodes[after.node])}",
     "slices_refuted": lambda _, after: refuted_words(after),
     "certificate_started": _certificate_started,
     "certificate_finished": _certificate_finished,
@@ -204,12 +202,12 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
         f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
     ),
     "isolation_started": lambda *_: (
-        f"{ISOLATING}: as few models as can be removed from the whole world so that the robot reaches its goal"
+        f"{ISOLATING}: removing as few models as possible from the whole world so that the robot reaches its goal"
     ),
     "removal_judged": lambda before, after: _judged(after, after.removals.changed_since(before.removals)),
     "isolation_checked": lambda _, after: _passes(after.isolations[-1].checks[-1].claims[0]),
     "isolation_given_up": lambda *_: (
-        "the search for the nearest world that passes is given up; the reduction is as it was"
+        "the search for the nearest world that passes is abandoned; the reduction is unchanged"
     ),
     "isolation_finished": lambda _, after: of_passing(after, after.isolations[-1]),
     "margins_started": margins.started,
@@ -234,7 +232,7 @@ def what_happened(moment: Moment) -> str:
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         return _of_test(state, state.tests[event.test - 1])
     if kind == "created":
-        return "the run was made"
+        return "the run was created"
     if kind == "finished":
         # With what result is explained beside it.
         return "the run ended"

@@ -10,7 +10,7 @@ from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
 from ddenv.text import shortened
 
-SETTLING = "finding which models rest on which"
+SETTLING = "finding models that support others"
 # Every status and verdict has its own sign, so that nothing depends on colour alone.
 STATUS = {
     "created": ("○", "not started"),
@@ -57,7 +57,7 @@ CLAIM = {
     "not shown": "?",
     "unknown": "✗",
 }
-# What would fall once something that it rests on is gone, on the map and in the table.
+# What would fall once one of its supports is gone, on the map and in the table.
 DROPS = "↓"
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
 

@@ -14,7 +14,7 @@ from ddenv.text import count, first_of, percent
 RARE = 3.0
 # The maximum number of tests that a word on a candidate names.
 NAMED = 2
-TEACHING = "What took no part in a run can go without changing a bit of it, so the run without it is known."
+TEACHING = "Removing models that cannot have affected a run changes no bit of it, so the run without them is known."
 
 
 def slice_words(state: RunState, node: Node) -> str:
@@ -22,10 +22,10 @@ def slice_words(state: RunState, node: Node) -> str:
     before = 0 if node.parent is None else len(state.nodes[node.parent].environment)
     met = met_by(state, node)
     gone = count(before - len(node.environment), "model")
-    runs = f"took part in none of {len(met)} runs" if len(met) > 1 else "took no part in the one run known here"
+    runs = f"any of the {len(met)} runs" if len(met) > 1 else "the one run known here"
     return (
-        f"{gone} {runs}, so {'it goes' if gone == '1 model' else 'they go'} without a test; "
-        f"the chance that a fresh run meets a model that no run met is {_chance(met)}"
+        f"{gone} cannot have affected {runs}, so {'it is' if gone == '1 model' else 'they are'} removed without testing; "
+        f"the chance that a fresh run meets a model not met before is {_chance(met)}"
     )
 
 
@@ -47,8 +47,8 @@ def refuted_words(state: RunState) -> str:
         return ""
     audit, source = state.refuted
     return (
-        f"test {audit} does not repeat test {source}, which implied it: slices are no longer used in this run, and what rested on "
-        "them is tested again"
+        f"test {audit} does not repeat test {source}, which implied it: slices are no longer used in this run, and all that relied "
+        "on them is tested again"
     )
 
 

@@ -154,7 +154,7 @@ def lines() -> list[str]:
     width, room = (max(map(len, words)) for words in (keys, keys.values()))
     for id, action in actions().items():
         found.append(f"{'*' if id in config.keys else ' '} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
-    return [*found, "", "* is your own key"] if config.keys else found
+    return [*found, "", "* marks your own keys"] if config.keys else found
 
 
 def example_lines() -> list[str]:

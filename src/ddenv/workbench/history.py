@@ -158,7 +158,7 @@ class History(Screen[int | None]):
         if node is None or self._marked is None:
             refuse(self, "mark one environment first (m), then move to another and press c")
         elif node.number == self._marked:
-            refuse(self, "this one is marked: move to another one")
+            refuse(self, "this is the marked one: move to another one")
         else:
             first = self._tree[self._marked]
             self.app.push_screen(SideBySide("Two environments side by side", lines(first, node, self._here)))

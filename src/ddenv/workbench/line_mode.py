@@ -34,7 +34,7 @@ NAMED = 50
 TRIES = 5
 # By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and what it does.
 GUIDES = {
-    "pause": ("pause", "space", "start no new test; again to go on"),
+    "pause": ("pause", "space", "start no new test; again to resume"),
     "step": ("step", "s", "run one test, then pause"),
     "round": ("step_round", "S", "run to the end of the round, then pause"),
     "accept": ("accept", "a", "accept the reduction that waits; 'accept try 1' adopts a try that shows f"),
@@ -43,7 +43,7 @@ GUIDES = {
     "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
     "without": ("without", "w", "try the environment without models: 'without crate_01'"),
     "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
-    "drop": ("leave_out", "H", "leave out the model that only helps, by the certificate"),
+    "drop": ("leave_out", "H", "leave out the model that only helps, as certified"),
     "undo": ("undo", "u", "take back the last reduction"),
     "isolate": ("isolate", "i", "find a nearest world that passes; again stops that"),
     "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),
@@ -63,7 +63,7 @@ def status(snapshot: Snapshot) -> Iterator[str]:
         yield forms[0]
     if left := left_said(state, snapshot.engine == "alive"):
         yield left[0]
-    engines = {"alive": "an engine is at work", "starting": "the engine starts"}
+    engines = {"alive": "an engine is running", "starting": "the engine starts"}
     yield engines.get(snapshot.engine, "no engine is running")
 
 

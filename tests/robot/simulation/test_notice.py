@@ -63,15 +63,6 @@ def test_the_tiles_of_the_ditch_are_touched_in_driving_order(ditch, ditch_world)
     assert result.first_sensed == result.first_touched
 
 
-@pytest.mark.rates
-def test_asking_for_contacts_only_near_what_is_untouched_misses_none(ditch, ditch_world, monkeypatch):
-    keep = frozenset(ditch_world.elements())
-    first = ditch.run(keep, seed=3)
-    monkeypatch.setattr(Notice, "_may_touch", lambda *_: True)
-    assert ditch.run(keep, seed=3).first_touched == first.first_touched
-    assert len(first.first_touched) == 5
-
-
 def test_what_is_within_range_is_sensed_before_it_is_touched(world_of, husky, scenario_of):
     scenario = scenario_of(sensors={"view_range": 1.0})
     high = box_model("lamp", "1.0 0 1.5 0 0 0", "0.2 0.2 0.2")
@@ -191,8 +182,6 @@ def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husk
 def test_noticing_changes_no_bit_of_a_run_in_the_ditch(ditch, ditch_world, monkeypatch):
     keep = frozenset(ditch_world.elements())
     for seed in (0, 3):
-        # Contacts are asked for at every look, not only where it is needed.
-        monkeypatch.setattr(Notice, "_may_touch", lambda *_: True)
         result = ditch.run(keep, seed)
         bare = without_noticing(monkeypatch, lambda seed=seed: ditch.run(keep, seed))
         assert result.first_touched

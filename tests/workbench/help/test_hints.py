@@ -32,7 +32,7 @@ def hints(screen):
         ("enter opens   escape cancels", [("enter opens", "enter"), ("escape cancels", "escape")]),
         ("← → other tests", [("← → other tests", "left")]),
         ("tab or click chooses more", [("tab or click chooses more", "tab")]),
-        ("l let it run on   s stop", [("l let it run on", "l"), ("s stop", "s")]),
+        ("l keep it running   s stop", [("l keep it running", "l"), ("s stop", "s")]),
         ("^o opens a file", [("^o opens a file", "ctrl+o")]),
     ],
 )

@@ -93,7 +93,7 @@ async def test_runs_race_by_themselves_to_the_end(two_runs, size, monkeypatch):
         await pilot.pause()
         assert titles(pilot)[0] == "delivery · 38 tests · 3 left ✓"
         assert "16 tests, stopped · 6 left" in titles(pilot)[1] and (size == (120, 36) or "…" in titles(pilot)[1])
-        assert "did not come to an end" in said(pilot) and "no winner" in said(pilot)
+        assert "did not finish" in said(pilot) and "no winner" in said(pilot)
 
 
 async def test_a_race_is_paused(two_runs, monkeypatch):
@@ -116,7 +116,7 @@ async def test_a_race_is_paused(two_runs, monkeypatch):
     ("runs", "words"),
     [
         (["delivery"], "--race: expected 2 to 4 runs, found 1"),
-        (["delivery", "ditch"], "has another world than"),
+        (["delivery", "ditch"], "its world is not that of"),
         (["delivery", "nothing"], "no such run file"),
         (["delivery"] * 5, "found 5"),
     ],

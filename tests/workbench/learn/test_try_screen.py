@@ -96,7 +96,7 @@ async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again(at_the_s
         await without(pilot, "pallet")
         await pilot.press("u", "escape")
         await pilot.pause()
-        assert "`" not in said(pilot, "lesson-text") and "t goes on with it" in said(pilot, "lesson-text")
+        assert "`" not in said(pilot, "lesson-text") and "t continues it" in said(pilot, "lesson-text")
         await pilot.press("t")
         await pilot.pause()
         assert [each.out for each in pilot.app.screen.attempt.tried] == [("pallet",)]

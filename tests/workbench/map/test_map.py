@@ -208,8 +208,8 @@ async def test_a_place_is_picked_by_enter_or_click(busy):
         assert world.selection == frozenset()
 
 
-SIGNS = {"removed": "·", "pinned": "+", "path": "⠒", "failure": "×", "sensed": "A3", "took part": "b"}
-HIDDEN = ("sensed", "took part")
+SIGNS = {"removed": "·", "pinned": "+", "path": "⠒", "failure": "×", "sensed": "A3", "participants": "b"}
+HIDDEN = ("sensed", "participants")
 
 
 @pytest.mark.parametrize("layer", SIGNS)

@@ -115,7 +115,7 @@ async def test_two_tests_are_overlaid_and_p_goes_to_where_they_part(two_ways):
         assert all("≠" in line for line in lines)
         # The second test ends sooner.
         assert lines[1].index("┤") < lines[0].index(NOW)
-        assert "a in one of them only" in screen.map.legend(100).plain
+        assert "a in only one of them" in screen.map.legend(100).plain
         await session.press("x")
         assert [one.test.id for one in screen._tests] == [61, 38]
 

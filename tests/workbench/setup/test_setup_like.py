@@ -36,7 +36,7 @@ async def test_it_starts_from_the_run_file_alone(made, runs, started):
     async with Opened(screen=lambda: SetupScreen(like=made)) as session:
         assert session.told("about").startswith("11 models. As in the run crates-1.")
         assert session.value("name") == "crates-2"
-        assert "f7 saves it" in session.told("command")
+        assert "save it as a file" in session.told("command")
         session.fill(iterations="9", spawn_y="1")
         await session.press("ctrl+s")
         assert session.wrong_or_run() == "crates-2"

@@ -89,7 +89,7 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
 async def test_before_the_search_has_ended_there_is_nothing_to_do(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
-        assert "The search still goes on" in words(await opened(session), "#why-empty")
+        assert "The search is still running" in words(await opened(session), "#why-empty")
 
 
 async def test_where_all_could_stay_away_there_is_nothing_to_look_at(run):

@@ -27,7 +27,7 @@ _TAKE = "choose the line under the cursor"
 TEXTUAL_WORDS = {
     "app.focus_next": _FOCUS,
     "app.focus_previous": _FOCUS,
-    "screen.copy_text": "copy the text that is selected with the mouse",
+    "screen.copy_text": "copy the text selected with the mouse",
     "cursor_up": _LINE,
     "cursor_down": _LINE,
     "page_up": _PAGE,

@@ -15,22 +15,22 @@ Signs = tuple[tuple[str, str], ...]
 
 def signs() -> dict[str, Signs]:
     return {
-        "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate that is shown"), *MORE_SIGNS[1:], *LEGEND),
-        "On the map of tests played back": (*OF_WAYS, ("a", "in one of the two only")),
+        "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate shown"), *MORE_SIGNS[1:], *LEGEND),
+        "On the map of tests played back": (*OF_WAYS, ("a", "in only one of the two")),
         "On the time of a test": (
-            ("●", "the instant that is shown"),
+            ("●", "the instant shown"),
             ("┤", "its end"),
             ("▾", "touches a model"),
             OF_WAYS[-1],
         ),
-        "On the chart": (("╌", "so many models seem to be needed at least"), ("▲", "you decided something")),
-        "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
+        "On the chart": (("╌", "at least this many models seem to be needed"), ("▲", "you decided something")),
+        "How a test ended": (*_split(OUTCOME), ("▶", "running")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
         "Verdicts of a certificate": _joined(CLAIM),
         "What a certificate has shown": (
             ("≥", "what is left keeps at least this share of the rate of f"),
             ("≤", "without the model f shows at most this often, as a share of the rate with it"),
-            ("whole, missed", "the whole world, with the seeds with which what is left missed f"),
+            ("whole, missed", "the whole world, with the seeds for which what is left missed f"),
             ("step 3", "what was left after reduction 3: the history has its number"),
         ),
         "States of a run": tuple((sign, words) for sign, words in STATUS.values()),

@@ -50,7 +50,7 @@ class LessonScreen(LearnScreen[bool]):
     FIRST = "help close on skip again activity run_back run_on predict hint variables next_reduction next_decision back"
     BINDINGS: ClassVar = keys(
         "lesson",
-        ("on", "enter,space", "on", "go on", "on to what comes next in the lesson", "enter"),
+        ("on", "enter,space", "on", "go on", "continue the lesson", "enter"),
         ("back", "backspace", "back", "step back", "back to the step before"),
         ("skip", "s", "skip", "skip", "skip the question: shows the answer, without a score"),
         ("hint", "h", "hint", "hint", "show a hint for the question"),
@@ -69,7 +69,7 @@ class LessonScreen(LearnScreen[bool]):
         ("activity", "t", "activity", "try", "search yourself, or watch the race, where a step has one"),
         ("predict", "p", "predict", "predict", "predict what comes next in the run"),
         ("again", "r", "again", "start again", "at the end of a lesson: start it again, with a new score"),
-        ("variables", "v", "variables", "variables", "the variables in place of the map (80 columns)"),
+        ("variables", "v", "variables", "variables", "the variables instead of the map (80 columns)"),
         *(
             (letter, letter, f"answer({place})", letter, f"give answer {letter}")
             for place, letter in enumerate(LETTERS)

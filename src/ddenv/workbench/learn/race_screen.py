@@ -92,8 +92,8 @@ class RaceScreen(LearnScreen[None]):
     BINDINGS: ClassVar = keys(
         "race",
         ("run", "space", "run", "run/pause", "run the race, or pause it"),
-        ("back", "left", "move(-1)", "back", "one test of each back"),
-        ("on", "right,enter", "move(1)", "one test on", "one test of each on", "→"),
+        ("back", "left", "move(-1)", "back", "one test back in each"),
+        ("on", "right,enter", "move(1)", "one test on", "one test on in each", "→"),
         ("begin", "home", "go(0)", "start", "to the beginning"),
         ("end", "end", "go(-1)", "result", "to the end: who needed the fewest tests, and why"),
         HELP,

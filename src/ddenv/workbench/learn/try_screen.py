@@ -41,8 +41,8 @@ class TryScreen(LearnScreen[None]):
         ("mark", "space", "mark", "mark", "mark or unmark the model under the crosshair"),
         ("without", "w", "test(False)", "test without", "test what is kept without the marked models"),
         ("only", "o", "test(True)", "test only", "test the marked models alone"),
-        ("back", "u", "back", "undo", "undo: keep again what the last reduction took away"),
-        ("done", "m", "done", "minimal", "say that no single model can go: the verdict"),
+        ("back", "u", "back", "undo", "undo: restore what the last reduction removed"),
+        ("done", "m", "done", "minimal", "claim that no single model can go: the verdict"),
         ("again", "n", "again", "new search", "begin again"),
         HELP,
         ("on", "enter", "on", "back to the lesson", "back to the lesson, once the search is over"),
@@ -105,7 +105,7 @@ class TryScreen(LearnScreen[None]):
             said.update(Text("\n\n").join((verdict, Text(plain(sentence)))))
             return
         many = count(len(attempt.held), "model")
-        sure = Text(f"Sure that no single one of {many} can go? m again says so, and ends the search.", "bold")
+        sure = Text(f"Sure that no single one of {many} can go? m again confirms it and ends the search.", "bold")
         said.update(Text("\n").join((sure if self._asked else _last(attempt), *self._models())))
 
     def _models(self) -> tuple[Text, Text]:
@@ -117,7 +117,7 @@ class TryScreen(LearnScreen[None]):
             word.apply_meta({"@click": f"screen.mark_one({self.attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
         if not self.attempt.tests_left:
-            return models, Text("No test is left. m: the verdict on what you keep.", "dim")
+            return models, Text("No tests are left. m: the verdict on what you keep.", "dim")
         if not marked:
             return models, Text("Mark models with enter or a click. When no single one can go, press m.", "dim")
         left = len(self.attempt.held) - len(marked)

@@ -36,14 +36,14 @@ PARTS, SELECTED, PINNED, FALLING, SENSED, NO_PART, FIRST_PATH = MORE_SIGNS = (
     ("+", "pinned"),
     (DROPS, "drops"),
     ("1 2", "order sensed"),
-    ("a b", "took no part"),
+    ("a b", "no effect"),
     ("⠒ ⠒", "path of f"),
 )
 # On a map of finished tests.
 PARTING = "≠"
 SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
-    ("⠒", "the first way"),
-    ("⠒ ⠒", "the second way"),
+    ("⠒", "the first path"),
+    ("⠒ ⠒", "the second path"),
     ("→ ⇒", "their robots"),
     (PARTING, "they part"),
 )
@@ -58,7 +58,7 @@ def legend(shown: Shown, width: int) -> Text:
         PINNED: bool(state.pinned) and "pinned" in layers,
         FALLING: shown.candidate is not None and bool(drops(state, shown.candidate)),
         SENSED: "sensed" in layers and state.evidence_test is not None,
-        NO_PART: "took part" in layers and in_last(state) is not None,
+        NO_PART: "participants" in layers and in_last(state) is not None,
         FIRST_PATH: "original" in layers and not shown.same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]

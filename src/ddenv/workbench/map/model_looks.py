@@ -74,7 +74,7 @@ def kept(shown: Shown) -> Kept:
     """What the map needs of a run's state, and how models stand out in the layers that are shown."""
     state, layers, candidate, place = shown.snapshot.state, shown.layers, shown.candidate, shown.place
     parts = state.round.split.letter_of if state.round and "partitions" in layers else {}
-    met = in_last(state) if "took part" in layers else None
+    met = in_last(state) if "participants" in layers else None
     standing = frozenset(candidate.models) if candidate else None
     return Kept(
         frozenset(state.elements) or place.elements,

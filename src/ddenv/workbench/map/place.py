@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 # The layers of the map, which can be hidden.
-LAYERS = ("partitions", "removed", "pinned", "sensed", "took part", "path", "original", "failure", "names")
+LAYERS = ("partitions", "removed", "pinned", "sensed", "participants", "path", "original", "failure", "names")
 Point = tuple[float, float]
 # How long to retry a run file that another program has locked, s.
 PATIENCE = 10.0
@@ -69,7 +69,7 @@ class Shown:
     place: Place = field(default_factory=Place)
     snapshot: Snapshot = field(default_factory=Snapshot)
     candidate: Candidate | Trial | None = None
-    layers: frozenset[str] = frozenset(LAYERS) - {"sensed", "took part", "names"}
+    layers: frozenset[str] = frozenset(LAYERS) - {"sensed", "participants", "names"}
     selection: frozenset[str] = frozenset()
     ways: tuple[Way, ...] = ()
     parting: Point | None = None

@@ -32,7 +32,7 @@ def met(test: Test) -> tuple[tuple[float, str], ...]:
 
 def how_it_ended(test: Test) -> str:
     if test.outcome == "running":
-        return "▶ it runs"
+        return "▶ running"
     why = f": {plain(test.failure)}" if test.failure else ""
     early = ", ended early: it was stuck for good" if test.cut else ""
     return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"

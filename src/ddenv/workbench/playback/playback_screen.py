@@ -108,7 +108,7 @@ class Playback(Screen[None]):
         ("faster", "greater_than_sign", "speed(1)", "faster", "faster", ">"),
         ("start", "home", "go(0)", "start", "to the start of the test"),
         ("end", "end", "go(1)", "end", "to the end of the test"),
-        ("parting", "p", "parting", "they part", "to the instant at which the ways of the two tests part"),
+        ("parting", "p", "parting", "they part", "to the instant at which the paths of the two tests part"),
         ("beside", "o", "beside", "two tests", "play another test over this one, or this one alone again"),
         ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
         ("before", "up", "test(-1)", "test before", "the finished test before this one"),
@@ -187,7 +187,7 @@ class Playback(Screen[None]):
         there = [one.models if one.models is not None else state.environment for one in self._tests]
         differ, either = frozenset(there[0]) ^ frozenset(there[-1]), frozenset(there[0]) | frozenset(there[-1])
         both = tuple(name for name in state.elements if name in either)
-        self._apart = ("a", "in one of them only") if differ else None
+        self._apart = ("a", "in only one of them") if differ else None
         groups = (tuple(name for name in both if name in differ),) if differ else ()
         self.map.show(snapshot_with(state, both, groups), without(both, differ) if differ else None)
         lacks = dict.fromkeys(line for one in self._tests for line in one.lacks)

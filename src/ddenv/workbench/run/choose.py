@@ -30,7 +30,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         ("cancel", "escape", "cancel", "cancel", "choose nothing"),
         ("down", "down", "move(1)", "", "next name"),
         ("up", "up", "move(-1)", "", "previous name"),
-        ("toggle", "tab", "mark", "", "choose this model, too, or no longer"),
+        ("toggle", "tab", "mark", "", "choose this model, or take it out again"),
     )
 
     def __init__(
@@ -156,7 +156,7 @@ MEANINGS = {
     "removed": "where removed models stood",
     "pinned": "which models are pinned",
     "sensed": "the order in which the robot sensed the models",
-    "took part": "bright what took part in the last similar run",
+    "participants": "models that affected the last similar run",
     "path": "the robot's path on the last similar run",
     "original": "the robot's path in f itself",
     "failure": "where the robot ended in f",
@@ -184,7 +184,7 @@ class Layers(ModalScreen[None]):
 
     def _prompt(self, name: str) -> Text:
         mark = "[x]" if name in self._world.shown.layers else "[ ]"
-        return Text(f"{mark} {name:<11} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
+        return Text(f"{mark} {name:<12} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
 
     @on(OptionList.OptionSelected)
     def action_switch(self) -> None:

@@ -45,14 +45,14 @@ class Quit(Choice):
     BINDINGS: ClassVar = keys(
         "quit",
         ("stop", "s", "answer('stop')", "stop the engine", "stop the engine and leave"),
-        ("leave", "l", "answer('leave')", "let it run on", "leave; the engine goes on"),
+        ("leave", "l", "answer('leave')", "keep it running", "leave; the engine goes on"),
         ("cancel", "escape,c", "answer('cancel')", "cancel", "stay here"),
     )
 
     def __init__(self) -> None:
         words = "The engine is a separate process; it can go on without this screen."
-        answers = {"leave": "Let it run on", "stop": "Stop the engine", "cancel": "Cancel"}
-        super().__init__("Quit", "l let it run on   s stop   c cancel", words, **answers)
+        answers = {"leave": "Keep it running", "stop": "Stop the engine", "cancel": "Cancel"}
+        super().__init__("Quit", "l keep it running   s stop   c cancel", words, **answers)
 
 
 class ReductionWaits(Choice):
@@ -62,7 +62,7 @@ class ReductionWaits(Choice):
         "waits",
         ("accept", "a", "answer('accept')", "accept", "make the reduction, then go on"),
         ("reject", "x", "answer('reject')", "reject", "reject the reduction, then go on"),
-        ("drop", "d", "answer('drop')", "drop", "go on without deciding: it may come again"),
+        ("drop", "d", "answer('drop')", "drop", "go on without deciding: it may come back"),
         ("cancel", "escape,c", "answer('cancel')", "cancel", "change nothing"),
     )
 

@@ -56,7 +56,7 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
     text.append("\nlog\n", "bold")
     for at, words in met(test):
         text.append(f"{at:>8.1f} s  ", "dim").append(f"{words}\n")
-    return title, text.append("\nto make it again\n", "bold").append(f"  {command}")
+    return title, text.append("\nto repeat it\n", "bold").append(f"  {command}")
 
 
 def _place(test: Test) -> str:
@@ -71,7 +71,7 @@ def _took(test: Test) -> str:
     if not test.is_finished:
         return ""
     if test.implied_by is not None:
-        return f"not simulated: it follows from test {test.implied_by}, in which nothing that it lacks took part"
+        return f"not simulated: no model that it lacks can have affected test {test.implied_by}, which implies it"
     computed = "its result was copied from another run" if test.taken else f"{test.wall_seconds:.1f} s of computing"
     return f"{test.simulated_seconds:.1f} s simulated, {computed}"
 
@@ -104,7 +104,7 @@ class FactsDialog(ModalScreen[None]):
         ("before", "left", "step(-1)", "test before", "the test before this one"),
         ("next", "right", "step(1)", "next test", "the next test"),
         ("play", "p,P", "play", "play", "play this test back on the map"),
-        ("copy", "c", "copy", "copy", "copy the command that makes it again (OSC 52)"),
+        ("copy", "c", "copy", "copy", "copy the command that repeats it (OSC 52)"),
         ("close", "escape,F,q,enter", "dismiss", "close", "back to the run"),
     )
 

@@ -143,7 +143,7 @@ class Opening:
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
         if selected := self._screen.keys.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
-        texts += [("to come back", f"ddenv open {name}"), ("to go on without screen", f"ddenv resume {name}")]
+        texts += [("to come back", f"ddenv open {name}"), ("to go on without a screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]
 
         def chosen(row: int | None) -> None:

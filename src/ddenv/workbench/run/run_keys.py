@@ -47,7 +47,7 @@ TITLES = {
 
 # The keys that guide the run: key, name of the offer, word in the footer, what the help says.
 _GUIDES = (
-    ("space", "pause", "pause", "pause: start no new test; again to go on; starts an engine if none is running"),
+    ("space", "pause", "pause", "pause: start no new test; again to resume; starts an engine if none is running"),
     ("s", "step", "step", "run one test, then pause"),
     ("S", "step_round", "round", "run to the end of the round, then pause"),
     (
@@ -61,7 +61,7 @@ _GUIDES = (
     ("p", "pin", "pins", "choose the models that always stay; the selected ones are marked, pinned ones are unpinned"),
     ("w", "without", "try without", "try by hand: test the environment without the selected models, or those you name"),
     ("o", "only", "try only", "try by hand: test the selected models alone, or those you name"),
-    ("H", "leave_out", "leave out", "leave out the model that only helps, by the certificate; a new search begins"),
+    ("H", "leave_out", "leave out", "leave out the model that only helps, as certified; a new search begins"),
     ("u", "undo", "undo", "undo: take back the last reduction; it is not made again"),
     ("c", "change", "settings", "change pair, algorithm, iterations or budget, from the next round on"),
     ("t", "mode", "ask", "accept reductions automatically, or ask before each one"),
@@ -104,7 +104,7 @@ KEYS: list[BindingType] = [
         ("follow", "escape", "follow", "follow", "back to now; select nothing; cursor and map follow the run again"),
         *MAP_KEYS,
         ("back", "comma", "browse('moment', -1)", "back", "back in the run: to the moment before this one", ","),
-        ("on", "full_stop", "browse('moment', 1)", "on", "on to the next moment; after the last one comes now", "."),
+        ("on", "full_stop", "browse('moment', 1)", "on", "on to the next moment; after the last one, back to now", "."),
         (
             "round_before",
             "less_than_sign",
@@ -126,7 +126,7 @@ KEYS: list[BindingType] = [
         ("reduction_before", "{", "browse('reduction', -1)", "", "to the reduction before", "{"),
         ("next_reduction", "}", "browse('reduction', 1)", "", "to the next reduction", "}"),
         ("rounds", "b", "open('rounds')", "rounds", "the list of all rounds so far: go to the end of any"),
-        ("facts", "F", "open('facts')", "facts", "the raw facts of a test, and the command that makes it again"),
+        ("facts", "F", "open('facts')", "facts", "the raw facts of a test, and the command that repeats it"),
         ("play", "P", "open('play')", "play", "play a finished test of the row under the cursor back on the map"),
         ("signs", "k", "app.signs", "signs", "what the signs and letters on this screen mean"),
         ("runs", "R", "app.runs", "runs", "the list of all runs"),

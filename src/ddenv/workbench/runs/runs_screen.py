@@ -102,7 +102,7 @@ class RunsScreen(Screen[None]):
         ("watch", "w", "open(True)", "watch", "watch it without changing anything"),
         ("like", "n", "copy", "new like it", "a new run with its scenario and other settings"),
         ("filter", "slash", "filter", "filter", "filter by name, scenario, method or state"),
-        ("sort", "s", "sort", "sort", "sort by the next column; a click on a column does so, too"),
+        ("sort", "s", "sort", "sort", "sort by the next column; or click on a column"),
         ("mark", "m", "mark", "mark", "mark this run, to compare another with it"),
         ("compare", "c", "compare", "compare", "compare the marked run with this one"),
         ("delete", "d", "delete", "delete", "delete it; u brings it back for a week"),
@@ -171,7 +171,7 @@ class RunsScreen(Screen[None]):
         works = sum(run.is_worked_on for run in self._runs)
         panel = self.query_one("#list")
         panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
-        said = [f"{count(works, 'engine')} at work"] if works else []
+        said = [f"{count(works, 'engine')} running"] if works else []
         if self._marked is not None:
             said.append(f"marked: {shortened(plain(self._marked.stem), 20)}")
         panel.border_subtitle = Text(" · ".join(said))
@@ -220,7 +220,7 @@ class RunsScreen(Screen[None]):
         if run is None:
             refuse(self, "there is no run here")
         elif run.is_worked_on:
-            refuse(self, "its engine is at work: open the run and stop it first")
+            refuse(self, "its engine is running: open the run and stop it first")
         else:
             self.app.run_worker(self._delete(run.path))
 

@@ -64,7 +64,7 @@ PLACES = (*SPAWN, *GOAL)
 ADVANCED = _shown("more")
 NAMED = "The name of the run: a file in the runs folder, or a path that ends in .ddenv."
 NAME = Field("name", "run name", str, meaning=NAMED)
-ACCEPTED = "Whether each reduction is taken at once (automatic), or waits for you to accept or reject it (ask)."
+ACCEPTED = "Whether each reduction is accepted at once (automatic), or waits for you to accept or reject it (ask)."
 ACCEPT = Field("accept", "accept", str, choices=("automatic", "ask"), meaning=ACCEPTED)
 ALL = (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)
 

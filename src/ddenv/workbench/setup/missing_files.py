@@ -109,7 +109,7 @@ class MissingList(OptionList):
     BINDINGS: ClassVar = keys(
         "missing",
         ("choose", "enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
-        ("guess", "a", "guess", "guess", "take the guessed shape wherever nothing is chosen, or else for this one"),
+        ("guess", "a", "guess", "guess", "take the guessed shape for all undecided files, or else for this one"),
         ("without", "w", "without", "without", "leave this one out"),
     )
 

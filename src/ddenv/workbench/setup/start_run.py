@@ -18,7 +18,7 @@ from ddenv.workbench.shared.processes import Engine
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
+NO_COMMAND = "there is no command for the scenario of a run; save it as a file first (f7)"
 
 
 def command_words(

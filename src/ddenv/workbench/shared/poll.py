@@ -120,7 +120,7 @@ class Poll:
         return replace(snapshot, behind=more, version=__version__)
 
     def _left(self, why: str) -> Snapshot:
-        error = f"{why}; what you see is what was read last"
+        error = f"{why}; the screen shows what was read last"
         return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 
     def _follow(self) -> tuple[str, bool]:

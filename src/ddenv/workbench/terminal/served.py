@@ -68,7 +68,7 @@ def address_lines(port: int, token: str, font_size: int = FONT_SIZE) -> list[str
     size = "" if font_size == FONT_SIZE else f"?fontsize={font_size}"
     return [
         f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
-        f"Whoever has that address acts as {getpass.getuser()} on this machine: the workbench can read, write and start "
+        f"Anyone with that address acts as {getpass.getuser()} on this machine: the workbench can read, write and start "
         "programs in your name.",
         "Other machines cannot reach it. From yours, type there first:",
         f"  ssh -L {port}:{HOST}:{port} {getpass.getuser()}@{socket.gethostname()}",
@@ -88,7 +88,7 @@ def guard(port: int, token: str) -> Any:
         given = request.path.encode().split(b"/")[1]
         if not hmac.compare_digest(given, token.encode()):
             raise web.HTTPForbidden(
-                text="the address of this workbench has a token; take all of it from 'ddenv serve'\n"
+                text="the address of this workbench has a token; copy all of it from 'ddenv serve'\n"
             )
         if request.host not in own or (origin is not None and origin.removeprefix("http://") not in own):
             raise web.HTTPForbidden(text=f"open http://{HOST}:{port} itself\n")

@@ -122,7 +122,7 @@ def head_of(state: RunState, works: bool) -> str:
 
 def nothing_yet(state: RunState, works: bool, run: str) -> str:
     """Why there is nothing to show, and what to do; `works`: an engine does. `run` is what a shell calls the run."""
-    shows = "Full runs of what is left, and of that without each of its models, show why it fails: the certificate makes them."
+    shows = "Full runs of what is left, with and without each of its models, show why: the certificate makes them."
     making, command = in_the_making(state), remedy(state, works, run)
     if (certificate := current(state)) is not None:
         return no_reasons(certificate)
@@ -130,8 +130,8 @@ def nothing_yet(state: RunState, works: bool, run: str) -> str:
         return f"{shows}\n\n{as_sentence(shown(state))} Make one, and come back: {command}   (c copies that)"
     if making is not None:
         made = made_of_usual(state, making)
-        return f"{shows}\n\nIt is being made: {made}. This page fills by itself.\n\n{as_sentence(shown(state))}"
-    return f"{shows}\n\nIt is made once the search has ended, and this page fills by itself. The search still goes on."
+        return f"{shows}\n\nIt is being made: {made}. This page fills in by itself.\n\n{as_sentence(shown(state))}"
+    return f"{shows}\n\nIt is made once the search ends, and this page then fills in by itself. The search is still running."
 
 
 def remedy(state: RunState, works: bool, run: str) -> str:

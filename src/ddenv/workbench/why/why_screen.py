@@ -79,7 +79,7 @@ class WhyScreen(Screen[None]):
                 BEGIN,
                 "find a nearest world in which the robot reaches its goal; again: stop that",
             ),
-            ("margins", "m", "margins", "margins", "how far each number may change before f goes"),
+            ("margins", "m", "margins", "margins", "how far each number can change before f disappears"),
             ("copy", "c", "copy", "copy", "copy all sentences, or the command that is named (OSC 52)"),
             *MAP_KEYS,
             ("signs", "k", "app.signs", "signs", "what the signs and letters on the map mean"),
@@ -218,7 +218,7 @@ class WhyScreen(Screen[None]):
         self.map.show(one.snapshot, without(one.snapshot.state.environment, one.gone))
         parting = None if one.parting is None else one.parting.place
         self.map.show_ways(ways, parting, (one.letter.lower(), "left out in one"), self._place.prints)
-        title = "World" if one.parting is None or not ways else f"The two ways, seed {one.parting.seed}"
+        title = "World" if one.parting is None or not ways else f"The two paths, seed {one.parting.seed}"
         self.query_one("#why-world").border_title = Text(title)
         legend = self.query_one("#why-legend", Static)
         legend.update(self.map.legend(legend.size.width))
@@ -241,7 +241,7 @@ class WhyScreen(Screen[None]):
         if one is None or one.parting is None:
             refuse(
                 self,
-                "there are no two runs to play: none with the model and one without it have the same seed and other ends",
+                "there are no two runs to play: none with the model and one without it share a seed and end differently",
             )
             return
         try:
@@ -281,13 +281,13 @@ class MarginsDialog(Reading):
                 (name, bar(one.margin, 41)),
                 ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
             ]
-        groups = [("How far each number may change before f goes", lines)]
+        groups = [("How far each number can change before f disappears", lines)]
         if not lines:
             groups = [
-                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number may change")])
+                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number can change")])
             ]
         if known is not None and found:
             groups += [
-                ("What this says", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
+                ("What this means", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
             ]
         super().__init__("Margins", groups)
