@@ -35,6 +35,8 @@ def create_named(
 
     `asks` whether what it starts is trusted. `name` and `output` as for `run_path`. Raises UserError, with nothing written.
     """
+    if output is not None and is_world(output) and output.exists():
+        raise UserError(f"--output: {output} exists already; choose another name")
     if given.get("inside") and (of_run := named(subject)) is not None and of_run[0] == "run":
         with RunFile(of_run[1]) as file:
             scenario = trusted_scenario(file, asks, given["cluster"])

@@ -6,6 +6,8 @@ import fake_run
 import pytest
 
 from ddenv.cli.command_line import app as command_line
+from ddenv.cli.workbench import open_command
+from ddenv.runs.subject import READING
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.start_run import command_words
@@ -99,6 +101,26 @@ async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, start
         assert session.app.clipboard == shown
         await session.press("ctrl+s")
         assert asked_by(shlex.split(shown)) == [session.made(), session.app.screen.run]
+
+
+@pytest.mark.parametrize("given", [[], ["--inside"]])
+async def test_the_options_of_the_command_line_are_part_of_it(scenarios, tmp_path, given):
+    """As click gives them, without any and with a flag."""
+    parsed = open_command.make_context("open", ["house.sdf", *given]).params
+    reading = {name: parsed[name] for name in READING}
+    world = tmp_path / "house.sdf"
+    boxes = "".join(
+        f"<collision name='{name}'><pose>3 {y} 0.5 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
+        for name, y in (("left", 2), ("right", -2))
+    )
+    house = f"<model name='house'><static>1</static><link name='l'>{boxes}</link></model>"
+    world.write_text(f"<sdf version='1.9'><world name='w'>{house}</world></sdf>")
+    async with Opened(reading=reading) as session:
+        await session.open(world)
+        session.place()
+        await session.pilot.pause()
+        words = shlex.split(session.told("command"))
+        assert ("--inside" in words) == bool(given), words
 
 
 @pytest.mark.screens

@@ -163,7 +163,7 @@ class Opening:
         """Begins a run inside the models that are left, and shows it."""
         snapshot = self._poll.snapshot
         if snapshot.engine != "absent" or not snapshot.state.ended:
-            self._asking.refuse("the search has not ended: what is left can be opened then")
+            self._asking.refuse("something is still running: what is left can be opened when it has ended")
             return
         self._screen.run_worker(self._begin_inside, group="inside", exclusive=True, thread=True)
 

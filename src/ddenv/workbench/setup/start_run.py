@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ def command_words(
     *,
     bare: bool = False,
     jobs: int,
-    reading: Mapping[str, Sequence[Any]],
+    reading: Mapping[str, Any],
     name: str = "",
 ) -> list[str]:
     """The words of the command that runs `asked` as Start does, to be joined by `shlex.join`.
@@ -51,8 +51,9 @@ def command_words(
     for one in changed:
         if one.name not in others:
             words += one.words(read(after, one))
+    words += ["--inside"] if reading.get("inside") else []
     for option, values in reading.items():
-        for value in values:
+        for value in values if option != "inside" else ():
             words += [f"--{option.replace('_', '-')}", str(value.absolute()) if isinstance(value, Path) else str(value)]
     if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]
