@@ -28,7 +28,7 @@ FIRST = ids(
 )
 # What comes next when the run has ended.
 ENDED = ids(
-    "run", "why isolate export play inside quit help leave_out history change pin without only undo find scene runs"
+    "run", "why isolate export play quit help inside leave_out history change pin without only undo find scene runs"
 )
 # While an earlier moment is shown, while the map has the focus, and on a screen that only watches.
 BROWSING = ids("run", "back on round_before next_round rounds facts follow help quit play signs")
