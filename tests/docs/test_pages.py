@@ -7,7 +7,7 @@ import click
 import pytest
 
 from ddenv.cli.command_line import app
-from ddenv.schemas import names
+from ddenv.schemas import OURS, names
 from ddenv.world.scenario import (
     Controller,
     FailureSpec,
@@ -87,8 +87,13 @@ def test_the_reference_names_every_option(command):
     assert {option for option in options if f"`{option}" not in REFERENCE} == set()
 
 
-@pytest.mark.parametrize("page", ["how-it-works.md", "glossary.md"])
-@pytest.mark.parametrize("kind", ["partitioning", "prioritization", "algorithm"])
+@pytest.mark.parametrize(
+    ("page", "kind"),
+    [
+        *((page, kind) for page in ("how-it-works.md", "glossary.md") for kind in OURS),
+        ("library.md", "algorithm"),
+    ],
+)
 def test_pages_name_every_schema_and_algorithm(page, kind):
     text = (ROOT / "docs" / page).read_text()
     assert {name for name in names(kind) if f"`{name}`" not in text} == set()

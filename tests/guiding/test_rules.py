@@ -10,11 +10,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ddenv.engine.control import Control, Stopped
+from ddenv.engine.control import _EVENTS, Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.guiding.commands import KINDS, parse, refusal, send, written
-from ddenv.guiding.course import StartEngine
+from ddenv.guiding.course import GoBack, Pause, Resume, StartEngine, Step, Stop, Undo
 from ddenv.guiding.offers import ACTIONS, Pointed, offer
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.store import RunFile
@@ -64,6 +64,11 @@ def test_each_command_is_written_as_it_is_read():
     assert {kind for kind, _ in WRITTEN} == set(KINDS)
     for kind, data in WRITTEN:
         assert written(parse(kind, data)) == (kind, data)
+
+
+def test_the_engine_knows_what_to_do_for_each_command():
+    # It carries these out itself; of each other one it writes the event.
+    assert {Pause, Resume, Step, Stop, Undo, GoBack} | set(_EVENTS) == set(KINDS.values())
 
 
 @pytest.mark.parametrize(

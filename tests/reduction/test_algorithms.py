@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from ddenv.environment import NOTHING, Environment
 from ddenv.reduction.algorithms import sweep
 from ddenv.reduction.guide import make_guide, search
-from tests.reduction.worlds import ALGORITHMS, PAIRS, evidence, run, worlds
+from ddenv.schemas import uses
+from tests.reduction.worlds import ALGORITHMS, PAIRS, carried_through, evidence, run, worlds
 from tests.tiers import examples
 
 OPTIONS = st.fixed_dictionaries(
@@ -148,3 +149,19 @@ def _rounds(searching):
         while True:
             yield round
             round = searching.send(None)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_an_algorithm_uses_the_parts_of_the_pair_that_it_is_said_to_use(algorithm):
+    guide, used = make_guide("model2model", "failure-proximal", lambda: evidence(9, 1)), set()
+
+    def split(environment, n):
+        used.add("partitioning")
+        return guide.split(environment, n)
+
+    def rank(partitions):
+        used.add("prioritization")
+        return guide.rank(partitions)
+
+    carried_through(search(algorithm, range(9), replace(guide, split=split, rank=rank)), Environment.of((1, 7)).__le__)
+    assert used == set(uses(algorithm))

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections import Counter
 from types import SimpleNamespace
 
 import fake_moments
@@ -168,6 +169,12 @@ def test_every_binding_has_an_id_and_a_tooltip():
     bindings = [binding for owner in owners for binding in owner.BINDINGS]
     assert all(binding.id and binding.tooltip for binding in bindings)
     assert len({binding.id for binding in bindings}) == len(bindings)
+
+
+def test_no_two_keys_of_the_run_screen_and_of_what_is_on_it_are_the_same():
+    bindings = [binding for owner in (RunScreen, WorldMap, Workbench) for binding in owner.BINDINGS]
+    taken = [key for binding in bindings for key in binding.key.split(",")]
+    assert [key for key, times in Counter(taken).items() if times > 1] == []
 
 
 async def test_e_explains_the_method_of_the_run(runs):
