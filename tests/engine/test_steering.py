@@ -181,7 +181,7 @@ def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
         ("try", {"models": list(range(6))}, "the current environment"),
         ("try", {"models": [True]}, "no such models"),
         ("adopt", {"trial": 1}, "no such try"),
-        ("leave_out", {"model": 0}, "no model that only helps"),
+        ("leave_out", {"model": 0}, "no certificate shows a model that only helps"),
         ("accept_other", {"test": 1}, "did not end in another failure"),
         ("accept_other", {"test": -1}, "no such test"),
         ("undo", {}, "no reduction"),

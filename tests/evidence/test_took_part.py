@@ -105,7 +105,7 @@ def test_the_map_of_a_run_shows_what_took_part(run, monkeypatch, capsys):
     met = set().union(*(test.took_part.names(state.elements) for test in state.tests if test.phase == "baseline"))
     for name in MODELS:
         assert (f"  {name}: " in said.stdout) == (name in met)
-    assert f"{len(met)} models of {len(state.elements)} took part" in said.stdout
+    assert f"{len(met)} models of {len(state.elements)} may have affected the runs" in said.stdout
 
 
 def test_a_run_that_does_not_know_what_took_part_says_so(tmp_path, monkeypatch, capsys):
@@ -115,5 +115,5 @@ def test_a_run_that_does_not_know_what_took_part_says_so(tmp_path, monkeypatch, 
     drive(path, pool)
     said = in_process(monkeypatch, capsys, "world", "show", path, "--took-part")
     assert said.returncode == 2
-    assert "it is not recorded what took part" in said.stderr
+    assert "does not record which models affected its runs" in said.stderr
     assert said.stderr.count("\n") == 1

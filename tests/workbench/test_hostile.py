@@ -107,7 +107,7 @@ def test_times_that_no_calendar_has_are_damage(run, time):
     run.created().close()
     with sqlite3.connect(run.path) as database:
         database.execute(f"UPDATE event SET time = {time} WHERE id = 2")
-    with RunFile(run.path) as file, pytest.raises(UserError, match="is no date"):
+    with RunFile(run.path) as file, pytest.raises(UserError, match="is not a date"):
         file.events()
     assert RunsFolder(run.path.parent).look()[0].trouble
     assert moment(1e15) == "?"
