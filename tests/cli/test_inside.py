@@ -31,19 +31,19 @@ def written(path, shapes, more=""):
 
 
 @pytest.mark.slow
-def test_what_a_run_has_left_is_reduced_inside_to_the_parts_that_stop_the_robot(tmp_path):
-    """Two posts of one model, among others of it and beside a crate."""
+def test_what_a_run_has_left_is_reduced_inside_to_the_part_that_stops_the_robot(tmp_path):
+    """A post in the robot's way, in one model with others, beside a crate."""
     others = "".join(box(f"far_{number}", 1 + number, 3) for number in range(4))
     crate = f"<model name='crate'><static>true</static><link name='l'>{box('c', 2, -3)}</link></model>"
-    world = written(tmp_path / "yard.sdf", box("left", 2, 0.45) + box("right", 2, -0.45) + others, crate)
+    world = written(tmp_path / "yard.sdf", box("post", 2, 0) + others, crate)
     assert ddenv("run", world, *PLACES, "--output", tmp_path / "whole.ddenv").returncode == 0
     minimal = tmp_path / "minimal.sdf"
     done = ddenv("run", tmp_path / "whole.ddenv", "--inside", "--output", tmp_path / "inside.ddenv", "--json")
-    assert json.loads(done.stdout)["kept"] == ["yard/left", "yard/right"]
+    assert json.loads(done.stdout)["kept"] == ["yard/post"]
     scenario = tmp_path / "minimal.yaml"
     assert ddenv("export", tmp_path / "inside.ddenv", "--output", minimal, "--scenario", scenario).returncode == 0
-    assert [len(model.collisions) for model in read_world(minimal).models] == [1, 2]
-    runs = ddenv("test", scenario, "--runs", 2, "--json")
+    assert [len(model.collisions) for model in read_world(minimal).models] == [1, 1]
+    runs = ddenv("test", scenario, "--repeat", 2, "--json")
     assert {each["outcome"] for each in json.loads(runs.stdout)["runs"]} == {"failed"}, runs.stdout
     is_one_line(ddenv("run", tmp_path / "inside.ddenv", "--inside"), "inside models already")
 

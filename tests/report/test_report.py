@@ -133,9 +133,9 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
 @pytest.mark.programs
 def test_the_nearest_world_that_passes_has_its_map(run, tmp_path):
     fake_moments.isolated(run)
-    text = page(run, tmp_path).text
-    assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in text
-    assert "The nearest world that passes, from above" in text
+    assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in page(run, tmp_path).text
+    # Its caption is read aloud, not shown.
+    assert "The nearest world that passes, from above" in str(content(read_run(run.path)))
 
 
 def test_what_a_removal_drops_stands_in_the_table_of_models(run):

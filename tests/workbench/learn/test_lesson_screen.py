@@ -133,7 +133,7 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
     async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         pane = pilot.app.screen.query_one(LessonPane)
-        assert pane.parent.border_subtitle == "a to c answers it, s skips"
+        assert pane.parent.border_subtitle == "a to c, or ↑ ↓ and enter; s skips"
         assert footer(pilot)[:3] == ["a to c answer", "s skip", "h hint"] and "enter go on" not in footer(pilot)
         await pilot.press("enter")
         assert not pilot.app._notifications, "it would hide the answers"

@@ -154,7 +154,7 @@ async def test_what_cannot_be_done_says_why(several):
         await listed.choose("crates-1")
         await listed.press("d")
         assert isinstance(listed.app.screen, RunsScreen)
-        assert "at work" in listed.notices()[-1]
+        assert "its engine is running" in listed.notices()[-1]
     with pytest.raises(UserError, match="another engine is working"):
         delete_run(several.path)
     assert several.path.exists()
