@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rich.console import RenderableType
 from rich.text import Text
 from textual import events, on
 from textual.app import App, ComposeResult
@@ -22,6 +23,7 @@ from ddenv.text import plain
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
+from ddenv.workbench.terminal.written import Written
 
 if TYPE_CHECKING:
     from ddenv.workbench.map.world_map import WorldMap
@@ -104,6 +106,7 @@ class Workbench(App[int]):
         first: ShowLessons | ShowLesson | ShowRace | None = None,
     ) -> None:
         super().__init__()
+        self._written = Written()
         self._reading = reading
         for theme in OURS:
             self.register_theme(theme)
@@ -143,7 +146,7 @@ class Workbench(App[int]):
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
-        self.app_resume_signal.subscribe(self, lambda _: self.refresh(layout=True))
+        self.app_resume_signal.subscribe(self, lambda _: self._redraw())
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
         if self.is_headless:
@@ -258,6 +261,16 @@ class Workbench(App[int]):
 
     async def action_quit(self) -> None:
         self.action_leave()
+
+    def _redraw(self) -> None:
+        self._written.forget()
+        self.refresh(layout=True)
+
+    def on_resize(self) -> None:
+        self._written.forget()
+
+    def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
+        super()._display(screen, self._written.fewer(renderable))
 
     def on_unmount(self) -> None:
         self._write("\x1b[23;2t")
