@@ -1,7 +1,7 @@
 """Remembers the cells on the terminal, and sends only cells that changed.
 
-A running reduction of the ditch at 120 x 36 sends 3 kB a second with it, and 66 kB without: Textual sends whole rows. This depends on
-two internal classes of Textual, which describe updates; tests/workbench/terminal/test_written.py checks them.
+A running reduction of the ditch at 120 x 36 sends 3 kB a second with it, and 66 kB without: Textual sends whole rows. This depends
+on two internal classes of Textual, which describe updates; tests/workbench/terminal/test_written.py checks them.
 """
 
 from __future__ import annotations
