@@ -78,22 +78,17 @@ def test_links_that_others_name_stay(read, more):
     assert parse_world(text, world.path).elements() == ("house",)
 
 
-def test_models_that_others_stand_relative_to_stay_though_their_parts_go(read):
-    own = f"<link name='l'>{shape('collision', 'd')}</link>"
-    other = f"<model name='on'><pose relative_to='house'>0 0 1 0 0 0</pose><static>true</static>{own}</model>"
-    world = read(house(ROOMS) + other, inside=True)
-    text = without(world, frozenset(name for name in world.elements() if name != "on"))
-    assert parse_world(text, world.path).model("on").pose.position == (0.0, 0.0, 1.0)
-
-
 def test_what_moves_and_what_other_files_hold_stays_whole_and_is_noted(read, tmp_path):
     (tmp_path / "hut.sdf").write_text(f"<sdf version='1.9'>{house(ROOMS).replace('house', 'hut')}</sdf>")
     cart = f"<model name='cart'><link name='l'>{shape('collision', 'a')}{shape('collision', 'b')}</link></model>"
-    world = read(f"{cart}<include><uri>hut.sdf</uri></include>{house(ROOMS)}", inside=True)
-    assert world.elements()[:2] == ("cart", "hut")
+    base = house(ROOMS).replace("house", "base")
+    lamp = f"<model name='lamp'><pose relative_to='base'/><static>1</static><link name='l'>{shape('collision', 'd')}</link></model>"
+    world = read(f"{cart}<include><uri>hut.sdf</uri></include>{base}{lamp}{house(ROOMS)}", inside=True)
+    assert world.elements()[:3] == ("cart", "hut", "lamp")
     whole = {note.model: note.why for note in world.notes if note.what == "--inside"}
     assert "it can move" in whole["cart"]
     assert "ddenv world convert" in whole["hut"]
+    assert "relative to it" in whole["base"]
 
 
 @given(removed=st.sets(st.sampled_from(DITCH.elements())))

@@ -21,13 +21,13 @@ def opened(world: World, root: Element) -> World:
     """`world` with the collisions of its models as models; `root` is the XML of its text."""
     at = {element.start: element for element in root.iter() if element.tag in ("model", "include")}
     models: list[Model] = []
-    shared, notes, anchors = list(world.shared), list(world.notes), set(world.anchors)
+    shared, notes = list(world.shared), list(world.notes)
     for model in world.models:
         element = at[model.spans[0][0]]
         if len(model.collisions) < 2 or is_ground(model):
             models.append(model)
             continue
-        closed = _closed(model, element)
+        closed = _closed(model, element, model.name in world.anchors)
         if closed:
             notes.append(Note("ignored", model.name, place(element), "--inside", f"it stays whole, since {closed}"))
             models.append(model)
@@ -35,16 +35,16 @@ def opened(world: World, root: Element) -> World:
         links = dict(_links(element))
         parts = [part for link in model.links for part in _parts(model, link, links[link.name])]
         models += parts
-        shared += _emptied(model, element, links, parts, model.name in anchors)
-        # Others are placed relative to the model, not to its parts.
-        anchors.discard(model.name)
-    return replace(world, models=tuple(models), shared=tuple(shared), notes=tuple(notes), anchors=frozenset(anchors))
+        shared += _emptied(model, element, links, parts)
+    return replace(world, models=tuple(models), shared=tuple(shared), notes=tuple(notes))
 
 
-def _closed(model: Model, element: Element) -> str:
+def _closed(model: Model, element: Element, is_anchor: bool) -> str:
     """Why a model cannot be opened; "" if it can."""
     if not model.static:
         return "it can move"
+    if is_anchor:
+        return "other models are placed relative to it"
     if element.tag == "include" or element.find(".//include") is not None:
         return "parts of it are in other files; 'ddenv world convert' writes them into one"
     return ""
@@ -87,9 +87,7 @@ def _name(model: Model, link: Link, collision: Collision) -> str:
     return "/".join(words)
 
 
-def _emptied(
-    model: Model, element: Element, links: dict[str, Element], parts: list[Model], anchor: bool
-) -> Iterator[Shared]:
+def _emptied(model: Model, element: Element, links: dict[str, Element], parts: list[Model]) -> Iterator[Shared]:
     """The links and models that go with the last of their parts."""
     spans: dict[Span, set[str]] = {}
     for part in parts:
@@ -100,6 +98,5 @@ def _emptied(
     named = any(one.tag in NAMING or any(map(one.get, REFERENCES)) for one in element.iter())
     if not named and len(model.spans) == 1:
         yield from (Shared(span, frozenset(names)) for span, names in spans.items())
-    if not anchor:
-        whole = frozenset(part.name for part in parts)
-        yield from (Shared(span, whole) for span in model.spans)
+    whole = frozenset(part.name for part in parts)
+    yield from (Shared(span, whole) for span in model.spans)
