@@ -33,7 +33,7 @@ CAMERAS = {
     "rubble": ((-0.3, 0.0, 0.4), 3.9, -28.0, 14.0),
     "friction": ((2.0, -0.4, 0.2), 6.5, -60.0, 34.0),
 }
-LEGEND = ("way of this test", "ghost: the other run", "left out of this test")
+LEGEND = ("path of this test", "ghost: the other run", "left out of this test")
 READY = (
     "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 20"
 )

@@ -1,4 +1,6 @@
-"""What an engine asks before its first test: did those before it die at once, does it compute the same, what rests on what."""
+"""What an engine checks before its first test: whether earlier engines died at once, whether it gets the same results, and which
+models support others.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +89,7 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
 
 
 def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> None:
-    """Finds what rests on what, once. Raises UserError if stacks are to be kept and it cannot be known."""
+    """Finds which models support others, once. Raises UserError if stacks are to be kept together and this cannot be found out."""
     moves = any(model.links and not model.static for model in world.models)
     # A simulator in Python names the models that affected a run, and those that they rest on.
     in_python = scenario.oracle is not None and scenario.oracle.use is not None

@@ -89,8 +89,8 @@ def _closed(journal: Journal, models: Environment, there: Environment) -> Enviro
 
 
 def audit_is_due(state: RunState, phase: str = "") -> bool:
-    """Whether the next implied test has to be simulated: the first one, and then one in so many as the setting says; in the `phase`
-    of a certificate each, while that is cheap.
+    """Whether the next implied test has to be simulated: the first one, then one in `audit`; during the `phase` of a certificate
+    every one, while that is cheap.
     """
     if phase == CERTIFY and _is_cheap(state):
         return True

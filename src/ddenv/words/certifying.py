@@ -33,10 +33,11 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
     if certificate.claims:
         return (_after(certificate), *_now(snapshot, certificate))
     made = fresh_runs_made(state, certificate)
+    done = f"{made} {'is' if made == 1 else 'are'} done"
     return (
         *(() if certificate.seeds else (_bar(state, certificate),)),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
-        f"By the runs so far, this takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} done.",
+        f"By the rate of the whole world, this takes about {usual_runs(state, certificate)}; {done}.",
         *_so_far(state),
         *_now(snapshot, certificate),
     )

@@ -91,7 +91,7 @@ def brief(seconds: float) -> str:
 
 
 def simulated(seconds: float | None, timeout: float) -> str:
-    """How far a running test is, in simulated time: beside real times it has to be told apart from them."""
+    """How far a running test is, in simulated time, marked so that it is not taken for real time."""
     return "" if seconds is None else f" {seconds:.1f}/{timeout:g} s"
 
 
