@@ -65,7 +65,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
         _at_most(certificate),
     )
-    often = rate(most) if bound is None else f"{_seldom(removals)} (at most {percent(bound)} as often)"
+    often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 

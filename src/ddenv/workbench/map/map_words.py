@@ -45,7 +45,7 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
     ("⠒", "the first path"),
     ("⠒ ⠒", "the second path"),
     ("→ ⇒", "their robots"),
-    (PARTING, "they part"),
+    (PARTING, "paths diverge"),
 )
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
