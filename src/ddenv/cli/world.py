@@ -29,6 +29,8 @@ MOST_NAMES = 5
 LONGEST_NAME = 34
 HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes")
 TO_THE_RIGHT = ("links", "yaw")
+# The columns that are left out first where not all fit; the width where all do.
+SPARE, WIDEST = ("links", "shapes", "yaw"), 10_000
 
 # A world, as it is read.
 world_argument = together(
@@ -131,7 +133,7 @@ def _shapes(model: Model) -> Counter[str]:
 def world_lines(world: World, columns: int | None = None) -> list[str]:
     """The table: a line for each model, then the notes by number, then the totals.
 
-    No line is wider than `columns`: cells that do not fit have more lines, or less words.
+    No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
     numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
     by_model: dict[str, dict[str, None]] = {}
@@ -191,15 +193,20 @@ def _row(model: Model, notes: str) -> tuple[str, ...]:
 
 def _table(rows: Iterable[tuple[str, ...]], columns: int | None) -> list[str]:
     from rich.console import Console
+    from rich.measure import Measurement
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, header_style="")
-    for title in HEADER:
-        table.add_column(title, justify="right" if title in TO_THE_RIGHT else "left")
-    for row in rows:
-        table.add_row(*map(Text, row))
-    console = Console(width=columns or 10_000, color_system=None)
+    found, titles, console = list(rows), list(HEADER), Console(width=columns or WIDEST, color_system=None)
+    for spare in (*SPARE, ""):
+        table = Table(box=None, pad_edge=False, header_style="")
+        for title in titles:
+            table.add_column(title, justify="right" if title in TO_THE_RIGHT else "left")
+        for row in found:
+            table.add_row(*(Text(cell) for title, cell in zip(HEADER, row, strict=True) if title in titles))
+        if not spare or Measurement.get(console, console.options.update(width=WIDEST), table).maximum <= console.width:
+            break
+        titles.remove(spare)
     with console.capture() as printed:
         console.print(table)
     return [line.rstrip() for line in printed.get().splitlines()]
