@@ -12,7 +12,7 @@ from dataclasses import asdict
 from ddenv.engine.bench import MOST_BROKEN, WAIT
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failures_of, result_data
+from ddenv.engine.judging import failures_of, motions_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.worker import Broken, Run
@@ -24,6 +24,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runs.changes import beside
 from ddenv.world.extent import center
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario, seed_of
@@ -102,6 +103,8 @@ class _Search:
         self._running: dict[int, Wanted] = {}
         self._kept = frozenset(journal.state.environments[self._now.asked.environment].names(journal.state.elements))
         self._submitted, self._broken = len(journal.state.tests), 0
+        left = beside(journal.state)
+        self._beside = None if left is None else left.run
         # How many looks at a number are over: the second one has the runs that are left.
         self._looks = 0
         # The values of the current number that are known to be possible.
@@ -190,7 +193,9 @@ class _Search:
     def _record(self, one: Wanted, result: RunResult | Broken) -> None:
         data, seed = result_data(result, self._failures), seed_of(self._parts[0].reduction, one[2])
         kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
-        self._journal.record(events.MarginRan(*one, seed, **kept))
+        # Of each value, the run that can be played beside one of what is left.
+        motions = motions_of(result) if one[2] == self._beside else None
+        self._journal.record(events.MarginRan(*one, seed, **kept), motions, -1 - self._now.made)
         self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(f"{self._broken} runs in a row broke; the last one: {data['failure']}")

@@ -52,7 +52,7 @@ def export_world(
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
     if margin is not None:
-        number, value = _margin(state, numbers_of(scenario, world, machine, state.environment), margin, run)
+        number, value = margin_given(state, numbers_of(scenario, world, machine, state.environment), margin, run)
         if scenario_file is None and number in OF_SCENARIO:
             raise UserError(
                 f"--margin: {number} is a number of the scenario, not of the world: also give --scenario FILE"
@@ -88,7 +88,7 @@ def export_world(
     return Exported([sdf, model, scenario_file], needs)
 
 
-def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:
+def margin_given(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:
     """The number that is meant, and its new value. Raises UserError."""
     name, _, given = margin.partition("=")
     if name not in numbers:

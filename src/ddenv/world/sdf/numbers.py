@@ -244,18 +244,24 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     return after
 
 
-def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: str, value: float) -> bytes:
-    """The text with a model in another place."""
+def move_of(model: Model, what: str, value: float) -> Pose:
+    """How a model moves in the world where one of its x, y, z (m) and yaw (rad) has this value; not at all for other numbers."""
     turn = value - model.pose.yaw() if what == "yaw" else 0.0
     x, y, z = (value if axis == what else now for axis, now in zip("xyz", model.pose.position, strict=True))
+    return Pose.from_rpy(x, y, z, 0.0, 0.0, turn) @ Pose(model.pose.position).inverse()
+
+
+def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: str, value: float) -> bytes:
+    """The text with a model in another place."""
     pose = at.find("pose")
     words = [] if pose is None else (pose.text or "").split()
     if pose is not None and not pose.attrib and len(words) == 6 and len(model.spans) == 1:
         # A turn about the vertical is the last one of roll, pitch and yaw.
-        place, now = (5, float(words[5]) + turn) if what == "yaw" else ("xyz".index(what), value)
+        turned = float(words[5]) + value - model.pose.yaw()
+        place, now = (5, turned) if what == "yaw" else ("xyz".index(what), value)
         words[place] = f"{now:.9g}"
         return edited(world.text, [_said(world.text, pose, " ".join(words))])
-    move = Pose.from_rpy(x, y, z, 0.0, 0.0, turn) @ Pose(model.pose.position).inverse()
+    move = move_of(model, what, value)
     return with_places(world, {model.name: [move @ link.pose for link in model.links]}, scenario.reading)[0]
 
 

@@ -1,0 +1,113 @@
+"""Runs with a changed number beside one of what is left with the same seed: as tests that can be played, compared and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from ddenv.errors import UserError
+from ddenv.evidence.margins import MOST_RUNS, Margin
+from ddenv.runfile.events import MarginRan
+from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.store import RunFile
+from ddenv.runs.reasons import F, Parting, parted
+from ddenv.words.margins import rows
+from ddenv.world.model import Model, World
+from ddenv.world.pose import Pose
+from ddenv.world.sdf.numbers import move_of
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A model that has `moved` to a limit, seen from above, and the verdict on it: "f", "goal", "other" or "impossible"."""
+
+    verdict: str
+    model: Model
+    moved: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A number with another `value`, at a limit of its margin, as `sentence` says; `share` of its scale away. `parting` compares
+    two runs with one seed, of what is left as it is and with that value; None where no such pair is stored.
+
+    `limits` are those up to which its model may move, if the number is a place.
+    """
+
+    name: str
+    value: float
+    share: float
+    verdict: str
+    sentence: str
+    parting: Parting | None
+    limits: tuple[Limit, ...]
+
+
+def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change, ...]:
+    """A change for each number with a limit: to the nearest value at which the robot reaches its goal, or else f is gone."""
+    margins = state.margins
+    if margins is None:
+        return ()
+    by_name = {} if world is None else {model.name: model for model in world.models}
+    found = []
+    for row in rows(margins):
+        one = row.margin
+        limits = [
+            value for side in one.sides for value in (side.goal, side.gone) if value is not None and value.outcomes
+        ]
+        if limits:
+            value = min(limits, key=lambda each: (each.verdict != "goal", abs(each.value - one.asked.now)))
+            parting = _parting(file, state, one.asked.name, value.value)
+            moved = tuple(_limits(by_name, one))
+            share = abs(value.value - one.asked.now) / one.asked.scale
+            found.append(Change(one.asked.name, value.value, share, value.verdict, f"{row.sentence}.", parting, moved))
+    return tuple(found)
+
+
+def _limits(models: Mapping[str, Model], one: Margin) -> Iterator[Limit]:
+    owner, _, what = one.asked.name.rpartition(".")
+    if owner in models and what in ("x", "y", "yaw"):
+        for value in (each for side in one.sides for each in (side.until, side.goal or side.gone) if each is not None):
+            yield Limit(value.verdict, models[owner], move_of(models[owner], what, value.value))
+
+
+def beside(state: RunState) -> Test | None:
+    """The run of what is left that shows f and with which those with changed numbers are compared; None if there is none."""
+    margins = state.margins
+    there = margins and margins.asked.environment
+    tests = (test for test in state.tests if test.environment == there and test.outcome == F and test.run < MOST_RUNS)
+    return min(tests, key=lambda test: test.run, default=None)
+
+
+def run_with(state: RunState, number: int) -> MarginRan:
+    """The run with a changed number that has this negative `number` in the file. Raises UserError."""
+    margins = state.margins
+    place = -1 if margins is None else -number - 1 - margins.earlier
+    if margins is None or not 0 <= place < len(margins.runs):
+        raise UserError(f"there is no run {-number} with a changed number")
+    return margins.runs[place]
+
+
+def changed_run(state: RunState, number: int) -> tuple[Test, str]:
+    """The same run as a test, and what was changed. Raises UserError."""
+    one, environment = run_with(state, number), 0 if state.margins is None else state.margins.asked.environment
+    ended = one.outcome, one.failure, one.distance, one.end_pose
+    test = Test(number, environment, "margin", None, None, one.run, one.seed, *ended)
+    return test, f"{one.name} = {one.value:.4g}"
+
+
+def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:
+    left, margins = beside(state), state.margins
+    if left is None or margins is None:
+        return None
+    numbers = (
+        -1 - margins.earlier - place
+        for place, one in enumerate(margins.runs)
+        if (one.name, one.value, one.run) == (name, value, left.run)
+    )
+    try:
+        number = next(numbers)
+        equal, apart, place = parted(file.trajectory(left.id), file.trajectory(number))
+    except (StopIteration, UserError):
+        return None
+    return Parting(left.id, number, left.seed, equal, apart, place, None, False)
