@@ -67,7 +67,7 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
 def _limits(models: Mapping[str, Model], one: Margin) -> Iterator[Limit]:
     owner, _, what = one.asked.name.rpartition(".")
     if owner in models and what in ("x", "y", "yaw"):
-        for value in (each for side in one.sides for each in (side.until, side.goal or side.gone) if each is not None):
+        for value in (each for side in one.sides for each in (side.until, side.gone) if each is not None):
             yield Limit(value.verdict, models[owner], move_of(models[owner], what, value.value))
 
 

@@ -47,7 +47,7 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
     ("→ ⇒", "their robots"),
     (PARTING, "they part"),
 )
-LIMITS = ("▭", "how far it may move")
+LIMITS = ("▭", "limits")
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
@@ -75,12 +75,12 @@ def legend(shown: Shown, width: int) -> Text:
 def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
     for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
         yield sign, way.name
+    if shown.limits:
+        yield LIMITS
     if shown.parting is not None:
         yield PARTED
     if shown.apart is not None:
         yield shown.apart
-    if shown.limits:
-        yield LIMITS
     yield from (each for each in LEGEND if each[0] in "SG×·#")
 
 

@@ -190,7 +190,8 @@ class WhyScreen(Screen[None]):
             self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
             return
         beyond = f" · {more} more are not listed" if more else ""
-        self.query_one("#why-models").border_title = Text(f"Without each model{beyond}")
+        numbers = ", and with other numbers" if found[-1].figures else ""
+        self.query_one("#why-models").border_title = Text(f"Without each model{numbers}{beyond}")
         self._list()
 
     def _list(self) -> None:
