@@ -56,16 +56,16 @@ def test_command(
     **given: Any,
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
-    from ddenv.engine.single_test import changes_of, plan, run_trials
+    from ddenv.engine.single_test import plan, run_trials
+    from ddenv.runs.export import with_margin
 
     planned = {name: given.pop(name) for name in PLANNED}
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     results = []
     with ExitStack() as robots:
         what = _subject(subject, given, simulator, trust, robots)
-        trials = plan(what, keep=names, **planned)
-        changes = () if margin is None else changes_of(what, trials, margin)
-        for result in run_trials(what, trials, jobs, changes):
+        what = what if margin is None else with_margin(what, margin)
+        for result in run_trials(what, plan(what, keep=names, **planned), jobs):
             results.append(result)
             if not as_json:
                 print(line(result), flush=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
-from ddenv.engine.worker import Changes, Run
+from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
@@ -19,12 +19,10 @@ from ddenv.robot.oracle import Failure
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
-from ddenv.runs.export import margin_given
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import count
 from ddenv.world.scenario import Oracle, seed_of
-from ddenv.world.sdf.numbers import NotPossible, check, numbers_of
 
 
 @dataclass(frozen=True)
@@ -96,21 +94,7 @@ def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
     return state.models_of(test), test.seed
 
 
-def changes_of(subject: Subject, trials: list[Trial], margin: str) -> Changes:
-    """The change that NUMBER or NUMBER=VALUE means in a run. Raises UserError, also if a trial cannot have it."""
-    if subject.run is None or subject.state is None:
-        raise UserError("--margin: needs a run; a scenario has no margins yet")
-    parts = subject.scenario, subject.world, subject.robot
-    name, value = margin_given(subject.state, numbers_of(*parts, subject.elements), margin, subject.run)
-    for keep in {trial.keep for trial in trials}:
-        try:
-            check(*parts, keep, name, value)
-        except NotPossible as error:
-            raise UserError(f"--margin: {name} cannot be {value:g}: {error}") from None
-    return ((name, value),)
-
-
-def run_trials(subject: Subject, trials: list[Trial], jobs: int, changes: Changes = ()) -> Iterator[dict[str, Any]]:
+def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
     """Makes the runs in worker processes; yields the result of each, in order, as plain data. Without f a failed run is just
     "failed".
     """
@@ -121,7 +105,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int, changes: Change
     try:
         while shown < len(trials):
             while pool.idle and started < len(trials):
-                pool.submit(started, Run(trials[started].keep, trials[started].seed, changes=changes))
+                pool.submit(started, Run(trials[started].keep, trials[started].seed))
                 started += 1
             for index, result in pool.finished(1.0):
                 trial = trials[index]

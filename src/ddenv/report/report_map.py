@@ -86,7 +86,7 @@ def picture(
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS
     drawn = {way: path for way, samples in ways.items() if (path := _way(samples, frame))}
-    outlines = [(LIMITS[each.verdict], ring) for each in limits for ring in rings(each.model, each.moved)]
+    outlines = [(LIMITS[verdict], ring) for verdict, model, moved in limits for ring in rings(model, moved)]
     shown = {*sorts.values(), *drawn, *places, *(sign for sign, _ in outlines)}
     legend = [name for name in WORDS if name in shown]
     bottom = float(frame.box[3]) + AXIS

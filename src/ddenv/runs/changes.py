@@ -10,20 +10,14 @@ from ddenv.evidence.margins import MOST_RUNS, Margin
 from ddenv.runfile.events import MarginRan
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
-from ddenv.runs.reasons import F, Parting, parted
+from ddenv.runs.reasons import F, Parting, parted, parting_words
 from ddenv.words.margins import rows
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.numbers import move_of
 
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """A model that has `moved` to a limit, seen from above, and the verdict on it: "f", "goal", "other" or "impossible"."""
-
-    verdict: str
-    model: Model
-    moved: Pose
+# A model that has moved to a limit: the verdict there, such as "f", the model, and how it has moved.
+Limit = tuple[str, Model, Pose]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,23 +46,22 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
     found = []
     for row in rows(margins):
         one = row.margin
-        limits = [
-            value for side in one.sides for value in (side.goal, side.gone) if value is not None and value.outcomes
-        ]
+        limits = [value for side in one.sides for value in (side.goal, side.gone) if value and value.outcomes]
         if limits:
             value = min(limits, key=lambda each: (each.verdict != "goal", abs(each.value - one.asked.now)))
             parting = _parting(file, state, one.asked.name, value.value)
             moved = tuple(_limits(by_name, one))
             share = abs(value.value - one.asked.now) / one.asked.scale
-            found.append(Change(one.asked.name, value.value, share, value.verdict, f"{row.sentence}.", parting, moved))
+            words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
+            found.append(Change(one.asked.name, value.value, share, value.verdict, words, parting, moved))
     return tuple(found)
 
 
 def _limits(models: Mapping[str, Model], one: Margin) -> Iterator[Limit]:
     owner, _, what = one.asked.name.rpartition(".")
     if owner in models and what in ("x", "y", "yaw"):
-        for value in (each for side in one.sides for each in (side.until, side.gone) if each is not None):
-            yield Limit(value.verdict, models[owner], move_of(models[owner], what, value.value))
+        for value in (each for side in one.sides for each in (side.until, side.gone) if each):
+            yield value.verdict, models[owner], move_of(models[owner], what, value.value)
 
 
 def beside(state: RunState) -> Test | None:
@@ -79,35 +72,23 @@ def beside(state: RunState) -> Test | None:
     return min(tests, key=lambda test: test.run, default=None)
 
 
-def run_with(state: RunState, number: int) -> MarginRan:
-    """The run with a changed number that has this negative `number` in the file. Raises UserError."""
+def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
+    """The run with a changed number that has this negative `number` in the file, also as a test. Raises UserError."""
     margins = state.margins
     place = -1 if margins is None else -number - 1 - margins.earlier
     if margins is None or not 0 <= place < len(margins.runs):
         raise UserError(f"there is no run {-number} with a changed number")
-    return margins.runs[place]
-
-
-def changed_run(state: RunState, number: int) -> tuple[Test, str]:
-    """The same run as a test, and what was changed. Raises UserError."""
-    one, environment = run_with(state, number), 0 if state.margins is None else state.margins.asked.environment
+    one = margins.runs[place]
     ended = one.outcome, one.failure, one.distance, one.end_pose
-    test = Test(number, environment, "margin", None, None, one.run, one.seed, *ended)
-    return test, f"{one.name} = {one.value:.4g}"
+    return one, Test(number, margins.asked.environment, "margin", None, None, one.run, one.seed, *ended)
 
 
 def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:
     left, margins = beside(state), state.margins
     if left is None or margins is None:
         return None
-    numbers = (
-        -1 - margins.earlier - place
-        for place, one in enumerate(margins.runs)
-        if (one.name, one.value, one.run) == (name, value, left.run)
-    )
-    try:
-        number = next(numbers)
-        equal, apart, place = parted(file.trajectory(left.id), file.trajectory(number))
-    except (StopIteration, UserError):
-        return None
-    return Parting(left.id, number, left.seed, equal, apart, place, None, False)
+    for place, one in enumerate(margins.runs):
+        number = -1 - margins.earlier - place
+        if (one.name, one.value, one.run) == (name, value, left.run) and (samples := file.motion(number)):
+            return Parting(left.id, number, left.seed, *parted(file.trajectory(left.id), samples), None, False)
+    return None

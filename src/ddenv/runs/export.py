@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,14 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import removed_in_passing
-from ddenv.runs.subject import RESOURCE, read_parts
+from ddenv.runs.subject import RESOURCE, Subject, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
 from ddenv.world.access import Missing, Unusable, check_ending, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
-from ddenv.world.sdf.numbers import OF_SCENARIO, NotPossible, Number, changed, numbers_of
+from ddenv.world.sdf.numbers import NotPossible, Number, changed, numbers_of
 from ddenv.world.sdf.read import parse_model, parse_world
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
@@ -52,15 +52,10 @@ def export_world(
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
     if margin is not None:
-        number, value = margin_given(state, numbers_of(scenario, world, machine, state.environment), margin, run)
-        if scenario_file is None and number in OF_SCENARIO:
-            raise UserError(
-                f"--margin: {number} is a number of the scenario, not of the world: also give --scenario FILE"
-            )
-        try:
-            scenario, world = changed(scenario, world, {number: value})
-        except NotPossible as error:
-            raise UserError(f"--margin: {number} cannot be {value:g}: {error}") from None
+        there = with_margin(Subject(scenario, world, machine, run, state), margin)
+        if scenario_file is None and there.scenario != scenario:
+            raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
+        scenario, world = there.scenario, there.world
     try:
         text = without(world, removed)
     except ValueError as error:
@@ -88,7 +83,20 @@ def export_world(
     return Exported([sdf, model, scenario_file], needs)
 
 
-def margin_given(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:
+def with_margin(subject: Subject, margin: str) -> Subject:
+    """A run's world and scenario with the change that NAME or NAME=VALUE means. Raises UserError."""
+    if subject.run is None or subject.state is None:
+        raise UserError("--margin: needs a run; a scenario has no margins yet")
+    scenario, world, state = subject.scenario, subject.world, subject.state
+    name, value = _margin(state, numbers_of(scenario, world, subject.robot, state.environment), margin, subject.run)
+    try:
+        scenario, world = changed(scenario, world, {name: value})
+    except NotPossible as error:
+        raise UserError(f"--margin: {name} cannot be {value:g}: {error}") from None
+    return replace(subject, scenario=scenario, world=world)
+
+
+def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:
     """The number that is meant, and its new value. Raises UserError."""
     name, _, given = margin.partition("=")
     if name not in numbers:

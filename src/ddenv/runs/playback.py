@@ -57,7 +57,8 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     """The finished test with this number. Raises UserError if there is none; what the file lacks of it is said in `lacks`."""
     tests = position.end.tests
     if number < 0:
-        test, words = changed_run(position.end, number)
+        one, test = changed_run(position.end, number)
+        words = f"{one.name} = {one.value:.4g}"
     elif 0 < number <= len(tests):
         test = tests[number - 1]
     else:

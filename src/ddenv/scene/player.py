@@ -18,7 +18,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runfile.tested import Wanted, made_for
-from ddenv.runs.changes import changed_run, changes, run_with
+from ddenv.runs.changes import changed_run, changes
 from ddenv.runs.playback import played
 from ddenv.runs.reasons import Parting, nearest, reasons
 from ddenv.runs.subject import read_parts
@@ -158,7 +158,7 @@ class Player:
     def _moved(self, number: int) -> list[bytes]:
         """The messages that draw where the changed model stands in a run with a changed number."""
         scenario, world, _ = read_parts(self._run)
-        one = run_with(self._state, number)
+        one, _ = changed_run(self._state, number)
         owner = one.name.rpartition(".")[0]
         if owner not in self._elements:
             return []
@@ -168,9 +168,9 @@ class Player:
     def _shot_of(self, test: int) -> Shot:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
         if test < 0:
-            one, words = changed_run(self._state, test)
+            run, one = changed_run(self._state, test)
             found = shot_of_test(self._state, "replay", one)
-            return replace(found, title=f"{words} · {one.outcome}")
+            return replace(found, title=f"{run.name} = {run.value:.4g} · {one.outcome}")
         start, state = self._position.start_of(test), self._state
         if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")

@@ -16,17 +16,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
 from ddenv.runs.changes import changes
 from ddenv.runs.folder import attach_name
-from ddenv.runs.reasons import (
-    Nearest,
-    Parting,
-    Reason,
-    nearest,
-    no_reasons,
-    parting_sentence,
-    parting_words,
-    reasons,
-    sentence,
-)
+from ddenv.runs.reasons import Nearest, Parting, Reason, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.runs.subject import read_parts
 from ddenv.text import as_sentence, padded, percent, plain, shortened
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
@@ -89,14 +79,13 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
 
     snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
     for one in changes(file, state, read_parts(file)[1]):
-        value, given = f"{one.value:.4g}", f"--margin {one.name}={one.value:.9g}"
-        again = f"To run it again: ddenv test {run} --minimal {given} --repeat 10"
-        export = f"To write that world: ddenv export {run} {given} --output changed.sdf"
-        parting = parting_words(one.parting, "", "")
-        limits = tuple((limit.verdict, ring) for limit in one.limits for ring in rings(limit.model, limit.moved))
-        figures = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}"
-        more, ways = (parting, again, export), ("now", f"at {value}")
-        yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
+        value, given = f"{one.value:.4g}", f"{run} --margin {one.name}={one.value:.9g}"
+        again = (
+            f"Again: ddenv test --minimal {given} --repeat 10\nAs a world: ddenv export {given} --output changed.sdf"
+        )
+        limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
+        figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
+        yield Entry(one.name, "", (), one.sentence, (again,), one.parting, ways, snapshot, None, limits, figures)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
