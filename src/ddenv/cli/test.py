@@ -36,7 +36,9 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 )
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
-@click.option("--margin", metavar="NUMBER[=VALUE]", help="Change this number, as 'ddenv export --margin' does.")
+@click.option(
+    "--margin", multiple=True, metavar="NUMBER[=VALUE]", help="Change a number, as 'ddenv export --margin' does."
+)
 @click.option("--seed", type=options.whole(0, 2**31), help="Seed of the first run; the next ones count up from it.")
 @click.option("--repeat", type=options.whole(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
 @click.option(
@@ -48,7 +50,7 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 def test_command(
     subject: str,
     keep: str | None,
-    margin: str | None,
+    margin: tuple[str, ...],
     simulator: Path | None,
     jobs: int,
     trust: bool,
@@ -57,14 +59,14 @@ def test_command(
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
     from ddenv.engine.single_test import plan, run_trials
-    from ddenv.runs.export import with_margin
+    from ddenv.runs.export import with_margins
 
     planned = {name: given.pop(name) for name in PLANNED}
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     results = []
     with ExitStack() as robots:
         what = _subject(subject, given, simulator, trust, robots)
-        what = what if margin is None else with_margin(what, margin)
+        what = with_margins(what, margin)
         for result in run_trials(what, plan(what, keep=names, **planned), jobs):
             results.append(result)
             if not as_json:

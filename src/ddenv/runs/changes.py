@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
-from ddenv.evidence.margins import MOST_RUNS, Margin
+from ddenv.evidence.margins import MOST_RUNS, Margin, changes_at
 from ddenv.runfile.events import MarginRan
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
@@ -22,15 +22,15 @@ Limit = tuple[str, Model, Pose]
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A number with another `value`, at a limit of its margin, as `sentence` says; `share` of its scale away. `parting` compares
-    two runs with one seed, of what is left as it is and with that value; None where no such pair is stored.
-
-    `limits` are those up to which its model may move, if the number is a place.
+    """A number with another `value`, `share` of its scale away, at a limit of its margin, as `sentence` says; it means `changes` of
+    numbers to values. `parting` compares two runs with one seed, of what is left as it is and with that value; None where no such
+    pair is stored. `limits` are those up to which its model may move, if the number is a place.
     """
 
     name: str
     value: float
     share: float
+    changes: tuple[tuple[str, float], ...]
     verdict: str
     sentence: str
     parting: Parting | None
@@ -53,7 +53,8 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
             moved = tuple(_limits(by_name, one))
             share = abs(value.value - one.asked.now) / one.asked.scale
             words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
-            found.append(Change(one.asked.name, value.value, share, value.verdict, words, parting, moved))
+            to = changes_at(one.asked, value.value)
+            found.append(Change(one.asked.name, value.value, share, to, value.verdict, words, parting, moved))
     return tuple(found)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -36,11 +36,11 @@ class Exported:
 
 
 def export_world(
-    run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margin: str | None = None
+    run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margins: Sequence[str] = ()
 ) -> Exported:
     """Writes the current environment of a run, or the nearest world that `passes`, to `sdf`, and a scenario for it if asked.
 
-    With a `margin`, NAME or NAME=VALUE, that number is changed: to the value nearest to the present one at which the robot
+    With `margins`, NAME or NAME=VALUE, these numbers are changed: to the value nearest to the present one at which the robot
     reaches its goal if no other is given. Raises UserError.
     """
     with RunFile(run) as file:
@@ -51,11 +51,10 @@ def export_world(
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
-    if margin is not None:
-        there = with_margin(Subject(scenario, world, machine, run, state), margin)
-        if scenario_file is None and there.scenario != scenario:
-            raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
-        scenario, world = there.scenario, there.world
+    there = with_margins(Subject(scenario, world, machine, run, state), margins)
+    if scenario_file is None and there.scenario != scenario:
+        raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
+    scenario, world = there.scenario, there.world
     try:
         text = without(world, removed)
     except ValueError as error:
@@ -83,16 +82,17 @@ def export_world(
     return Exported([sdf, model, scenario_file], needs)
 
 
-def with_margin(subject: Subject, margin: str) -> Subject:
-    """A run's world and scenario with the change that NAME or NAME=VALUE means. Raises UserError."""
-    if subject.run is None or subject.state is None:
-        raise UserError("--margin: needs a run; a scenario has no margins yet")
+def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
+    """A run's world and scenario with the changes that `margins`, each NAME or NAME=VALUE, mean. Raises UserError."""
     scenario, world, state = subject.scenario, subject.world, subject.state
-    name, value = _margin(state, numbers_of(scenario, world, subject.robot, state.environment), margin, subject.run)
-    try:
-        scenario, world = changed(scenario, world, {name: value})
-    except NotPossible as error:
-        raise UserError(f"--margin: {name} cannot be {value:g}: {error}") from None
+    for margin in margins:
+        if subject.run is None or state is None:
+            raise UserError("--margin: needs a run; a scenario has no margins yet")
+        name, value = _margin(state, numbers_of(scenario, world, subject.robot, state.environment), margin, subject.run)
+        try:
+            scenario, world = changed(scenario, world, {name: value})
+        except NotPossible as error:
+            raise UserError(f"--margin: {name} cannot be {value:g}: {error}") from None
     return replace(subject, scenario=scenario, world=world)
 
 

@@ -79,7 +79,7 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
 
     snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
     for one in changes(file, state, read_parts(file)[1]):
-        value, given = f"{one.value:.4g}", f"{run} --margin {one.name}={one.value:.9g}"
+        value, given = f"{one.value:.4g}", " ".join([run, *(f"--margin {name}={to:.9g}" for name, to in one.changes)])
         again = (
             f"Again: ddenv test --minimal {given} --repeat 10\nAs a world: ddenv export {given} --output changed.sdf"
         )

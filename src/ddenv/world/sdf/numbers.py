@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import product
 from typing import Any
 
 from pydantic import ValidationError
@@ -200,22 +201,20 @@ def part_of(
     return scenario.model_copy(update={"whole": whole}), world
 
 
-def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], name: str, value: float) -> None:
-    """Raises NotPossible if a number cannot have a value: then the robot stands in a model at its start, or a changed model in
+def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], changes: Mapping[str, float]) -> None:
+    """Raises NotPossible if numbers cannot have these values: then the robot stands in a model at its start, or a changed model in
     another one that it did not stand in.
     """
     try:
-        there, after = part_of(scenario, world, kept, {name: value})
+        there, after = part_of(scenario, world, kept, changes)
         found = stands_inside(after, robot, there.robot.spawn)
     except UserError as error:
         raise NotPossible(str(error)) from None
     if found is not None:
         raise NotPossible(found[0])
-    owner = name.rpartition(".")[0]
-    if name in OF_SCENARIO or owner not in kept:
-        return
-    before, model = world.model(owner), after.model(owner)
-    for other in after.models:
+    owners = {name.rpartition(".")[0] for name in changes if name not in OF_SCENARIO} & kept
+    for owner, other in product(sorted(owners), after.models):
+        before, model = world.model(owner), after.model(owner)
         # What stands on the ground may sink into it, and two that never move push nothing apart.
         if other.name == owner or (model.static and is_ground(other)):
             continue
