@@ -47,6 +47,7 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
     ("→ ⇒", "their robots"),
     (PARTING, "paths diverge"),
 )
+LIMITS = ("▭", "limits")
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
@@ -64,7 +65,7 @@ def legend(shown: Shown, width: int) -> Text:
     signs = [sign for sign, there in meanings.items() if there]
     usual = LEGEND if state.elements else LEGEND[:2]
     text = Text(no_wrap=True, overflow="ellipsis")
-    for sign, meaning in _of_ways(shown) if shown.ways else (*signs, *usual):
+    for sign, meaning in _of_ways(shown) if shown.ways or shown.limits else (*signs, *usual):
         if text.cell_len + len(sign) + len(meaning) + 3 > width:
             break
         text.append(sign, "bold").append(f" {meaning}  ", "dim")
@@ -74,6 +75,8 @@ def legend(shown: Shown, width: int) -> Text:
 def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
     for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
         yield sign, way.name
+    if shown.limits:
+        yield LIMITS
     if shown.parting is not None:
         yield PARTED
     if shown.apart is not None:
