@@ -117,7 +117,9 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
-    return with_remembered(scenario, announce) if remembered else scenario
+    if not remembered:
+        return scenario
+    return scenario.model_copy(update={"reading": with_remembered(scenario.world, read_as, announce)})
 
 
 def reading_of(
