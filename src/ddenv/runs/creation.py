@@ -11,8 +11,8 @@ from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.export import renamed
-from ddenv.runs.folder import run_path
-from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, named, read_parts, scenario_named
+from ddenv.runs.folder import named, run_path
+from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts, scenario_named
 from ddenv.runs.trust import check_cluster, check_named, trust_cluster, trusted_scenario
 from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.files.resources import Resources
