@@ -161,8 +161,7 @@ class RunState:
     @property
     def f_test(self) -> Test | None:
         """The test whose end is f in the current node; None until f is fixed."""
-        known = self.failures and 0 < self.failures[0] <= len(self.tests)
-        return self.tests[self.failures[0] - 1] if known else None
+        return next(iter(self.tests_of(self.failures[:1])), None)
 
     @property
     def f_position(self) -> Place | None:
