@@ -59,13 +59,18 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
     if kind != "run":
         scenario = scenario_named(name, given, announce)
         return Subject(scenario, *load_parts(scenario))
-    if any(value is not None and value != () for option, value in given.items() if option != "remembered"):
+    if has_options(given):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
             "a run keeps its own"
         )
     with RunFile(path) as file:
         return read_subject(file)
+
+
+def has_options(given: Mapping[str, Any], *but: str) -> bool:
+    """Whether any of these options was given, `but` some."""
+    return any(value is not None and value != () for name, value in given.items() if name not in ("remembered", *but))
 
 
 # From files and options.
