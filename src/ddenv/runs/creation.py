@@ -11,14 +11,13 @@ from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.export import renamed
-from ddenv.runs.folder import run_path
+from ddenv.runs.folder import named, run_path
 from ddenv.runs.subject import (
     RESOURCE,
     Announce,
     check_parts,
     has_options,
     load_parts,
-    named,
     read_parts,
     scenario_named,
 )

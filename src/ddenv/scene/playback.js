@@ -256,7 +256,7 @@ async function offer() {
   place("test").max = found.tests;
   while (which.options.length > 1) which.remove(1);
   for (const [number, one] of found.pairs.entries()) {
-    const option = new Option(`with and ${one.title}`, number);
+    const option = new Option(one.title, number);
     option.pair = one;
     which.add(option);
   }

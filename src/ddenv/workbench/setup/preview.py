@@ -18,7 +18,6 @@ from textual.widgets import Static
 from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
-from ddenv.map.raster import arrow
 from ddenv.runs.remedies import remember_remedies
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
@@ -238,6 +237,8 @@ class Preview(Vertical):
         return {"spawn_yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
 
     def _show_picking(self) -> None:
+        from ddenv.map.raster import arrow
+
         line, what = self.query_one("#picking", Static), self.picked_next
         line.set_class(bool(what), "-on")
         text = Text(no_wrap=True, overflow="ellipsis")
