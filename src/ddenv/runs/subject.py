@@ -18,7 +18,7 @@ from ddenv.runs.folder import named
 from ddenv.runs.remedies import with_remembered
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
-from ddenv.world.access import is_world, read_bytes, write_file
+from ddenv.world.access import is_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
@@ -126,7 +126,7 @@ def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], go
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
         "name": world.stem.removesuffix(".dmd")[:80] or "world",
-        "world": str(world.resolve()),
+        "world": str(resolved(world)),
         "robot": {
             "model": str(SDF / "robots" / "husky.sdf"),
             "spawn": dict(zip(("x", "y", "z", "yaw"), spawn, strict=True)),
