@@ -60,9 +60,9 @@ class Footprint:
         return min(_distance(polygon, np.array(point)) for polygon in self.polygons)
 
 
-def footprints(world: World, corners: int = ROUND) -> tuple[Footprint, ...]:
+def footprints(world: World) -> tuple[Footprint, ...]:
     """Footprints of all models except the ground, the largest first, so that small ones are drawn on top."""
-    prints = [footprint(model, corners) for model in world.models if not is_ground(model)]
+    prints = [footprint(model) for model in world.models if not is_ground(model)]
     return tuple(sorted(prints, key=lambda each: -each.area))
 
 

@@ -241,9 +241,9 @@ class RunFile:
         with self._writing() as db:
             return _insert(db, "command", kind, data, time.time())
 
-    def motion(self, test: int, model: str = ROBOT) -> array[float] | None:
-        """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
-        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (self._made(test), model))
+    def motion(self, test: int) -> array[float] | None:
+        """Samples of the robot in a finished test, flat rows of `COLUMNS` floats."""
+        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (self._made(test), ROBOT))
         return None if row is None else _floats(row[0], self.path)
 
     def trajectory(self, test: int) -> array[float]:
