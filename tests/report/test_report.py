@@ -198,7 +198,9 @@ STATES = {
 @pytest.mark.parametrize("told", STATES)
 def test_a_run_that_has_not_come_to_an_end_says_so(run, tmp_path, told):
     STATES[told](run)
-    assert told in page(run, tmp_path).text
+    text = page(run, tmp_path).text
+    # Which tests idle workers made in vain is not known yet.
+    assert told in text and "idle workers" not in text
 
 
 def test_of_a_damaged_run_what_makes_sense_is_told(run, tmp_path):
