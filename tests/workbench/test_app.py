@@ -66,6 +66,7 @@ async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs)
 async def test_a_model_is_a_command_of_the_setup_screen_too(scenarios):
     async with Opened((80, 24)) as session:
         world = session.screen.query_one(WorldMap)
+        await session.press("f4")
         assert not world.is_on_screen
         hits = [hit async for hit in Commands(session.screen).search("crate_01")]
         assert [hit.text for hit in hits] == ["go to crate_01 on the map"]
