@@ -11,7 +11,7 @@ from ddenv.cli import options
 from ddenv.cli.run import idle_run
 from ddenv.cli.terminal import announce, say
 from ddenv.errors import UserError
-from ddenv.runs.folder import find_run
+from ddenv.runs.folder import attach_name, find_run
 
 
 @click.command("why")
