@@ -64,7 +64,7 @@ def _can_be_opened(word: str) -> bool:
     path = Path(word)
     if path.suffix or len(path.parts) > 1 or path.exists():
         return True
-    from ddenv.runs.subject import named
+    from ddenv.runs.folder import named
 
     return named(word) is not None
 

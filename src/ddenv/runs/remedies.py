@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.runs.remembered import read_state, state_file, write_state
 from ddenv.text import first_of, shortened
 from ddenv.world.access import MissingFiles, is_folder, without_tilde
-from ddenv.world.scenario import Reading
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Reading
 
 REMEDIES = "remedies.json"
 # Maximum numbers of URIs that are kept, and that a line names, and the maximum width of each in cells.

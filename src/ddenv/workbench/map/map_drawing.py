@@ -230,9 +230,11 @@ def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[in
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
     layers, snapshot = shown.layers, shown.snapshot
-    if shown.ways:
+    signs = {"f": palette.failure, "goal": palette.goal}
+    limits = [(ring, signs.get(verdict, palette.shade(DULL)), 0) for verdict, ring in shown.limits]
+    if shown.ways or limits:
         both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
-        return [(way.points, color, dash) for way, color, dash in both][::-1]
+        return [*limits, *[(way.points, color, dash) for way, color, dash in both][::-1]]
     lines = [(_path(snapshot.evidence), palette.shade(PATH), 0)] if "path" in layers else []
     if "original" in layers and not shown.same_paths:
         lines.insert(0, (_path(snapshot.original), palette.shade(ORIGINAL), DASH))

@@ -45,8 +45,9 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
     ("⠒", "the first path"),
     ("⠒ ⠒", "the second path"),
     ("→ ⇒", "their robots"),
-    (PARTING, "they part"),
+    (PARTING, "paths diverge"),
 )
+LIMITS = ("▭", "limits")
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 # The first signs of `LEGEND` are places, which no map goes without. Two cells apart, they need so many cells.
 PLACES, GAP, WITH_GAPS = 3, 2, 28
@@ -67,7 +68,7 @@ def legend(shown: Shown, width: int, lines: int) -> Text:
     signs = [sign for sign, there in meanings.items() if there]
     usual = (*LEGEND[:PLACES], *signs, *LEGEND[PLACES:]) if state.elements else LEGEND[:2]
     text, used, gap = Text(no_wrap=True, overflow="ellipsis"), 0, GAP if width >= WITH_GAPS else 1
-    for sign, meaning in _of_ways(shown) if shown.ways else usual:
+    for sign, meaning in _of_ways(shown) if shown.ways or shown.limits else usual:
         cells = len(sign) + 1 + len(meaning)
         if used and used + gap + cells > width:
             lines -= 1
@@ -84,6 +85,8 @@ def legend(shown: Shown, width: int, lines: int) -> Text:
 def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
     for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
         yield sign, way.name
+    if shown.limits:
+        yield LIMITS
     if shown.parting is not None:
         yield PARTED
     if shown.apart is not None:

@@ -25,7 +25,7 @@ from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Layers, copied
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, failures, rounds
 from ddenv.workbench.run.facts import FactsDialog
-from ddenv.workbench.shared.background import is_open
+from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.shared.messages import ShowRun
 
 if TYPE_CHECKING:
@@ -166,6 +166,9 @@ class Opening:
     def inside(self) -> None:
         """Begins a run inside the models that are left, and shows it."""
         snapshot = self._poll.snapshot
+        if why := self._asking.barred:
+            self._asking.refuse(why)
+            return
         if snapshot.engine != "absent" or not snapshot.state.ended:
             self._asking.refuse(_not_over(snapshot))
             return
@@ -174,13 +177,13 @@ class Opening:
     def _begin_inside(self) -> None:
         from ddenv.runs.creation import create_inside
 
-        path = run_path(f"{self._poll.path.stem}-inside", None, None)
         try:
+            path = run_path(f"{self._poll.path.stem}-inside", None, None)
             create_inside(self._poll.path, path)
         except UserError as error:
-            self._screen.app.call_from_thread(self._asking.refuse, str(error))
+            call_if_open(self._screen, self._asking.refuse, str(error))
             return
-        self._screen.app.call_from_thread(self._screen.post_message, ShowRun(path))
+        call_if_open(self._screen, self._screen.post_message, ShowRun(path))
 
     def method(self) -> None:
         options = settings(self._poll.snapshot.state)

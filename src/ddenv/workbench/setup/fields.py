@@ -166,7 +166,10 @@ class OptionsForm(Vertical):
 
     def _explain(self, widget: Widget | None) -> None:
         """The field that has the focus, or else the algorithm, which most depends on."""
-        id, (pair, algorithm) = "" if widget is None else widget.id or "", self.method
+        # An open list of names is a widget inside its field.
+        near = [] if widget is None else [each.id for each in (widget, widget.parent) if each is not None]
+        id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
+        pair, algorithm = self.method
         partitioning, _, prioritization = pair.partition("/")
         panel = self.query_one(Explained)
         if id in FIELDS:
