@@ -17,6 +17,7 @@ from textual.screen import Screen
 from textual.widgets import OptionList, Static
 
 from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.help.command_palette import Commands
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help, commands, groups
 from ddenv.workbench.map.world_map import WorldMap
@@ -64,11 +65,13 @@ async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs)
 
 async def test_a_model_is_a_command_of_the_setup_screen_too(scenarios):
     async with Opened((80, 24)) as session:
-        await offers(session.pilot, "crate_01", "go to crate_01 on the map")
-        await session.press("enter")
-        await session.pilot.pause()
         world = session.screen.query_one(WorldMap)
-        assert world.is_on_screen and world.model_at_cursor == "crate_01"
+        await session.press("f4")
+        assert not world.is_on_screen
+        hits = [hit async for hit in Commands(session.screen).search("crate_01")]
+        assert [hit.text for hit in hits] == ["go to crate_01 on the map"]
+        hits[0].command()
+        await eventually(lambda: world.is_on_screen and world.model_at_cursor == "crate_01")
 
 
 async def offers(pilot, query, words):

@@ -277,8 +277,8 @@ async def test_a_list_of_models_brings_the_map_to_a_small_terminal(run):
 @pytest.mark.parametrize(
     ("make", "why"),
     [
-        (fake_moments.isolating, "the search for a world that passes goes on; i stops it: I works once it is over"),
-        (fake_moments.mid_round, "the reduction goes on: I works once it is over"),
+        (fake_moments.isolating, "I works once the search for a world that passes is over; i stops it"),
+        (fake_moments.mid_round, "I works once the reduction is over"),
     ],
 )
 async def test_no_run_inside_begins_before_all_is_over(run, make, why):

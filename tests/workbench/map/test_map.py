@@ -255,8 +255,8 @@ def fake_sensed(state, test, sensed):
 
 async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(busy):
     async with Shown(busy) as (_, world):
-        assert world.legend(25).plain == "S start G goal × end of f"
-        assert world.legend(30).plain == "S start  G goal  × end of f"
+        assert world.legend(25, 1).plain == "S start G goal × end of f"
+        assert world.legend(30, 1).plain == "S start  G goal  × end of f"
         assert world.legend(30, 2).plain.splitlines()[1].startswith("A B parts  ")
         assert max(map(len, world.legend(30, 2).plain.splitlines())) <= 30
 

@@ -53,7 +53,7 @@ LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 PLACES, GAP, WITH_GAPS = 3, 2, 28
 
 
-def legend(shown: Shown, width: int, lines: int = 1) -> Text:
+def legend(shown: Shown, width: int, lines: int) -> Text:
     """The signs on the map with their meanings, as many as fit: first where the robot starts, has to go and ended."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {

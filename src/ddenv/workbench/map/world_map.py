@@ -170,7 +170,7 @@ class WorldMap(Widget, can_focus=True):
         self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
 
-    def legend(self, width: int, lines: int = 1) -> Text:
+    def legend(self, width: int, lines: int = 2) -> Text:
         return legend(self.shown, width, lines)
 
     @property

@@ -238,9 +238,8 @@ def _not_over(snapshot: Snapshot) -> str:
         what = "the search for a world that passes"
     elif state.margining is not None:
         what = "the search for margins"
-    if snapshot.engine == "absent":
-        return f"{what} is not over: r goes on with it, then I works"
-    return f"{what} goes on{'; i stops it' if state.isolating is not None else ''}: I works once it is over"
+    then = "; r goes on with it" if snapshot.engine == "absent" else "; i stops it" if state.isolating is not None else ""
+    return f"I works once {what} is over{then}"
 
 
 def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tuple[int | None, int | None]:
