@@ -78,9 +78,9 @@ def played(file: RunFile, position: Position, number: int) -> Played:
             rows = samples
         else:
             moving[name] = table
-    if number < 0 and rows:
-        test = replace(test, simulated_seconds=rows[-COLUMNS])
-    if not rows:
+    if rows:
+        test = replace(test, simulated_seconds=test.simulated_seconds or rows[-COLUMNS])
+    else:
         lacks.append(
             f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
