@@ -199,8 +199,7 @@ class Bench:
     def _judge(self, trial: Trial, environment: Environment, verdict: str) -> None:
         runs, _ = decided_by(self._journal.shown, environment, self.rule)
         tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
-        known = sum(self._journal.state.tests[test - 1].trial != trial.number for test in tests)
-        self._journal.record(TrialJudged(trial.number, verdict, tests, known))
+        self._journal.record(TrialJudged(trial.number, verdict, tests))
 
     def _is_spent(self) -> bool:
         """Whether no test may start any more. Raises Stopped once none runs."""

@@ -150,7 +150,7 @@ def _map(
     words: str,
     named: Collection[str] | None,
 ) -> Picture:
-    """The world of the models `kept` without those `gone`, with the two ways of a parting; `named` models bear their names."""
+    """The world of the models `kept` without those `gone`, with two diverging paths; `named` models bear their names."""
     ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
     drawn = picture(replace(record, kept=kept - frozenset(gone)), name, ways, named)
     return Picture(name, drawn, plain(f"{words}, seed {one.seed}."))

@@ -338,7 +338,7 @@ class OfCandidate:
 
 
 class CandidateJudged(OfCandidate, Event):
-    """The verdict on a candidate, by these tests; `known` of them were made for something else."""
+    """The verdict on a candidate, by these tests. Earlier versions also wrote how many were `known` before."""
 
     verdict: Annotated[str, OneOf("similar", "missed", "dissimilar", "unknown")]
     tests: tuple[Number, ...]

@@ -192,7 +192,7 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
     state = state.changed(
         nodes=tuple(_without_void(reached, state) for reached in state.nodes),
         trials=tuple(
-            replace(trial, verdict="", tests=(), known=0) if _any_implied(state, trial.tests) else trial
+            replace(trial, verdict="", tests=()) if _any_implied(state, trial.tests) else trial
             for trial in state.trials
         ),
     )

@@ -213,7 +213,7 @@ function mark() {
   if (pair === null) return;
   option.value = at;
   place("marks").append(option);
-  button.textContent = `they part at ${at.toFixed(1)} s`;
+  button.textContent = `paths diverge at ${at.toFixed(1)} s`;
   put(node("parting"), ghost.robot, at);
   node("parting").quaternion.set(0, 0, 0, 1);
 }

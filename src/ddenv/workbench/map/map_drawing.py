@@ -35,7 +35,7 @@ DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
 # Maximum width of a model's name, in cells.
-NAME = 20
+NAME = 26
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 # A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
 _Line = tuple[np.ndarray, int, int]

@@ -167,8 +167,8 @@ class WorldMap(Widget, can_focus=True):
         self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
 
-    def legend(self, width: int) -> Text:
-        return legend(self.shown, width)
+    def legend(self, width: int, lines: int = 1) -> Text:
+        return legend(self.shown, width, lines)
 
     @property
     def model_at_cursor(self) -> str | None:

@@ -110,7 +110,7 @@ class Playback(Screen[None]):
         ("faster", "greater_than_sign", "speed(1)", "faster", "faster", ">"),
         ("start", "home", "go(0)", "start", "to the start of the test"),
         ("end", "end", "go(1)", "end", "to the end of the test"),
-        ("parting", "p", "parting", "they part", "to the instant at which the paths of the two tests part"),
+        ("parting", "p", "parting", "paths diverge", "to the instant at which the paths of the two tests diverge"),
         ("beside", "o", "beside", "two tests", "play another test over this one, or this one alone again"),
         ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
         ("before", "up", "test(-1)", "test before", "the finished test before this one"),
