@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from shlex import quote
 
 from rich.text import Text
 
@@ -77,7 +78,7 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
     snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
     for one in changes(file, state, read_parts(file)[1]):
         value, run_it = f"{one.value:.4g}", f"Again: ddenv test --repeat 10 --minimal {run}"
-        given = "".join(f" --margin {name}={to:.9g}" for name, to in one.changes)
+        given = "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
         again = f"{run_it}{given}\nAs a world: ddenv export --output changed.sdf {run}{given}"
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
         figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
