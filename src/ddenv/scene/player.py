@@ -127,8 +127,9 @@ class Player:
             found += [(f"with and without {each.without}", each.parting) for each in reasons(self._run, self._state)]
         if (near := nearest(self._run, self._state)) is not None:
             found.append(("with and the nearest world that passes", near.parting))
-        others = changes(self._run, self._state, None)
-        found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
+        with suppress(UserError):
+            others = changes(self._run, self._state, None)
+            found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
         pairs = [
             {
                 "title": f"{words} ({_numbers(one)}, seed {one.seed})",
