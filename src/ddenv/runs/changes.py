@@ -74,10 +74,7 @@ def beside(state: RunState) -> Test | None:
 
 
 def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
-    """The run with a changed number that has this negative `number` in the file, also as a test, whose phase says what.
-
-    Raises UserError.
-    """
+    """The run with this negative `number`, also as a test, whose phase says what was changed. Raises UserError."""
     margins = state.margins
     place = -1 if margins is None else -number - 1 - margins.earlier
     if margins is None or not 0 <= place < len(margins.runs):
