@@ -248,7 +248,7 @@ async def test_a_number_is_shown_at_its_limits_and_played_beside_what_is_left(ru
     fake_moments.with_margins(run)
     async with Attached(run) as session:
         screen = await opened(session)
-        assert "with other numbers" in str(screen.query_one("#why-models").border_title)
+        assert "; other numbers" in str(screen.query_one("#why-models").border_title)
         options = screen.query_one(OptionList)
         rows = [str(options.get_option_at_index(number).prompt).split() for number in range(options.option_count)]
         assert rows[-2:] == [["crate_00.friction", "goal", "at", "0.4"], ["crate_01.y", "no", "f", "at", "0.31"]]

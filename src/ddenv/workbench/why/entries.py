@@ -79,10 +79,10 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
     for one in changes(file, state, read_parts(file)[1]):
         value, run_it = f"{one.value:.4g}", f"Again: ddenv test --repeat 10 --minimal {run}"
         given = "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
-        again = f"{run_it}{given}\nAs a world: ddenv export --output changed.sdf {run}{given}"
+        more = f"{run_it}{given}", f"As a world: ddenv export --output changed.sdf {run}{given}"
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
         figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
-        yield Entry(one.name, "", (), one.sentence, (again,), one.parting, ways, snapshot, None, limits, figures)
+        yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
