@@ -57,8 +57,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     """The finished test with this number. Raises UserError if there is none; what the file lacks of it is said in `lacks`."""
     tests = position.end.tests
     if number < 0:
-        one, test = changed_run(position.end, number)
-        words = f"{one.name} = {one.value:.4g}"
+        _, test = changed_run(position.end, number)
     elif 0 < number <= len(tests):
         test = tests[number - 1]
     else:
@@ -67,8 +66,11 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         why = "is still running" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
     lacks = [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
-    if number > 0:
-        words = _purpose(position, test)
+    try:
+        start = position.start_of(number)
+        words = purpose(position.end if start is None else start.after, test)
+    except UserError:
+        words = f"test {number}"
     rows, moving = array("d"), {}
     for name, samples in _stored(file, number, lacks).items():
         table = _table(samples)
@@ -78,21 +80,13 @@ def played(file: RunFile, position: Position, number: int) -> Played:
             rows = samples
         else:
             moving[name] = table
-    if number < 0 and rows:
-        test = replace(test, simulated_seconds=rows[-COLUMNS])
-    if not rows:
+    if rows:
+        test = replace(test, simulated_seconds=test.simulated_seconds or rows[-COLUMNS])
+    else:
         lacks.append(
             f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
     return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
-
-
-def _purpose(position: Position, test: Test) -> str:
-    try:
-        start = position.start_of(test.id)
-        return purpose(position.end if start is None else start.after, test)
-    except UserError:
-        return f"test {test.id}"
 
 
 def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:

@@ -6,7 +6,6 @@ import math
 from array import array
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -127,8 +126,9 @@ class Player:
             found += [(f"with and without {each.without}", each.parting) for each in reasons(self._run, self._state)]
         if (near := nearest(self._run, self._state)) is not None:
             found.append(("with and the nearest world that passes", near.parting))
-        others = changes(self._run, self._state, None)
-        found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
+        with suppress(UserError):
+            others = changes(self._run, self._state, None)
+            found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
         pairs = [
             {
                 "title": f"{words} ({_numbers(one)}, seed {one.seed})",
@@ -168,9 +168,7 @@ class Player:
     def _shot_of(self, test: int) -> Shot:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
         if test < 0:
-            run, one = changed_run(self._state, test)
-            found = shot_of_test(self._state, "replay", one)
-            return replace(found, title=f"{run.name} = {run.value:.4g} · {one.outcome}")
+            return shot_of_test(self._state, "replay", changed_run(self._state, test)[1])
         start, state = self._position.start_of(test), self._state
         if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")

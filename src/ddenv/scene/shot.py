@@ -75,7 +75,7 @@ def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial 
     if test.id == state.evidence_test and kind == "replay" and row is None:
         name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
         models = frozenset(state.environment)
-    words = [name, f"test {test.id}"]
+    words = [name, f"test {test.id}"] if test.id > 0 else [name]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")
     words.append("runs now" if kind == "live" else test.outcome)
