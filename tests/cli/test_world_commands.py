@@ -8,9 +8,9 @@ import pytest
 from ddenv.cli.world import world_lines as lines
 from ddenv.cli.world import world_report as report
 from ddenv.text import width
-from ddenv.world.sdf.read import parse_world
+from ddenv.world.sdf.read import parse_world, read_world
 from tests.command import ddenv, in_process
-from tests.conftest import DATA
+from tests.conftest import DATA, ROOT
 
 WORLD = b"""<sdf version='1.6'><world name='hall'>
 <model name='ground'><static>1</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision></link></model>
@@ -76,6 +76,12 @@ def crowd(tmp_path):
 
 def rows_of(told):
     return told[told.index("") + 1 : len(told) - told[::-1].index("notes") - 2]
+
+
+def test_at_80_columns_each_model_of_the_ditch_has_one_line():
+    told = lines(read_world(ROOT / "sdf/worlds/ditch.sdf"), 80)
+    assert len(told) == len(lines(read_world(ROOT / "sdf/worlds/ditch.sdf"), None))
+    assert "centre x, y, z, m" in told[2] and "links" not in told[2]
 
 
 @pytest.mark.parametrize("columns", [20, 40, 62, 80, 120])

@@ -152,7 +152,7 @@ def test_of_other_files_nothing_is_taken_over(made, fresh, document):
 
 
 def test_of_another_simulator_nothing_is_taken_over(made, fresh, monkeypatch):
-    monkeypatch.setattr(shared, "version", lambda name: "0.1")
+    monkeypatch.setattr(shared, "simulator", lambda: "drake 0.1, numpy 0.1")
     assert known(fresh) == {}
     monkeypatch.undo()
     assert known(fresh)

@@ -1,5 +1,6 @@
 """A broken lesson: file, line, key, and what is wrong, in one line."""
 
+import json
 import re
 import shutil
 
@@ -107,6 +108,14 @@ def test_a_good_lesson_is_read(tmp_path):
     whole = open_lesson(lesson(tmp_path, ALONE))
     assert whole.lesson.steps[2].budget == 12 and whole.asked == 5
     assert [play.name for play in whole.racers(whole.lesson.steps[3])] == ["ddmin", "splitting"]
+
+
+def test_a_search_needs_an_oracle_in_which_the_whole_world_fails(tmp_path):
+    file = lesson(tmp_path, ALONE.partition("  - text: Look.")[0])
+    oracle = tmp_path / "delivery.oracle.json"
+    oracle.write_text(json.dumps(json.loads(oracle.read_text()) | {"outcomes": {}, "plays": {}}))
+    with pytest.raises(UserError, match="f does not show with all models, so there is nothing to search"):
+        open_lesson(file)
 
 
 MISTAKES = [(GOOD, *each) for each in WRONG] + [(ALONE, *each) for each in WRONG_ALONE]

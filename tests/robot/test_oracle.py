@@ -105,4 +105,4 @@ def test_similar_trajectories_have_similar_ends(a, b, epsilon):
     f = Failure(tuple(b[-1, 1:4]), b, epsilon)
     along = judge(result("failed", a), replace(f, similarity="trajectory"))
     assert along.outcome == "other" or judge(result("failed", a), f).outcome == "similar"
-    assert (along.outcome == "similar") == (max(along.distance, along.trajectory_distance) <= epsilon)
+    assert (along.outcome == "similar") == (max(along.distance, trajectory_distance(a, b)) <= epsilon)

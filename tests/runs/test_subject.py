@@ -1,14 +1,16 @@
 """What a name stands for, and what stands behind it."""
 
+import os
 import shutil
+from pathlib import Path
 
 import pytest
 
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
 from ddenv.runs.folder import BUNDLED_RUN, find_run, named, runs_folder
-from ddenv.runs.subject import open_subject, robot_file
-from ddenv.world.load import SCENARIOS, load_scenario
+from ddenv.runs.subject import open_subject, robot_file, scenario_named
+from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from tests.conftest import DATA
 
 NOTHING = dict.fromkeys(("spawn", "goal", "world")) | {"model_path": (), "stand_in": (), "ignore": ()}
@@ -78,3 +80,13 @@ def test_the_robot_of_a_run_needs_no_file_of_its_own(here):
     with robot_file(subject) as file:
         assert file != own and file.read_bytes() == text
     assert not file.exists()
+
+
+@pytest.mark.parametrize("name", ["world.sdf", "scenario.yaml"])
+def test_a_path_that_is_not_utf_8_is_refused_in_one_line(tmp_path, name):
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    folder.mkdir()
+    for file in (SDF / "worlds" / "friction.sdf", SCENARIOS / "friction.yaml"):
+        (folder / f"{'world' if file.suffix == '.sdf' else 'scenario'}{file.suffix}").write_bytes(file.read_bytes())
+    with pytest.raises(UserError, match="this path is not UTF-8 text"):
+        scenario_named(str(folder / name), NOTHING | {"spawn": (0.0, 0.0, 0.2), "goal": (9.0, 0.0)})

@@ -149,7 +149,7 @@ def test_names_that_make_no_sense_get_one_line_with_the_nearest(words, told):
 
 def test_names_of_scenarios_that_cannot_be_told_apart_are_refused(tmp_path):
     for one, two, told in (
-        ("crates", "crates", "--scenarios: two of them are called 'crates'; give each a name of its own"),
+        ("crates", "crates", "the names of two of them make the same file names"),
         ("a b", "a?b", "the names of two of them make the same file names"),
         (LONGEST, LONGEST[:-1], "the names of two of them make the same file names"),
     ):

@@ -17,9 +17,12 @@ from textual.screen import Screen
 from textual.widgets import OptionList, Static
 
 from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.help.command_palette import Commands
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help, commands, groups
+from ddenv.workbench.map.world_map import WorldMap
 from tests.waiting import PATIENCE, eventually
+from tests.workbench.setup.setup_session import Opened
 
 
 def told(screen):
@@ -58,6 +61,17 @@ async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs)
         assert {shortcut.id for shortcut in shortcuts} >= {"run.pause", "run.pin", "app.leave"}
         await offers(pilot, "choose the colours", "choose the colours")
         await offers(pilot, "box_1", "go to [bold]box_1[/] on the map\n")
+
+
+async def test_a_model_is_a_command_of_the_setup_screen_too(scenarios):
+    async with Opened((80, 24)) as session:
+        world = session.screen.query_one(WorldMap)
+        await session.press("f4")
+        assert not world.is_on_screen
+        hits = [hit async for hit in Commands(session.screen).search("crate_01")]
+        assert [hit.text for hit in hits] == ["go to crate_01 on the map"]
+        hits[0].command()
+        await eventually(lambda: world.is_on_screen and world.model_at_cursor == "crate_01")
 
 
 async def offers(pilot, query, words):

@@ -177,18 +177,19 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert "aborts" in question(course.Change({"iterations": 9}), state)
 
 
-async def test_a_notice_hides_no_dialog_and_goes_at_the_next_key(run):
+async def test_a_notice_waits_until_a_dialog_is_closed_and_goes_at_the_next_key(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run, (80, 24), notices=True) as session:
         await session.press("q")
         assert isinstance(session.app.screen, Quit)
         for number in range(5):
             session.screen.asking.say(f"notice {number}")
-            await session.pilot.pause()
-        assert not any(toast.display for toast in session.app.screen.query("Toast"))
-        # The latest one is enough: the log has all.
-        assert [notice.message for notice in session.app._notifications] == ["notice 4"]
+        await session.pilot.pause()
+        assert session.said() == "" and not session.app.screen.query("Toast")
         await session.press("escape")
+        # The latest one is enough: the log has all.
+        assert session.said() == "notice 4"
+        await eventually(lambda: len(session.screen.query("Toast")) == 1)
         await session.press("down")
         await eventually(lambda: not session.screen.query("Toast"))
 
@@ -261,6 +262,30 @@ async def test_one_key_leaves_out_the_model_that_only_helps(run, monkeypatch):
         await session.press("H")
         assert session.asked() == []
         assert "no certificate shows a model that only helps" in session.said()
+
+
+async def test_a_list_of_models_brings_the_map_to_a_small_terminal(run):
+    fake_moments.guided(run).hold()
+    async with Attached(run, (80, 24)) as session:
+        await session.press("2")
+        world = session.screen.query_one(WorldMap)
+        assert not world.is_on_screen
+        await session.press("p", "down")
+        assert world.is_on_screen and world.aims and world.model_at_cursor == "crate_01"
+
+
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (fake_moments.isolating, "I works once the search for a world that passes is over; i stops it"),
+        (fake_moments.mid_round, "I works once the reduction is over"),
+    ],
+)
+async def test_no_run_inside_begins_before_all_is_over(run, make, why):
+    make(run).hold()
+    async with Attached(run) as session:
+        await session.press("I")
+        assert session.said() == why
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from ddenv.cli import options
 from ddenv.cli.run import idle_run
 from ddenv.cli.terminal import announce, say
 from ddenv.errors import UserError
-from ddenv.runs.folder import find_run
+from ddenv.runs.folder import attach_name, find_run
 
 
 @click.command("why")
@@ -77,20 +77,22 @@ def isolate_command(
         follow(path, start_engine(path, 1, give_up="yes"), as_json)
         return 0
     if why := Isolate(again=True).refusal(Situation(state, "absent")):
-        raise UserError(f"{path}: {why}: ddenv resume {path}")
+        raise UserError(f"{path}: {why}: ddenv resume {attach_name(path)}")
     if state.isolated is None or state.isolating is not None or again or runs is not None:
         try:
             follow(path, start_engine(path, jobs, isolate=runs or 0, cluster=cluster), as_json)
         except Interrupted as interrupted:
             if interrupted.state.isolating is not None or interrupted.state.isolated is None:
-                announce(f"interrupted; continue with: ddenv isolate {path}, or end it with --give-up")
+                announce(f"interrupted; continue with: ddenv isolate {attach_name(path)}, or end it with --give-up")
                 return 130
     with RunFile(path) as file:
         state = fold(file.events())
         found = nearest(file, state)
     if found is None:
         # The engine was stopped from elsewhere.
-        raise UserError(f"{path}: the search for a world that passes was stopped; continue with: ddenv isolate {path}")
+        raise UserError(
+            f"{path}: the search for a world that passes was stopped; continue with: ddenv isolate {attach_name(path)}"
+        )
     if as_json:
         print(json.dumps({"nearest": asdict(found)}))
     else:

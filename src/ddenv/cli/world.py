@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Numbers, reading_options, scenarios, together
+from ddenv.cli.options import Numbers, reading_options, remembered_option, scenarios, together
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
@@ -29,11 +29,14 @@ MOST_NAMES = 5
 LONGEST_NAME = 34
 HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes")
 TO_THE_RIGHT = ("links", "yaw")
+# The columns that are left out first where not all fit; the width where all do.
+SPARE, WIDEST = ("links", "shapes", "yaw"), 10_000
 
 # A world, as it is read.
 world_argument = together(
     click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
     reading_options,
+    remembered_option,
 )
 
 
@@ -42,9 +45,10 @@ def world_group() -> None:
     """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
 
 
-def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
-    """The world of an SDF file, or of a scenario, and how it was read. Raises UserError."""
+def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
+    """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
     from ddenv.runs.folder import named_file
+    from ddenv.runs.remedies import with_remembered
     from ddenv.runs.subject import reading_of
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN
@@ -53,7 +57,10 @@ def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     kind, path = named_file(str(file)) or ("world", file)
     scenario = load_scenario(path) if kind == "scenario" else None
     file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
-    read_as = reading_of(own, **reading)
+    reads_remembered = options.pop("remembered")
+    read_as = reading_of(own, **options)
+    if reads_remembered:
+        read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as
 
 
@@ -132,7 +139,7 @@ def _shapes(model: Model) -> Counter[str]:
 def world_lines(world: World, columns: int | None = None) -> list[str]:
     """The table: a line for each model, then the notes by number, then the totals.
 
-    No line is wider than `columns`: cells that do not fit have more lines, or less words.
+    No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
     numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
     by_model: dict[str, dict[str, None]] = {}
@@ -192,15 +199,20 @@ def _row(model: Model, notes: str) -> tuple[str, ...]:
 
 def _table(rows: Iterable[tuple[str, ...]], columns: int | None) -> list[str]:
     from rich.console import Console
+    from rich.measure import Measurement
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, header_style="")
-    for title in HEADER:
-        table.add_column(title, justify="right" if title in TO_THE_RIGHT else "left")
-    for row in rows:
-        table.add_row(*map(Text, row))
-    console = Console(width=columns or 10_000, color_system=None)
+    found, titles, console = list(rows), list(HEADER), Console(width=columns or WIDEST, color_system=None)
+    for spare in (*SPARE, ""):
+        table = Table(box=None, pad_edge=False, header_style="")
+        for title in titles:
+            table.add_column(title, justify="right" if title in TO_THE_RIGHT else "left")
+        for row in found:
+            table.add_row(*(Text(cell) for title, cell in zip(HEADER, row, strict=True) if title in titles))
+        if not spare or Measurement.get(console, console.options.update(width=WIDEST), table).maximum <= console.width:
+            break
+        titles.remove(spare)
     with console.capture() as printed:
         console.print(table)
     return [line.rstrip() for line in printed.get().splitlines()]

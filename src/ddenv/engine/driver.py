@@ -323,8 +323,7 @@ class Driver:
         if round.candidates[step.index].verdict:
             return
         tests = journal.tests(step.environment, map(self._leg.rule.run, range(step.runs)))
-        known = sum(journal.state.tests[test - 1].round != round.number for test in tests)
-        journal.record(events.CandidateJudged(round.number, step.index, step.verdict, tests, known))
+        journal.record(events.CandidateJudged(round.number, step.index, step.verdict, tests))
 
     def _similar(self, step: steps.Similar) -> bool:
         """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""

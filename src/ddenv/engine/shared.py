@@ -8,7 +8,6 @@ import platform
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +25,6 @@ from ddenv.runs.folder import SUFFIX
 from ddenv.world.scenario import Scenario
 
 OURS = ("straight", "costmap")
-# What the physics, the noise and the navigation are computed with.
-PACKAGES = ("drake", "numpy", "scipy")
 
 # Models, seed, and whether the test ran to its end.
 Key = tuple[frozenset[str], int, bool]
@@ -43,14 +40,8 @@ class Place:
 
 
 def simulator() -> str:
-    """The versions of everything that the bits of a test may depend on."""
-    versions = []
-    for name in PACKAGES:
-        try:
-            versions.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            versions.append(f"no {name}")
-    return ", ".join(versions)
+    """The versions of everything that the bits of a test may depend on: physics, noise and navigation."""
+    return processor.versions("drake", "numpy", "scipy")
 
 
 def machine() -> str:

@@ -108,6 +108,9 @@ def open_lesson(file: Path) -> Opened:
     oracle = None if lesson.oracle is None else read_oracle(lesson.oracle)
     if oracle is not None and set(oracle.models) != set(opened[0].end.elements):
         raise UserError(f"{lesson.oracle}: its models are not those of {lesson.run.name}")
+    searches = any(step.budget for step in lesson.steps)
+    if oracle is not None and searches and frozenset(oracle.models) not in oracle.showing:
+        raise UserError(f"{lesson.oracle}: f does not show with all models, so there is nothing to search")
     plays = {} if oracle is None else _plays(lesson, oracle)
     made = Opened(lesson, opened[0], oracle, {name: _end(run) for name, run in lesson.beside.items()}, plays)
     _check(made)

@@ -60,9 +60,9 @@ class Footprint:
         return min(_distance(polygon, np.array(point)) for polygon in self.polygons)
 
 
-def footprints(world: World, corners: int = ROUND) -> tuple[Footprint, ...]:
+def footprints(world: World) -> tuple[Footprint, ...]:
     """Footprints of all models except the ground, the largest first, so that small ones are drawn on top."""
-    prints = [footprint(model, corners) for model in world.models if not is_ground(model)]
+    prints = [footprint(model) for model in world.models if not is_ground(model)]
     return tuple(sorted(prints, key=lambda each: -each.area))
 
 
@@ -76,6 +76,11 @@ def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE) -> Footpri
     points = np.vstack(polygons) if polygons else np.array([(moved @ model.pose).position[:2]])
     low, high = points.min(axis=0), points.max(axis=0)
     return Footprint(model.name, polygons, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
+
+
+def rings(model: Model, moved: Pose) -> tuple[np.ndarray, ...]:
+    """The outlines of a model that has `moved`, as closed lines (N, 2), m."""
+    return tuple(np.vstack([each, each[:1]]) for each in footprint(model, moved=moved).polygons)
 
 
 def _outline(collision: Collision, corners: int, moved: Pose) -> np.ndarray:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count, takewhile
-from numbers import Integral, Real
-from typing import Any, TypeVar
+from numbers import Real
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -156,10 +156,8 @@ def reduce(
         "skip": skip,
         "prior": prior,
     }
-    _check_words(**variants, accept_rate=accept_rate)
-    _check_counts(iterations=iterations, n_partitions=n_partitions, seed=seed, baseline_runs=baseline_runs)
-    _check_numbers(LARGEST, delta=delta)
-    _check_numbers(0.95, keep_rate=keep_rate, certify_rate=certify_rate)
+    _check(**variants, accept_rate=accept_rate, keep_rate=keep_rate, certify_rate=certify_rate, delta=delta)
+    _check(iterations=iterations, n_partitions=n_partitions, seed=seed, baseline_runs=baseline_runs)
     path = _trajectory(trajectory)
     failure = _place(path[-1, 1:4] if failure_pose is None and path is not None else failure_pose)
     if failure is None and failure_pose is not None:
@@ -373,25 +371,16 @@ def _wrong(what: str, expected: str, found: object) -> UserError:
     return UserError(f"{what}: expected {expected}, found {found!r}")
 
 
-def _check_words(**given: str) -> None:
-    # To repeat runs exactly takes seeds, and `test` has none.
-    for name, word in given.items():
-        choices = [one for one in SETTINGS[name].choices if one != "exact"]
-        if word not in choices:
-            raise UserError(f"{name}: {word!r} is not allowed; use one of {', '.join(choices)}")
-
-
-def _check_counts(**given: int) -> None:
-    for name, number in given.items():
-        least = SETTINGS[name].least or 0
-        if not isinstance(number, Integral) or not least <= number < 2**31:
-            raise _wrong(name, f"{least} or more", number)
-
-
-def _check_numbers(most: float, **given: float) -> None:
-    for name, number in given.items():
-        if not isinstance(number, Real) or not 0 < number <= most:
-            raise _wrong(name, f"a number above 0, at most {most:g}", number)
+def _check(**given: Any) -> None:
+    """Raises UserError for a value that the setting of this name cannot have in a scenario either."""
+    for name, value in given.items():
+        one = SETTINGS[name]
+        # To repeat runs exactly takes seeds, and `test` has none.
+        choices = [word for word in one.choices if word != "exact"]
+        if choices and value not in choices:
+            raise UserError(f"{name}: {value!r} is not allowed; use one of {', '.join(choices)}")
+        if not one.allows(value.item() if isinstance(value, np.generic) else value):
+            raise _wrong(name, one.wanted, value)
 
 
 def _names(elements: Iterable[str]) -> Names:
@@ -452,4 +441,4 @@ def _place(values: Any) -> Place | None:
 
 
 def _time(value: Any) -> float | None:
-    return float(value) if isinstance(value, Real) and 0.0 <= float(value) <= LARGEST else None
+    return float(value) if isinstance(value, Real) and 0 <= cast(float, value) <= LARGEST else None

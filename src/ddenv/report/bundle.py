@@ -132,7 +132,7 @@ def _needed(record: Record) -> set[int]:
 def _issue(record: Record, needs: list[str]) -> bytes:
     state, found = record.state, current(record.state)
     assert found is not None
-    at = f" at ({', '.join(f'{value:.2f}' for value in state.f_position[:2])}) m" if state.f_position else ""
+    at = f" at ({', '.join(f'{value:z.2f}' for value in state.f_position[:2])}) m" if state.f_position else ""
     models = [f"- `{_code(name)}`" for name in state.environment[:MOST_NAMES]]
     if (more := len(state.environment) - MOST_NAMES) > 0:
         models.append(f"- and {count(more, 'more model')}")

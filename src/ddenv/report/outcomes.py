@@ -102,11 +102,11 @@ def _tests(state: RunState) -> list[Block]:
     # Before the end of the run, anything may still come to be needed.
     slices, ahead = _slices(state), state.ahead if state.status == "finished" else 0
     words = (
-        f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, "
-        f"{thousands(state.cut_tests)} ended early because the robot was stuck for good, and {thousands(ahead)} were started "
-        "early by idle workers and not needed."
+        f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, and "
+        f"{thousands(state.cut_tests)} ended early because the robot was stuck for good"
     )
-    return [table, say(words), *slices]
+    idle = f"; {thousands(ahead)} were started early by idle workers and not needed" if ahead else ""
+    return [table, say(f"{words}{idle}."), *slices]
 
 
 def _slices(state: RunState) -> list[Block]:

@@ -76,11 +76,10 @@ class Failure:
 
 @dataclass(frozen=True)
 class Judgement:
-    """`outcome` is "similar", "other", "pass" or "error"; `distance` (m) between the ends, `trajectory_distance` (m) on average."""
+    """`outcome` is "similar", "other", "pass" or "error"; `distance` is that between the ends, m."""
 
     outcome: str
     distance: float
-    trajectory_distance: float
 
 
 def judge(result: RunResult, failure: Failure) -> Judgement:
@@ -92,9 +91,10 @@ def judge(result: RunResult, failure: Failure) -> Judgement:
 def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
     """Whether the trajectory (N, 8) of a failed run shows f ("similar") or another failure ("other")."""
     distance = float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
-    along = trajectory_distance(trajectory, failure.trajectory)
-    similar = distance <= failure.epsilon and (failure.similarity == "end-pose" or along <= failure.epsilon)
-    return Judgement("similar" if similar else "other", distance, along)
+    similar = distance <= failure.epsilon
+    if similar and failure.similarity == "trajectory":
+        similar = trajectory_distance(trajectory, failure.trajectory) <= failure.epsilon
+    return Judgement("similar" if similar else "other", distance)
 
 
 def trajectory_distance(a: Floats, b: Floats) -> float:

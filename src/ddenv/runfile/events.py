@@ -338,7 +338,7 @@ class OfCandidate:
 
 
 class CandidateJudged(OfCandidate, Event):
-    """The verdict on a candidate, by these tests; `known` of them were made for something else."""
+    """The verdict on a candidate, by these tests. Earlier versions also wrote how many were `known` before."""
 
     verdict: Annotated[str, OneOf("similar", "missed", "dissimilar", "unknown")]
     tests: tuple[Number, ...]
@@ -526,6 +526,7 @@ class NumberAsked:
     """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try.
 
     A change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.
+    Numbers that are changed `together`, in %, have each a name, the present value and that at 100 %.
     """
 
     name: str
@@ -535,6 +536,7 @@ class NumberAsked:
     scale: Positive
     resolution: Positive
     unit: str = ""
+    together: tuple[tuple[str, Real, Real], ...] = ()
 
 
 class MarginsStarted(Event):

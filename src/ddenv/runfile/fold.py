@@ -270,7 +270,7 @@ def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
 
 
 def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
-    candidate = replace(tried(state, event), verdict=event.verdict, tests=event.tests, known=event.known)
+    candidate = replace(tried(state, event), verdict=event.verdict, tests=event.tests)
     changes = with_candidate(state, candidate)
     changes["left_unknown"] = state.left_unknown or event.verdict == "unknown"
     # Without tests it is part of what has lost the rate.

@@ -47,7 +47,7 @@ def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
 
 def trial_judged(state: RunState, event: e.TrialJudged, _: float) -> Changes:
     trial = state.trials[event.trial - 1]
-    judged = replace(trial, verdict=event.verdict, tests=event.tests, known=event.known)
+    judged = replace(trial, verdict=event.verdict, tests=event.tests)
     return with_trial(state, judged) | {"left_unknown": state.left_unknown or event.verdict == "unknown"}
 
 

@@ -161,8 +161,7 @@ class RunState:
     @property
     def f_test(self) -> Test | None:
         """The test whose end is f in the current node; None until f is fixed."""
-        known = self.failures and 0 < self.failures[0] <= len(self.tests)
-        return self.tests[self.failures[0] - 1] if known else None
+        return next(iter(self.tests_of(self.failures[:1])), None)
 
     @property
     def f_position(self) -> Place | None:
@@ -337,7 +336,7 @@ class Candidate:
     `verdict` is "" while open, then "similar", "missed" (it missed f in a few tests; the algorithm may come back to it),
     "dissimilar", "unknown" (its tests broke), "vetoed", "rejected" (similar, but the user rejected it) or "undone" (the user took
     it back before). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are
-    the ids of its tests so far, including re-runs and `known` tests of earlier rounds.
+    the ids of its tests so far, including re-runs and tests of earlier rounds.
     """
 
     index: int
@@ -347,7 +346,6 @@ class Candidate:
     distance: float | None = None
     verdict: str = ""
     tests: tuple[int, ...] = ()
-    known: int = 0
 
     @property
     def kept(self) -> Environment:
@@ -382,7 +380,7 @@ class Candidate:
 class Trial:
     """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it was tried in `node`.
 
-    `verdict`, `tests` and `known` are as in a candidate. `adopted`: it became the environment.
+    `verdict` and `tests` are as in a candidate. `adopted`: it became the environment.
     """
 
     number: int
@@ -391,7 +389,6 @@ class Trial:
     environment: int = 0
     verdict: str = ""
     tests: tuple[int, ...] = ()
-    known: int = 0
     adopted: bool = False
 
     @property

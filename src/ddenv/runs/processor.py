@@ -1,4 +1,4 @@
-"""The machine: its processor's name, and how many cores and how much memory this process may use."""
+"""The machine: its processor's name, how many cores and how much memory this process may use, and which packages it has."""
 
 from __future__ import annotations
 
@@ -17,6 +17,19 @@ def name(root: Path = Path("/")) -> str:
         if key.strip() in ("model name", "Model", "Hardware"):
             return " ".join(value.split())
     return platform.processor() or platform.machine()
+
+
+def versions(*packages: str) -> str:
+    """The versions of these packages; imports none of them."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = []
+    for name in packages:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            found.append(f"no {name}")
+    return ", ".join(found)
 
 
 def usable_cores(root: Path = Path("/")) -> int:

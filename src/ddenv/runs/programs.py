@@ -107,22 +107,20 @@ def last_words(run: Path) -> str:
     return f"{run}: the engine was killed or crashed{crashed} (see {log}); go on with 'ddenv resume {run}'"
 
 
-def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
+def start_scene(run: Path) -> subprocess.Popen[str]:
     """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
 
     It shows what its standard input asks for (`Wanted`), and ends with its parent. An empty first line means that it could not
     start; its log says why.
     """
-    words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port), "--pointed"]
     try:
         log = _log(run.with_name(f"{run.name}.scene.log"), run)
     except OSError:
         # A run in a folder that cannot be written can be seen all the same.
         log = Path(os.devnull).open("wb")  # noqa: SIM115  (closed below)
     with log:
-        return subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
-        )
+        words, pipe = [sys.executable, "-m", "ddenv.scene", str(run)], subprocess.PIPE
+        return subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=log, text=True, start_new_session=True)
 
 
 def how_to_install(extra: str = "") -> str:

@@ -18,7 +18,7 @@ from ddenv.runs.folder import named
 from ddenv.runs.remedies import with_remembered
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
-from ddenv.world.access import is_world, read_bytes, write_file
+from ddenv.world.access import is_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
@@ -59,13 +59,18 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
     if kind != "run":
         scenario = scenario_named(name, given, announce)
         return Subject(scenario, *load_parts(scenario))
-    if any(value is not None and value != () for option, value in given.items() if option != "remembered"):
+    if has_options(given):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
             "a run keeps its own"
         )
     with RunFile(path) as file:
         return read_subject(file)
+
+
+def has_options(given: Mapping[str, Any], *but: str) -> bool:
+    """Whether any of these options was given, `but` some."""
+    return any(value is not None and value != () for name, value in given.items() if name not in ("remembered", *but))
 
 
 # From files and options.
@@ -93,7 +98,9 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
-    return with_remembered(scenario, announce) if remembered else scenario
+    if not remembered:
+        return scenario
+    return scenario.model_copy(update={"reading": with_remembered(scenario.world, read_as, announce)})
 
 
 def reading_of(
@@ -119,7 +126,7 @@ def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], go
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
         "name": world.stem.removesuffix(".dmd")[:80] or "world",
-        "world": str(world.resolve()),
+        "world": str(resolved(world)),
         "robot": {
             "model": str(SDF / "robots" / "husky.sdf"),
             "spawn": dict(zip(("x", "y", "z", "yaw"), spawn, strict=True)),

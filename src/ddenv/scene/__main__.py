@@ -1,11 +1,11 @@
-"""`python -m ddenv.scene RUN [--port N] [--pointed]`: serves the 3-D scene of a run until it is stopped or its parent exits.
+"""`python -m ddenv.scene RUN`: serves the 3-D scene of a run until it is stopped or its parent exits.
 
-The first line of output is the URL. User errors are one line on standard error, with exit code 2.
+The first line of output is the URL; a line of input says what to show (`Wanted`). User errors are one line on standard error,
+with exit code 2.
 """
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import os
 import signal
@@ -13,7 +13,6 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
 
 from ddenv.errors import UserError
 from ddenv.runfile.reading import Invalid, read
@@ -26,28 +25,18 @@ from ddenv.scene.stage import Stage
 PERIOD = 0.1  # time between two updates of the scene, s
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise UserError(f"{message}; usage: python -m ddenv.scene RUN [--port N] [--pointed]")
-
-
 def main() -> int:
     parent = os.getppid()
-    parser = _Parser(prog="python -m ddenv.scene", description="Serves the 3-D scene of a run on this machine.")
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run file")
-    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 picks a free one from 7000 upwards")
-    parser.add_argument("--pointed", action="store_true", help="read what to show from standard input")
     try:
-        arguments = parser.parse_args()
-        with RunFile(arguments.run) as run:
-            asyncio.run(_serve(run, arguments.port, parent, arguments.pointed))
+        with RunFile(Path(sys.argv[1])) as run:
+            asyncio.run(_serve(run, parent))
     except UserError as error:
         print(f"ddenv.scene: {error}", file=sys.stderr)
         return 2
     return 0
 
 
-async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:
+async def _serve(run: RunFile, parent: int) -> None:
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -58,12 +47,13 @@ async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:
     server.welcome = stage.messages
     player = Player(run, stage, server.say)
     server.player = player
-    url = server.listen(port, before)
+    url = server.listen(before)
     remember(run.path, server.port, token)
     player.tick(time.monotonic())
     print(url, flush=True)
-    if pointed:
-        os.set_blocking(sys.stdin.fileno(), False)
+    os.set_blocking(sys.stdin.fileno(), False)
+    # Without a pipe nobody asks for anything.
+    with suppress(PermissionError):
         loop.add_reader(sys.stdin.fileno(), _point, player, loop)
     while not ended.is_set() and os.getppid() == parent:
         if server.viewers:

@@ -74,7 +74,7 @@ class Server:
             (f"/{self.token}/", _Page, {"server": self}),
             (rf"/{self.token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
             (rf"/{self.token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
-            (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
+            (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(-?\d{{1,9}}))?", _Asked, {"server": self}),
             (rf"/alive/{name_of(self.token)}/([0-9a-f]{{32}})", _Alive, {"server": self}),
         ]
         application = tornado.web.Application(
@@ -89,15 +89,9 @@ class Server:
         for name in ("tornado.general", "tornado.access"):
             logging.getLogger(name).setLevel(logging.ERROR)
 
-    def listen(self, port: int, before: int = 0) -> str:
-        """Starts on `port`, or for 0 on `before` or else the first free one from `FIRST_PORT` up; returns the URL.
-
-        Raises UserError.
-        """
-        if not 0 <= port <= 65535:
-            raise UserError(f"--port: {port} is not a port; use 1 to 65535, or 0 for a free one")
-        free = [*([before] if before else []), *range(FIRST_PORT, FIRST_PORT + TRIES)]
-        for number in [port] if port else free:
+    def listen(self, before: int = 0) -> str:
+        """Starts on the port `before`, or else the first free one from `FIRST_PORT` up; returns the URL. Raises UserError."""
+        for number in filter(None, (before, *range(FIRST_PORT, FIRST_PORT + TRIES))):
             try:
                 sockets = tornado.netutil.bind_sockets(number, LOOPBACK)
             except OSError:
@@ -105,8 +99,6 @@ class Server:
             self._http.add_sockets(sockets)
             self.port = number
             return f"http://{LOOPBACK}:{number}/{self.token}/"
-        if port:
-            raise UserError(f"--port: port {port} is in use or not allowed; use 0 for a free one")
         raise UserError(f"no free port from {FIRST_PORT} to {FIRST_PORT + TRIES - 1}")
 
     def send(self, message: bytes | str, newest_only: bool = False) -> None:

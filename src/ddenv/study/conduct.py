@@ -44,10 +44,7 @@ QUIET = 60.0
 
 @dataclass
 class Work:
-    """A cell in work by so many `workers`, since its run was as `before`.
-
-    `engine` is None while an engine of another study works on it. `problem` says why it did not end this time.
-    """
+    """A cell in work by so many `workers`, since its run was as `before`. `problem` says why it did not end this time."""
 
     cell: Cell
     path: Path
@@ -55,7 +52,7 @@ class Work:
     file: RunFile
     before: RunState
     state: RunState
-    engine: subprocess.Popen[bytes] | None = None
+    engine: subprocess.Popen[bytes]
     problem: str = ""
 
     @property
@@ -68,9 +65,8 @@ class Work:
 
     def has_ended(self) -> bool:
         """Whether no engine works on it any more."""
-        # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours,
-        # and then ours gave up.
-        at_work = (self.engine is not None and self.engine.poll() is None) or engine_is_alive(self.path)
+        # This comes before the events are read, so none is missed. Where the engine of a killed study works, ours gave up.
+        at_work = self.engine.poll() is None or engine_is_alive(self.path)
         self.catch_up()
         if not at_work and self.state.status != "finished":
             # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
@@ -96,36 +92,24 @@ def is_done(folder: Path, cell: Cell) -> bool:
         raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
     if other:
         raise UserError(f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}")
-    return _is_over(state) and not _all_broke(state) and not engine_is_alive(path)
+    return state.status == "finished" and not _broke(state) and not engine_is_alive(path)
 
 
-def _is_over(state: RunState) -> bool:
-    """Whether an engine has nothing to do: it makes tests again that broke, if the certificate is open without them."""
+def _broke(state: RunState) -> bool:
+    """Whether the baseline, or a claim of the certificate, is open since tests broke: an engine makes them again."""
+    if state.baseline is None:
+        return all(test.outcome in BROKEN for test in state.finished_tests)
     certificate = current(state)
-    broke = certificate is not None and any(claim.verdict == "unknown" for claim in certificate.claims)
-    return state.status == "finished" and not broke
-
-
-def _all_broke(state: RunState) -> bool:
-    """Whether the simulator broke in all baseline runs: it may work now."""
-    broke = all(test.outcome in BROKEN for test in state.finished_tests)
-    return state.status == "finished" and state.baseline is None and broke
+    return certificate is not None and any(claim.verdict == "unknown" for claim in certificate.claims)
 
 
 def _begin(folder: Path, cell: Cell, workers: int) -> Work:
     path = run_path(folder, cell)
-    if path.exists():
-        with RunFile(path) as old:
-            all_broke = _all_broke(fold(old.events()))
-        if all_broke:
-            path.unlink()
     if not path.exists():
         create_run(cell.scenario, path)
     file = RunFile(path)
     state = fold(file.events())
-    engine = None
-    if not engine_is_alive(path) and not _is_over(state):
-        engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
+    engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
     return Work(cell, path, workers, file, state, state, engine)
 
 
@@ -237,15 +221,10 @@ def _interrupt(*_: object) -> None:
 
 
 def _stop(running: Sequence[Work]) -> None:
-    """Stops engines, which record it."""
-    # On cells without an engine of ours, the engine of an earlier, killed study works.
-    left = [work for work in running if work.engine is None and engine_is_alive(work.path)]
-    for work in left:
-        with contextlib.suppress(UserError):
-            work.file.send("stop")
-    stop_engines([(work.file, work.engine) for work in running if work.engine is not None])
+    """Stops engines, which record it, also those that an earlier, killed study left."""
+    stop_engines([(work.file, work.engine) for work in running])
     deadline = time.monotonic() + STOP_WAIT
-    while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in left):
+    while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in running):
         time.sleep(POLL)
     for work in running:
         work.catch_up()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -22,8 +20,6 @@ from ddenv.text import count
 from ddenv.world.access import read_bytes, write_file
 
 ABOUT, LOCK = "study.json", "study.lock"
-# The numbers of a run come from these: another version may give another result.
-PACKAGES = ("drake", "numpy", "scipy", "scikit-learn")
 # A machine's name may be anything.
 LONGEST_NAME = 120
 
@@ -79,12 +75,9 @@ def write_sessions(folder: Path, all_of_them: tuple[Session, ...]) -> None:
 
 
 def versions() -> str:
-    """The versions of ddenv, Python and the packages that compute; imports none of them."""
-    known = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
-    for name in PACKAGES:
-        with contextlib.suppress(PackageNotFoundError):
-            known.append(f"{name} {version(name)}")
-    return ", ".join(known)
+    """The versions of ddenv, Python and the packages that compute: another one may give another result."""
+    packages = processor.versions("drake", "numpy", "scipy", "scikit-learn")
+    return f"ddenv {__version__}, Python {platform.python_version()}, {packages}"
 
 
 def machine() -> str:

@@ -124,9 +124,6 @@ def make_plan(
     known = {"all": schemas.names("algorithm")}
     chosen_algorithms = _chosen("--algorithms", algorithms, partial(schemas.check, "algorithm"), known)
     loaded = tuple(with_options(load_scenario(find_scenario(name)), **options) for name in scenario_names(scenarios))
-    for number, scenario in enumerate(loaded):
-        if scenario.name in (other.name for other in loaded[:number]):
-            raise UserError(f"--scenarios: two of them are called '{scenario.name}'; give each a name of its own")
     # Methods that use the same parts are the same.
     methods: dict[tuple[str, ...], Method] = {}
     for method in (Method(*parts) for parts in product(chosen_algorithms, chosen_pairs)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -103,10 +102,14 @@ class Result:
         return 1 - len(self.left) / len(self.elements) if self.elements else 0.0
 
     @property
-    def bounds(self) -> tuple[int, int]:
-        """The minimum of tests to show this result, and to find it (`least_tests`)."""
-        baseline_runs = self.cell.scenario.reduction.baseline_runs
-        return least_tests(len(self.elements), len(self.left), self.misses, baseline_runs)
+    def bound(self) -> int:
+        """The minimum of tests for any search that ends here, without its certificate.
+
+        After the baseline, f has to show once in what is left, and each of its models has to be left out without success, alone or
+        with others that are not left, with `misses` tests each.
+        """
+        shown_once = int(len(self.left) < len(self.elements))
+        return self.cell.scenario.reduction.baseline_runs + shown_once + len(self.left) * self.misses
 
 
 def read_cell(folder: Path, cell: Cell) -> Result:
@@ -235,7 +238,7 @@ class Row:
     @property
     def bound(self) -> float | None:
         """The minimum of tests for any method to find this result, the median of the seeds; None if nothing is minimal."""
-        return median(result.bounds[0] for result in self.minimal) if self.minimal else None
+        return median(result.bound for result in self.minimal) if self.minimal else None
 
     @property
     def tests(self) -> float | None:
@@ -268,24 +271,3 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
     low, high = said(min(values)), said(max(values))
     middle = said(median(values))
     return middle if low == high else f"{middle} ({low} to {high})"
-
-
-def least_tests(models: int, needed: int, misses: int, baseline_runs: int) -> tuple[int, int]:
-    """The minimum of tests for a search that ends at `needed` of `models` models, without its certificate: for any method, and on
-    average to find them, if each set of that size is equally likely.
-
-    After the baseline, f has to show once in what is left, and each of its models has to be left out without success, alone or with
-    others that are not left, with `misses` tests each.
-
-    A candidate without f costs `misses` tests, one with f at least one. So a test gives at most log2(1/x) bits, where
-    x + x^misses = 1 (Kraft's inequality; one bit a test if one miss is enough), and log2 C(n, k) bits are needed. A method that
-    knows more, such as that models near f are likelier, may need less.
-    """
-    to_show = baseline_runs + (1 if needed < models else 0) + needed * misses
-    # x in (0, 1) with x + x^misses = 1, by halving.
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if middle + middle**misses < 1 else (low, middle)
-    to_find = math.log(math.comb(models, needed)) / -math.log((low + high) / 2)
-    return to_show, max(to_show, baseline_runs + math.ceil(to_find - 1e-9))

@@ -29,11 +29,9 @@ MOST_WORLDS, MOST_LEFT, MOST_NAMES, MOST_CELLS = 4, 12, 8, 3
 FEWEST = 4
 BOUNDS = (
     "Search tests, the baseline included; certificates cost about the same after each method. Ranked by the ratio of tests to "
-    "the first bound (geometric mean over the scenarios); a method that is not certified with every seed is not ranked. No "
+    "the bound (geometric mean over the scenarios); a method that is not certified with every seed is not ranked. No "
     "search needs fewer tests: after the baseline, f has to show in what is left, and each of its models has to be left out "
-    "without success, with as many runs as a candidate without f takes. The second bound is for methods without any "
-    "knowledge: the mean number of tests to find the needed set of models, if all sets of that size are equally likely. A "
-    "method that first tries models near the failure may need fewer. The mark (◂) shows the fewest tests."
+    "without success, with as many runs as a candidate without f takes. The mark (◂) shows the fewest tests."
 )
 
 
@@ -236,14 +234,10 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     if len(scenarios[0]) < FEWEST or not any(row.minimal for rows in scenarios for row in rows):
         return None
     fewest = [min((tests for row in rows if (tests := _certain(row)) is not None), default=None) for rows in scenarios]
-    to_show, to_find = ([_bound(rows, which) for rows in scenarios] for which in (0, 1))
     names = tuple(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios)
     head = ("method", *names, "times the bound, mean")
     methods = [(_times(rows), rows) for rows in zip(*scenarios, strict=True)]
-    table: list[tuple[Cell, ...]] = [
-        ("minimum for a search that ends there", *to_show, "1.0"),
-        ("minimum to find it, if all sets are equally likely", *to_find, "–"),
-    ]
+    table: list[tuple[Cell, ...]] = [("minimum for a search that ends there", *map(_bound, scenarios), "1.0")]
     # Methods that are not certified everywhere come last.
     for times, rows in sorted(methods, key=lambda method: method[0] or math.inf):
         cells = [_cell(row, least) for row, least in zip(rows, fewest, strict=True)]
@@ -271,7 +265,7 @@ def _cell(row: Row, fewest: float | None) -> Cell:
     return Strong(f"{row.tests:g} ◂") if row.tests == fewest else f"{row.tests:g}"
 
 
-def _bound(rows: Sequence[Row], which: int) -> str:
-    """One of the bounds as a range, since cells may differ in how many models are left."""
-    bounds = [result.bounds[which] for row in rows for result in row.minimal]
+def _bound(rows: Sequence[Row]) -> str:
+    """The bound as a range, since cells may differ in how many models are left."""
+    bounds = [result.bound for row in rows for result in row.minimal]
     return " to ".join(map(str, sorted({min(bounds), max(bounds)}))) if bounds else "–"

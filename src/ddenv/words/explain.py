@@ -307,8 +307,8 @@ def _finished(state: RunState) -> Happening:
     return "returned", (
         *passing,
         f"Minimal: {kept} left. {_reason(state, '')}",
-        f"Kept: {first_of([plain(name) for name in state.environment], NAMED)}.",
         *_instead_of_f(state),
+        f"Kept: {first_of([plain(name) for name in state.environment], NAMED)}.",
         *means,
         *stays,
         base,
@@ -316,7 +316,7 @@ def _finished(state: RunState) -> Happening:
 
 
 def _instead_of_f(state: RunState) -> tuple[str, ...]:
-    """What the robot does without models that f needs, where it mostly fails in another way; and what counts that as f."""
+    """What the robot does without models that f needs, where it mostly fails in another way; and what can be done about it."""
     if (certificate := current(state)) is None:
         return ()
     ends = {claim: end for claim in certificate.claims if (end := failing_instead(state, certificate, claim))}
@@ -327,6 +327,9 @@ def _instead_of_f(state: RunState) -> tuple[str, ...]:
     if farthest is not None:
         wider = math.floor(farthest * 10 + 1) / 10
         said.append(f"To count that as f, too, start again with epsilon {wider:g} m (now {epsilon:g} m).")
+    if ends:
+        passing = "" if state.isolated is not None else ", i finds a nearest world that passes"
+        said.append(f"f lists all other failures and reduces one in a branch{passing}.")
     return tuple(said)
 
 

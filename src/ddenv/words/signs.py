@@ -62,10 +62,10 @@ DROPS = "↓"
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
 
 
-def bar(part: float, aim: float, width: int = 20) -> str:
-    """A share as a bar of so many cells, with a mark where it has to come."""
-    filled, mark = round(part * width), min(width - 1, round(aim * width))
-    return "".join("┃" if cell == mark else "█" if cell < filled else "░" for cell in range(width))
+def bar(part: float, aim: float) -> str:
+    """A share as a bar of 20 cells, with a mark where it has to come."""
+    filled, mark = round(part * 20), min(19, round(aim * 20))
+    return "".join("┃" if cell == mark else "█" if cell < filled else "░" for cell in range(20))
 
 
 def signs(counts: Mapping[str, int]) -> str:

@@ -15,7 +15,7 @@ from textual import events, on
 from textual.app import App, ComposeResult
 from textual.command import Provider
 from textual.geometry import Size
-from textual.screen import Screen
+from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
@@ -113,6 +113,7 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
+        self._held: tuple[str, dict[str, Any]] | None = None
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
@@ -145,6 +146,7 @@ class Workbench(App[int]):
             await super().on_event(event)
 
     def on_mount(self) -> None:
+        self.screen_change_signal.subscribe(self, lambda _: self._show_held())
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
         self.app_resume_signal.subscribe(self, lambda _: self._redraw())
         self._write("\x1b[22;2t")
@@ -164,9 +166,15 @@ class Workbench(App[int]):
             self.call_after_refresh(gc.freeze)
 
     def notify(self, message: str, **options: Any) -> None:
-        """As every app, but at most one notice is shown."""
-        self.clear_notifications()
-        super().notify(message, **options)
+        """As every app, but at most one notice is shown, and none over a dialog: it waits until that is closed."""
+        self._held = message, options
+        self._show_held()
+
+    def _show_held(self) -> None:
+        if self._held is not None and not any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:]):
+            (message, options), self._held = self._held, None
+            self.clear_notifications()
+            super().notify(message, **options)
 
     def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson | ShowRace) -> Screen[Any]:
         if isinstance(asked, ShowRun):

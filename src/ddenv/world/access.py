@@ -135,6 +135,16 @@ def read_bytes(path: Path) -> bytes:
         raise UserError(f"{path}: {error}") from None
 
 
+def resolved(path: Path) -> Path:
+    """The whole path of a file. Raises UserError for one that is not UTF-8: run files, which are JSON, cannot hold it."""
+    whole = path.resolve()
+    try:
+        str(whole).encode()
+    except UnicodeEncodeError:
+        raise UserError(f"{whole}: this path is not UTF-8 text, so that no run can name it; rename it") from None
+    return whole
+
+
 def write_file(path: Path, content: bytes, mode: int = 0o666) -> None:
     """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises UserError.
 

@@ -16,7 +16,7 @@ from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
-from ddenv.world.access import is_folder, read_bytes
+from ddenv.world.access import is_folder, read_bytes, resolved
 from ddenv.world.scenario import Oracle, Scenario
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -55,7 +55,7 @@ def find_scenario(name: str) -> Path:
 def load_scenario(path: Path) -> Scenario:
     """The scenario in the YAML file `path`, with its file names made absolute. Raises UserError."""
     scenario = validate(_data(path, "name, world, robot and goal"), str(path))
-    folder = path.resolve().parent
+    folder = resolved(path).parent
     robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
     model_path = tuple(folder / each for each in scenario.reading.model_path)
     reading = scenario.reading.model_copy(update={"model_path": model_path})

@@ -78,6 +78,20 @@ def test_links_that_others_name_stay(read, more):
     assert parse_world(text, world.path).elements() == ("house",)
 
 
+@pytest.mark.parametrize(
+    ("walls", "more"),
+    [
+        (ROOMS.replace("'b'", "'a'"), ""),
+        (ROOMS, "<model name='house/walls/a'><static>1</static><link name='l'/></model>"),
+    ],
+    ids=["two parts", "a part and a model"],
+)
+def test_a_model_whose_parts_would_have_one_name_stays_whole_and_is_noted(read, walls, more):
+    world = read(house(walls) + more, inside=True)
+    assert "house" in {model.name for model in world.models}
+    assert any("have one name" in note.why for note in world.notes)
+
+
 def test_what_moves_and_what_other_files_hold_stays_whole_and_is_noted(read, tmp_path):
     (tmp_path / "hut.sdf").write_text(f"<sdf version='1.9'>{house(ROOMS).replace('house', 'hut')}</sdf>")
     cart = f"<model name='cart'><link name='l'>{shape('collision', 'a')}{shape('collision', 'b')}</link></model>"

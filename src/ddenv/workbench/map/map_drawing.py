@@ -35,7 +35,8 @@ DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
 # Maximum width of a model's name, in cells.
-NAME = 20
+# Names are cut to the first of these lengths for which there is room.
+LENGTHS = (26, 18, 10)
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 # A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
 _Line = tuple[np.ndarray, int, int]
@@ -215,25 +216,35 @@ def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> N
         at = drawn.cells.get(index) or view.cell(*prints[index].center)
         if at is None:
             continue
-        text = shortened(plain(prints[index].name), NAME)
         sign = len(drawn.how.signs.texts[index]) if index in drawn.cells else 0
-        begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
-        for down, right in begins:
-            row, column = at[0] + down, at[1] + right
-            if not (0 <= row < view.rows and 0 <= column <= view.columns - len(text)):
-                continue
-            # With a free cell on each side names stay apart.
-            if not written[row, max(0, column - (right != sign + 1)) : column + len(text) + 1].any():
-                canvas.put((row, column), text)
-                written[row, column : column + len(text)] = True
-                break
+        texts = dict.fromkeys(shortened(plain(prints[index].name), length) for length in LENGTHS)
+        found = next((place for text in texts if (place := _room(drawn, at, text, sign))), None)
+        if found is not None:
+            row, column, text = found
+            canvas.put((row, column), text)
+            written[row, column : column + len(text)] = True
+
+
+def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[int, int, str] | None:
+    """The row and column for a name beside a sign of so many cells, or on the model without one; None where there is no room."""
+    begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
+    for down, right in begins:
+        row, column = at[0] + down, at[1] + right
+        if not (0 <= row < drawn.view.rows and 0 <= column <= drawn.view.columns - len(text)):
+            continue
+        # With a free cell on each side names stay apart.
+        if not drawn.written[row, max(0, column - (right != sign + 1)) : column + len(text) + 1].any():
+            return row, column, text
+    return None
 
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
     layers, snapshot = shown.layers, shown.snapshot
-    if shown.ways:
+    signs = {"f": palette.failure, "goal": palette.goal}
+    limits = [(ring, signs.get(verdict, palette.shade(DULL)), 0) for verdict, ring in shown.limits]
+    if shown.ways or limits:
         both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
-        return [(way.points, color, dash) for way, color, dash in both][::-1]
+        return [*limits, *[(way.points, color, dash) for way, color, dash in both][::-1]]
     lines = [(_path(snapshot.evidence), palette.shade(PATH), 0)] if "path" in layers else []
     if "original" in layers and not shown.same_paths:
         lines.insert(0, (_path(snapshot.original), palette.shade(ORIGINAL), DASH))

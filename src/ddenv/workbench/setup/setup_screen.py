@@ -335,7 +335,7 @@ class SetupScreen(Screen[None]):
 
     def _complain(self, error: UserError) -> None:
         self._busy = False
-        if isinstance(error, form.FieldError) and error.field != form.NAME.id:
+        if isinstance(error, form.FieldError) and form.NAME.id not in error.wrong:
             self._show_pane("settings")
         self.form.complain(error)
 

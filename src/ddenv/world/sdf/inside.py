@@ -22,18 +22,23 @@ def opened(world: World, root: Element) -> World:
     at = {element.start: element for element in root.iter() if element.tag in ("model", "include")}
     models: list[Model] = []
     shared, notes = list(world.shared), list(world.notes)
+    taken = {model.name for model in world.models}
     for model in world.models:
         element = at[model.spans[0][0]]
         if len(model.collisions) < 2 or is_ground(model):
             models.append(model)
             continue
         closed = _closed(model, element, model.name in world.anchors)
+        links = {} if closed else dict(_links(element))
+        parts = [part for link in model.links if links for part in _parts(model, link, links[link.name])]
+        names = {part.name for part in parts}
+        if len(names) < len(parts) or not taken.isdisjoint(names):
+            closed = "two of its parts, or a part and a model, have one name"
         if closed:
             notes.append(Note("ignored", model.name, place(element), "--inside", f"it stays whole, since {closed}"))
             models.append(model)
             continue
-        links = dict(_links(element))
-        parts = [part for link in model.links for part in _parts(model, link, links[link.name])]
+        taken |= names
         models += parts
         shared += _emptied(model, element, links, parts)
     return replace(world, models=tuple(models), shared=tuple(shared), notes=tuple(notes))
