@@ -90,7 +90,9 @@ def isolate_command(
         found = nearest(file, state)
     if found is None:
         # The engine was stopped from elsewhere.
-        raise UserError(f"{path}: the search for a world that passes was stopped; continue with: ddenv isolate {attach_name(path)}")
+        raise UserError(
+            f"{path}: the search for a world that passes was stopped; continue with: ddenv isolate {attach_name(path)}"
+        )
     if as_json:
         print(json.dumps({"nearest": asdict(found)}))
     else:

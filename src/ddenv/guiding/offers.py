@@ -153,13 +153,15 @@ def _isolate(now: Situation, _: Pointed) -> Command | Isolate:
 
 def _any(state: RunState, models: Collection[str]) -> bool:
     """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that cannot be selected."""
+    if not models:
+        if not state.environment:
+            raise UserError("there are no models to choose from")
+        return False
     elements = frozenset(state.elements)
     fixed = next((name for name in models if name not in elements), None)
     if fixed is not None:
         raise UserError(f"{shortened(fixed, LONGEST)} is protected: it always stays")
-    if not models and not state.environment:
-        raise UserError("there are no models to choose from")
-    return bool(models)
+    return True
 
 
 # What the footer calls a command where the action's usual words do not fit.

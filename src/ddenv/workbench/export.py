@@ -69,7 +69,13 @@ class ExportScreen(ModalScreen[None]):
     AUTO_FOCUS = "#export-world"
     BINDINGS: ClassVar = [
         *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
-        *keys("export", HELP, ("close", "escape", "dismiss", "close", "close this dialog")),
+        *keys(
+            "export",
+            HELP,
+            ("close", "escape", "dismiss", "close", "close this dialog"),
+            ("next", "down", "app.focus_next", "", "the next field"),
+            ("previous", "up", "app.focus_previous", "", "the field before"),
+        ),
     ]
 
     def __init__(self, run: Path, world: Path = Path()) -> None:

@@ -92,6 +92,9 @@ class MapDrawing:
     def __init__(self) -> None:
         self._trails: dict[int, list[Point]] = {}
         self._moved: MovedPrints | None = None
+        # The last picture, and what it is of.
+        self._of: tuple[Shown, View, Palette] | None = None
+        self._picture: Picture | None = None
 
     def fitting(self, shown: Shown, columns: int, rows: int) -> View:
         """A view of all important places; in a large world, of the ways of finished tests."""
@@ -114,7 +117,7 @@ class MapDrawing:
     def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         shown = self._with_live(shown)
-        still = _still(shown, view, palette)
+        still = self._still(shown, view, palette)
         canvas = still.canvas.copy()
         paths, robots = _riders(shown, palette) if shown.ways else self._driving(shown, palette)
         for points, color, dash in paths:
@@ -127,6 +130,13 @@ class MapDrawing:
         if cursor is not None:
             _crosshair(canvas, cursor, still.written, palette)
         return canvas, still
+
+    def _still(self, shown: Shown, view: View, palette: Palette) -> Picture:
+        """The last one again if only the crosshair or the focus moved."""
+        of = shown, view, palette
+        if self._picture is None or self._of is None or any(a is not b for a, b in zip(of, self._of, strict=True)):
+            self._of, self._picture = of, _still(*of)
+        return self._picture
 
     def _driving(self, shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
         live, ids = shown.snapshot.live, _in_focus(shown.snapshot)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,7 +92,7 @@ def kept(shown: Shown) -> Kept:
 def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
     names, floor = _known(tuple(prints))
     kinds = _kinds(names, floor, who)
-    parts = np.array([who.parts.get(name, -1) for name in names], dtype=int)
+    parts = np.fromiter(map(who.parts.get, names, repeat(-1)), dtype=int, count=len(names))
     # Only some of many parts look different, and only these colours are mixed.
     short = np.where(parts < 0, -1, parts % len(HUES))
     found, tones = np.unique(kinds * (len(HUES) + 1) + short + 1, return_inverse=True)
@@ -101,12 +102,12 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 
 
 @lru_cache(maxsize=4)
-def _known(prints: tuple[Footprint, ...]) -> tuple[list[str], np.ndarray]:
+def _known(prints: tuple[Footprint, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     areas = np.array([each.area for each in prints])
-    return [each.name for each in prints], areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
+    return tuple(each.name for each in prints), areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
 
 
-def _signs(names: Sequence[str], kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
+def _signs(names: tuple[str, ...], kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
     """A letter for each model of a part, with its number in the order of sensing if that is shown, and whether it drops."""
     groups = kinds * (int(parts.max(initial=-1)) + 2) + parts + 1
     found, which = np.unique(groups, return_inverse=True)
@@ -132,7 +133,7 @@ def _label(kind: int, part: int) -> str:
     return letter.lower() if kind in (LEFT_OUT, FLOOR_OUT) else letter
 
 
-def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
+def _kinds(names: tuple[str, ...], floor: np.ndarray, who: Kept) -> np.ndarray:
     kinds = np.where(floor, FLOOR, KEPT)
     if who.shown is not None:
         out = ~_among(names, who.shown)
@@ -144,7 +145,9 @@ def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
     return kinds
 
 
-def _among(names: Sequence[str], those: frozenset[str]) -> np.ndarray:
+# The world and what is left of it stay the same while the user looks at one candidate after the other.
+@lru_cache(maxsize=8)
+def _among(names: tuple[str, ...], those: frozenset[str]) -> np.ndarray:
     if not those:
         return np.zeros(len(names), dtype=bool)
     return np.fromiter(map(those.__contains__, names), dtype=bool, count=len(names))

@@ -46,7 +46,7 @@ SMALLEST = (64, 18)
 PERIOD = 0.1
 # The maximum number of tests in the list of those to play beside one, and the widths of its columns.
 LISTED = 200
-NUMBER, WORDS, SEED, OUTCOME = 7, 36, 12, 16
+NUMBER, WORDS, SEED, OUTCOME = 7, 32, 12, 16
 
 
 class Playing:

@@ -8,7 +8,7 @@ from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from rich.style import Style
 from textual import events
-from textual.geometry import Size
+from textual.geometry import Region, Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
@@ -127,8 +127,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         """Moves the cursor. The view goes with it, if the cursor was in sight."""
         if row is not None:
             reveal = reveal or self._in_sight
+            lines = (each + 1 - self.scroll_offset.y for each in (self.cursor_row, row))
             self.cursor_row = row
-            self.refresh()
+            self.refresh(*(Region(0, y, self.size.width, 1) for y in lines if y > 0))
             if reveal:
                 self._reveal()
 

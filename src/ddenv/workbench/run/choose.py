@@ -160,7 +160,7 @@ MEANINGS = {
     "path": "the robot's path on the last similar run",
     "original": "the robot's path in f itself",
     "failure": "where the robot ended in f",
-    "names": "the models' names; n shows or hides them on every map",
+    "names": "the models' names, as n does on every map",
 }
 
 
@@ -198,4 +198,4 @@ def copied(what: str, text: str) -> Text:
     lines = text.splitlines()
     more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
     shown = truncated(plain(lines[0]), 40) if lines else ""
-    return Text(f"{what:<24} ", no_wrap=True).append(f"{shown}{more}", "dim")
+    return Text(f"{what:<26} ", no_wrap=True).append(f"{shown}{more}", "dim")

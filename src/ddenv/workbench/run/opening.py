@@ -238,7 +238,9 @@ def _not_over(snapshot: Snapshot) -> str:
         what = "the search for a world that passes"
     elif state.margining is not None:
         what = "the search for margins"
-    then = "; r goes on with it" if snapshot.engine == "absent" else "; i stops it" if state.isolating is not None else ""
+    then = (
+        "; r goes on with it" if snapshot.engine == "absent" else "; i stops it" if state.isolating is not None else ""
+    )
     return f"I works once {what} is over{then}"
 
 

@@ -36,7 +36,7 @@ ON_MAP = ids(
     "run",
     "help quit pause accept reject leave_out map.pick map.next step pin without only undo history export why find layers fit",
 )
-LOOKING = ids("run", "history rounds facts play why export find copy layers signs help quit")
+LOOKING = ids("run", "help quit history rounds facts play why export find copy layers signs")
 # These ask for models if none are selected. A pin always asks: it ends the search.
 TITLES = {
     "pin": "Pin or unpin models (+): pinned ones stay; a new search begins",

@@ -43,7 +43,12 @@ LIGHT = Theme(
     surface="#ffffff",
     panel="#e9eef5",
     dark=False,
-    variables={"footer-key-foreground": "#0a58b0", "primary-muted": "#b9d4f3", "panel-lighten-2": "#a9b6c8"},
+    variables={
+        "footer-key-foreground": "#0a58b0",
+        "primary-muted": "#b9d4f3",
+        "panel-lighten-2": "#a9b6c8",
+        "text-disabled": "auto 55%",
+    },
 )
 # The terminal's own sixteen colours: for terminals that have no more, and for users who prefer them.
 ANSI = "ansi-dark"
