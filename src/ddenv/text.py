@@ -107,8 +107,7 @@ def about(middle: float, low: float = 0.0, high: float = 0.0) -> str:
 
 def coordinates(place: Sequence[float]) -> str:
     """A place, m, as it is said: 5.42, -0.56."""
-    # Adding zero makes -0.0 the same as 0.0.
-    return ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in place)
+    return ", ".join(f"{value:z.2f}" for value in place)
 
 
 def percent(part: float) -> str:

@@ -43,9 +43,15 @@ def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
     assert elsewhere.startswith(f"next: 'ddenv open {run.path}' shows it")
     assert summary_lines(state, runs_folder() / "crates-1.ddenv")[-1] == (
         "next: 'ddenv open crates-1' shows it, 'ddenv why crates-1' says why it fails, "
+        "'ddenv isolate crates-1' finds a nearest world that passes, "
         "'ddenv export crates-1 --bundle crates-1.zip' packs it for others"
     )
     assert not any(line.startswith("next:") for line in summary_lines(replace(state, status="stopped"), run.path))
+
+
+def test_a_nearest_world_that_passes_is_offered_until_it_is_known(run):
+    assert "next: " in told(fake_moments.isolated(run))[1]
+    assert "ddenv isolate" not in told(run)[1]
 
 
 def test_what_only_helps_can_be_left_out_by_a_key(run):

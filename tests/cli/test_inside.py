@@ -55,6 +55,14 @@ def test_a_world_without_models_that_have_parts_is_refused_in_one_line(tmp_path,
     assert not (tmp_path / "run.ddenv").exists()
 
 
+def test_inside_a_run_other_options_are_refused_and_not_ignored(run, monkeypatch, capsys):
+    fake_moments.finished(run)
+    for option in (("--seed", "5"), ("--cluster", "tcp://there:8786"), ("--exact",), ("--spawn", "0,0,0.2,0")):
+        is_one_line(
+            in_process(monkeypatch, capsys, "run", run.path, "--inside", *option), "a run keeps its own options"
+        )
+
+
 async def test_a_key_begins_a_run_inside_what_is_left(run, home):
     """The models of the world are single boxes: that is said in the line of messages, and no file is written."""
     fake_moments.finished(run)
@@ -65,3 +73,11 @@ async def test_a_key_begins_a_run_inside_what_is_left(run, home):
         assert "no model has parts that can be removed" in session.said()
         assert isinstance(session.app.screen, RunScreen)
         assert not list(home.glob("**/*-inside*"))
+
+
+async def test_the_key_begins_nothing_on_a_screen_that_only_watches(run, home):
+    fake_moments.finished(run)
+    async with Attached(run, watch=True) as session:
+        await session.press("I")
+        await session.app.workers.wait_for_complete()
+        assert "watching only" in session.said()

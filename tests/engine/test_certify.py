@@ -70,7 +70,7 @@ def test_a_certificate_has_fresh_runs_of_what_is_left_and_without_each_model(tmp
     assert all(test.run < FIRST_FRESH_RUN for test in state.tests if test.phase != "certify")
     assert state.reason == (
         "no single model can be removed: f in 15 of 15 fresh runs (72 % to 100 %), at least 68 % of the whole world's rate; "
-        "without any one of these 2, f in none of 10 fresh runs each (at most 79 % as often)"
+        "without any one of these 2, f in none of 10 fresh runs each (upper bound: 79 % as often)"
     )
 
 

@@ -11,11 +11,14 @@ from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool
 from ddenv.engine.worker import Run
 from ddenv.errors import UserError
-from ddenv.evidence.margins import FIX_RUNS, fixes_of, margins_of
+from ddenv.evidence.margins import FIX_RUNS, changes_at, fixes_of, margins_of
 from ddenv.runfile.events import EngineFailed, EngineStopped
+from ddenv.runfile.position import Position
 from ddenv.runfile.store import RunFile
+from ddenv.runs.changes import beside, changed_run, changes
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
+from ddenv.runs.playback import played
 from ddenv.runs.subject import load_parts, read_parts
 from ddenv.words.margins import lines
 from ddenv.world.load import load_scenario
@@ -144,6 +147,54 @@ def test_a_fix_that_only_the_seeds_of_the_search_show_is_refuted(path):
     assert any("no fix is certified" in line.lower() for line in table(state))
 
 
+def together(keep, seed, changes):
+    """Far to the left, or slowly, something else happens; only both together lead to the goal."""
+    left, slow_ = changes.get("wall.y", 0.0) > 0.7, changes.get("controller.speed", 1.0) < 0.5
+    return "pass" if left and slow_ else "other" if left or slow_ else "similar"
+
+
+def test_two_numbers_are_changed_together_where_no_single_one_leads_to_the_goal(path, tmp_path):
+    pool = fake()
+    pool.changed = together
+    state = work(path, pool)
+    *single, both = margins_of(state.margins)
+    assert all(side.goal is None for one in single for side in one.sides)
+    assert both.asked.name == "wall.y & controller.speed"
+    changes = dict(changes_at(both.asked, both.up.goal.value))
+    assert together((), 0, changes) == "pass"
+    (fix,) = [one for one in fixes_of(state.margins) if one.confirmed]
+    assert (fix.name, fix.value, fix.runs) == (both.asked.name, both.up.goal.value, FIX_RUNS)
+    said = table(state)[len(single) + 3]
+    for name, value in changes.items():
+        assert f"{name} from " in said and f" to {value:.4g}" in said
+    assert "of their ranges" in said
+    # The world with both is written, and another call finds all of it known.
+    given = [f"{name}={value}" for name, value in changes.items()]
+    export_world(path, tmp_path / "fixed.sdf", tmp_path / "fixed.yaml", margins=given)
+    fixed = load_scenario(tmp_path / "fixed.yaml")
+    assert fixed.controller.speed == pytest.approx(changes["controller.speed"])
+    assert len(work(path, fake()).margins.runs) == len(state.margins.runs)
+
+
+def test_the_run_that_shows_f_has_one_beside_it_at_each_value(path):
+    state = work(path, fake())
+    left = beside(state)
+    assert left.outcome == "similar"
+    assert set(state.models_of(left)) == set(state.environment)
+    with RunFile(path) as file:
+        position = Position(file.events)
+        position.catch_up()
+        found = changes(file, state, None)
+        assert [one.name for one in found] == GLOBS
+        for one in found:
+            run, test = changed_run(state, one.parting.without_test)
+            assert one.parting.with_test == left.id
+            assert (run.name, run.value, run.seed) == (one.name, one.value, left.seed)
+            assert file.motion(test.id) == played(file, position, test.id).rows
+    with pytest.raises(UserError, match="there is no run 9999 with a changed number"):
+        changed_run(state, -9999)
+
+
 def test_a_value_that_is_not_possible_is_said_and_makes_no_run(path):
     state = work(path, fake(), globs=["deck.z"])
     (deck,) = margins_of(state.margins)
@@ -187,7 +238,7 @@ def test_a_run_with_another_value_has_the_bits_of_the_world_that_is_exported(tmp
         scenario, world, robot = read_parts(file)
     keep = frozenset(world.elements())
     files = tmp_path / "fixed.sdf", tmp_path / "fixed.yaml"
-    export_world(run, *files, margin="wall.y=0.25")
+    export_world(run, *files, margins=("wall.y=0.25",))
     fixed = load_scenario(files[1])
     with closing(Pool(scenario, world, robot, 1)) as pool, closing(Pool(fixed, *load_parts(fixed), 1)) as other:
         own = [simulated(pool, keep, changes) for changes in ((), (("wall.y", 0.25),), (("wall.y", 2.0),), ())]

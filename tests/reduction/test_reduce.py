@@ -313,6 +313,7 @@ WRONG = {
     ),
     "times in a list": ({"first_sensed": ["a"]}, "first_sensed: expected a mapping from names to values, found list"),
     "a time before the beginning": ({"first_sensed": {"a": -1e6}}, "first_sensed['a']: expected a time in s"),
+    "a time beyond all numbers": ({"first_sensed": {"a": 10**400}}, "first_sensed['a']: expected a time in s"),
     "a complex trajectory": ({"trajectory": TRAJECTORY + 1j}, "trajectory: expected finite numbers"),
     "no algorithm": ({"algorithm": None, **ALL}, "algorithm: expected a name, found None; use one of ddenv"),
     "a number as schema": ({"partitioning": 3}, "partitioning: expected a name, found 3"),

@@ -12,7 +12,8 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import stack_with, stacks_of
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
-from ddenv.runs.subject import load_parts, named_file, read_parts, scenario_for_world
+from ddenv.runs.folder import named_file
+from ddenv.runs.subject import load_parts, read_parts, scenario_for_world
 from ddenv.world.load import load_scenario
 from tests.command import in_process
 from tests.runs.test_export import _reduce, box

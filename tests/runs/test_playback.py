@@ -94,9 +94,11 @@ def test_of_another_simulator_only_the_robot_moves_and_it_says_so(tmp_path):
     run.close()
 
 
-@pytest.mark.parametrize("number", [0, -1, 10**9])
-def test_there_is_no_such_test(run, number):
-    with pytest.raises(UserError, match=f"there is no test {number}"):
+@pytest.mark.parametrize(
+    ("number", "what"), [(0, "test 0"), (-1, "run 1 with a changed number"), (10**9, "test 1000000000")]
+)
+def test_there_is_no_such_test(run, number, what):
+    with pytest.raises(UserError, match=f"there is no {what}"):
         played(run.file, at_end(run), number)
 
 

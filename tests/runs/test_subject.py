@@ -6,8 +6,8 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
-from ddenv.runs.folder import BUNDLED_RUN, find_run, runs_folder
-from ddenv.runs.subject import named, open_subject, robot_file
+from ddenv.runs.folder import BUNDLED_RUN, find_run, named, runs_folder
+from ddenv.runs.subject import open_subject, robot_file
 from ddenv.world.load import SCENARIOS, load_scenario
 from tests.conftest import DATA
 

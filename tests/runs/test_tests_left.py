@@ -209,6 +209,8 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
     make(10_000 + high)
     assert left(run) is None
     assert left_said(state_of(run), True)[0] == "more tests than forecast"
+    run.write("engine_stopped", reason="")
+    assert not left_said(state_of(run), False), "nothing is left of what was stopped"
 
 
 def test_no_time_is_said_while_nothing_runs(run):

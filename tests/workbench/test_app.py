@@ -19,7 +19,9 @@ from textual.widgets import OptionList, Static
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help, commands, groups
+from ddenv.workbench.map.world_map import WorldMap
 from tests.waiting import PATIENCE, eventually
+from tests.workbench.setup.setup_session import Opened
 
 
 def told(screen):
@@ -58,6 +60,15 @@ async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs)
         assert {shortcut.id for shortcut in shortcuts} >= {"run.pause", "run.pin", "app.leave"}
         await offers(pilot, "choose the colours", "choose the colours")
         await offers(pilot, "box_1", "go to [bold]box_1[/] on the map\n")
+
+
+async def test_a_model_is_a_command_of_the_setup_screen_too(scenarios):
+    async with Opened((80, 24)) as session:
+        await offers(session.pilot, "crate_01", "go to crate_01 on the map")
+        await session.press("enter")
+        await session.pilot.pause()
+        world = session.screen.query_one(WorldMap)
+        assert world.is_on_screen and world.model_at_cursor == "crate_01"
 
 
 async def offers(pilot, query, words):

@@ -119,6 +119,8 @@ async def test_every_sign_has_its_meaning_one_key_away(run):
     for words in (*OUTCOME.values(), *VERDICT.values(), *CLAIM.values()):
         assert words[0] in shown
     assert shown >= {sign for sign, _ in (*LEGEND, *MORE_SIGNS, *STATUS.values())}
+    on_map = [sign for sign, _ in signs()["On the map"]]
+    assert len(set(on_map)) == len(on_map)
     fake_moments.finished(run)
     async with Attached(run, size=(80, 24)) as session:
         await session.press("k")

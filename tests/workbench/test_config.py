@@ -65,7 +65,7 @@ def test_a_file_sets_theme_and_keys(config):
         ("keys: [run.pause]", "keys: should be a valid dictionary"),
         ("keys: {run.pause: ?}", "not valid YAML"),
         ("notify: maybe", "notify: should be a valid boolean"),
-        ("- theme", "should be a valid dictionary"),
+        ("- theme", "expected lines such as"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(config, text, told):

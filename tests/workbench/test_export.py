@@ -4,12 +4,14 @@ from contextlib import asynccontextmanager
 
 import fake_moments
 import pytest
+from attached import Attached
 from textual.app import App
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
 from ddenv.runs.programs import export_mcap
-from ddenv.workbench.export import ExportScreen
+from ddenv.workbench.export import MEANINGS, ExportScreen
+from ddenv.workbench.help.shortcuts import Help
 
 NAMES = ("crates-1.html", "crates-1.minimal.robot.sdf", "crates-1.minimal.sdf", "crates-1.minimal.yaml")
 
@@ -93,6 +95,21 @@ async def test_a_scenario_goes_with_a_world(run, folder):
         await pilot.click(scenario)
         await pilot.pause()
         assert world.value
+
+
+async def test_the_dialog_says_what_each_file_is_for_and_has_help(run, folder):
+    fake_moments.finished(run)
+    async with Attached(run) as session:
+        await session.press("E", "down")
+        screen = session.app.screen
+        meaning = screen.query_one("#export-meaning", Static)
+        for kind, words in MEANINGS.items():
+            screen.query_one(f"#export-{kind}").focus()
+            await session.pilot.pause()
+            assert str(meaning.render()) == words
+            assert len(words) <= meaning.size.width
+        await session.press("question_mark")
+        assert isinstance(session.app.screen, Help)
 
 
 async def test_what_is_wrong_is_said_in_the_dialog(run, folder):

@@ -263,6 +263,30 @@ async def test_one_key_leaves_out_the_model_that_only_helps(run, monkeypatch):
         assert "no certificate shows a model that only helps" in session.said()
 
 
+async def test_a_list_of_models_brings_the_map_to_a_small_terminal(run):
+    fake_moments.guided(run).hold()
+    async with Attached(run, (80, 24)) as session:
+        await session.press("2")
+        world = session.screen.query_one(WorldMap)
+        assert not world.is_on_screen
+        await session.press("p", "down")
+        assert world.is_on_screen and world.aims and world.model_at_cursor == "crate_01"
+
+
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (fake_moments.isolating, "the search for a world that passes goes on; i stops it: I works once it is over"),
+        (fake_moments.mid_round, "the reduction goes on: I works once it is over"),
+    ],
+)
+async def test_no_run_inside_begins_before_all_is_over(run, make, why):
+    make(run).hold()
+    async with Attached(run) as session:
+        await session.press("I")
+        assert session.said() == why
+
+
 @pytest.mark.parametrize(
     ("make", "shown"),
     [

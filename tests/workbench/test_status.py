@@ -41,6 +41,12 @@ def test_everything_is_said_where_there_is_room(run):
     assert " (" in told["left"]
 
 
+@pytest.mark.parametrize("width", [100, 80])
+def test_how_much_is_left_is_said_also_where_there_is_little_room(run, width):
+    told = said(mid_round(run), width)
+    assert told["left"].startswith("about ") and "tests" in told
+
+
 def test_it_is_said_that_the_piles_settle(run):
     run.created().write("supports_started")
     assert said(snapshot(run))["state"] == "▶ finding models that support others"

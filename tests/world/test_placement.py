@@ -269,3 +269,9 @@ def test_the_way_down_is_measured_to_what_is_below(spawn, height):
     assert drop(WALL, HUSKY, spawn) == pytest.approx(height, abs=0.05)
     told = [about for about, _ in notes_on_start(WALL, HUSKY, spawn)]
     assert told == (["drop"] if height > DROP else [])
+
+
+def test_a_goal_inside_a_post_is_noted():
+    start = Spawn(x=0, y=0, z=0.45)
+    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, (0.0, -4.0))] == ["goal"]
+    assert list(notes_on_start(WALL, HUSKY, start, (0.0, -3.0))) == []

@@ -26,12 +26,12 @@ from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
 from ddenv.cli.run import certify_command, resume_command, run_command
 from ddenv.cli.share import CANNOT_SAY, export_command, report_command, reproduce_command
 from ddenv.cli.study import study_command
+from ddenv.cli.terminal import announce
 from ddenv.cli.test import test_command
 from ddenv.cli.workbench import open_command, serve_command
 from ddenv.cli.world import world_group
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
-from ddenv.text import printable
 
 
 class Commands(click.Group):
@@ -64,7 +64,7 @@ def _can_be_opened(word: str) -> bool:
     path = Path(word)
     if path.suffix or len(path.parts) > 1 or path.exists():
         return True
-    from ddenv.runs.subject import named
+    from ddenv.runs.folder import named
 
     return named(word) is not None
 
@@ -133,7 +133,7 @@ def _told(error: Exception, all_of_it: bool) -> int:
     What is no error of the user is raised again, or shown if `all_of_it`.
     """
     if isinstance(error, UserError):
-        print(f"ddenv: {error}", file=sys.stderr)
+        announce(f"ddenv: {error}")
     elif isinstance(error, click.exceptions.NoArgsIsHelpError):
         print(error.format_message(), file=sys.stderr)
     elif isinstance(error, click.ClickException):
@@ -144,7 +144,7 @@ def _told(error: Exception, all_of_it: bool) -> int:
             like = [each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])]
             error = click.NoSuchOption(error.option_name, possibilities=like)
         command = "ddenv" if context is None else context.command_path
-        print(printable(f"ddenv: {error.format_message().rstrip('.')}; see '{command} --help'"), file=sys.stderr)
+        announce(f"ddenv: {error.format_message().rstrip('.')}; see '{command} --help'")
     elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
         # Nobody reads the output any more (as with `| head`), or a disk is full. Else Python tries to write the rest at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

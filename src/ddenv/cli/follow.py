@@ -19,6 +19,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold, steps
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs.folder import attach_name
 from ddenv.runs.programs import last_words, stop_engines
 from ddenv.text import printable
 from ddenv.words.news import headline, news
@@ -49,7 +50,7 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
         for line in summary_lines(state, path):
             say(line)
     if code == 130:
-        print(printable(f"interrupted; continue with: ddenv resume {path}"), file=sys.stderr)
+        print(printable(f"interrupted; continue with: ddenv resume {attach_name(path)}"), file=sys.stderr)
     return code, state
 
 
@@ -74,7 +75,7 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
                 stop_engines([(file, engine)])
         except BrokenPipeError:
             announce(
-                f"the engine keeps working on {path}: 'ddenv open {path}' attaches to it, 'kill {engine.pid}' stops it"
+                f"the engine keeps working on {path}: 'ddenv open {attach_name(path)}' attaches to it, 'kill {engine.pid}' stops it"
             )
             raise
         state = _show(file, state, out)

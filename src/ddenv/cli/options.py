@@ -142,6 +142,15 @@ trust_option = click.option(
 # For commands that start an engine on a run that is there.
 engine_options = together(jobs_option(), cluster_option, trust_option, json_option)
 
+remembered_option = click.option(
+    "--no-remembered",
+    "remembered",
+    is_flag=True,
+    default=True,
+    flag_value=False,
+    help="Ignore the stand-ins that you chose in the workbench for missing files.",
+)
+
 # For commands that take a scenario.
 scenario_options = together(
     click.option(
@@ -149,14 +158,7 @@ scenario_options = together(
     ),
     click.option("--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."),
     click.option("--world", type=Path, help="An SDF world to use instead of the scenario's."),
-    click.option(
-        "--no-remembered",
-        "remembered",
-        is_flag=True,
-        default=True,
-        flag_value=False,
-        help="Ignore the stand-ins that you chose in the workbench for missing files.",
-    ),
+    remembered_option,
 )
 
 # For commands that read an SDF world with references to other files.

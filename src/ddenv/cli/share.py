@@ -60,9 +60,10 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
 )
 @click.option(
     "--margin",
+    multiple=True,
     metavar="NUMBER",
     help="With --sdf: change this number, such as green_patch_01.friction, to the nearest value with which the robot reaches its "
-    "goal ('ddenv margins RUN' finds it), or to that of NUMBER=VALUE.",
+    "goal ('ddenv margins RUN' finds it), or to that of NUMBER=VALUE; may be repeated.",
 )
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 @click.option(
@@ -89,7 +90,7 @@ def export_command(
     run: str,
     sdf: Path | None,
     passes: bool,
-    margin: str | None,
+    margin: tuple[str, ...],
     scenario: Path | None,
     bundle: Path | None,
     mcap: Path | None,
@@ -105,10 +106,10 @@ def export_command(
     if sdf is None and bundle is None and mcap is None and test is None:
         RunFile(path).close()
         raise UserError("nothing to export: give --sdf FILE, --bundle FOLDER, --mcap FILE or --pytest FOLDER")
-    for given, option in ((scenario is not None, "--scenario"), (passes, "--passes"), (margin is not None, "--margin")):
+    for given, option in ((scenario is not None, "--scenario"), (passes, "--passes"), (bool(margin), "--margin")):
         if given and sdf is None:
             raise UserError(f"{option}: needs --sdf FILE")
-    if passes and margin is not None:
+    if passes and margin:
         raise UserError("--passes and --margin: give one of them; margins apply to what is left")
     if bundle is not None:
         say_written(write_bundle(path, bundle))

@@ -144,8 +144,9 @@ def _next(state: RunState, path: Path) -> list[str]:
         return []
     out = f", and H in it leaves {helps[0]} out" if (helps := helping(found)) else ""
     run, bundle = attach_name(path), shlex.quote(f"{path.stem}.zip")
+    passing = "" if state.isolated is not None else f"'ddenv isolate {run}' finds a nearest world that passes, "
     return [
-        f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, "
+        f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, {passing}"
         f"'ddenv export {run} --bundle {bundle}' packs it for others"
     ]
 

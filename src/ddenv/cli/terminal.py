@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Callable, Iterable
+from typing import TextIO
 
 import click
 
@@ -14,9 +15,9 @@ from ddenv.text import printable, width
 LEAST = 8
 
 
-def terminal_columns() -> int | None:
-    """How wide the terminal is, columns; None where the output goes elsewhere."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+def terminal_columns(stream: TextIO | None = None) -> int | None:
+    """How wide the terminal is, columns; None where `stream`, by default stdout, goes elsewhere."""
+    return shutil.get_terminal_size().columns if (stream or sys.stdout).isatty() else None
 
 
 def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
@@ -47,8 +48,8 @@ def say_written(files: Iterable[object]) -> None:
 
 
 def announce(line: str) -> None:
-    """Announces a slow step on stderr, so that programs can read stdout."""
-    print(printable(line), file=sys.stderr, flush=True)
+    """Says on stderr what is going on, or wrong, so that programs can read stdout."""
+    print("\n".join(wrapped(printable(line), terminal_columns(sys.stderr))), file=sys.stderr, flush=True)
 
 
 def asking(trust: bool) -> Callable[[str], bool]:

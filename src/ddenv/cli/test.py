@@ -36,6 +36,9 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 )
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
+@click.option(
+    "--margin", multiple=True, metavar="NUMBER[=VALUE]", help="Change a number, as 'ddenv export --margin' does."
+)
 @click.option("--seed", type=options.whole(0, 2**31), help="Seed of the first run; the next ones count up from it.")
 @click.option("--repeat", type=options.whole(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
 @click.option(
@@ -45,16 +48,25 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @options.trust_option
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
 def test_command(
-    subject: str, keep: str | None, simulator: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
+    subject: str,
+    keep: str | None,
+    margin: tuple[str, ...],
+    simulator: Path | None,
+    jobs: int,
+    trust: bool,
+    as_json: bool,
+    **given: Any,
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
     from ddenv.engine.single_test import plan, run_trials
+    from ddenv.runs.export import with_margins
 
     planned = {name: given.pop(name) for name in PLANNED}
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     results = []
     with ExitStack() as robots:
         what = _subject(subject, given, simulator, trust, robots)
+        what = with_margins(what, margin)
         for result in run_trials(what, plan(what, keep=names, **planned), jobs):
             results.append(result)
             if not as_json:

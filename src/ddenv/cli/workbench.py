@@ -24,8 +24,7 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
 
     'ddenv RUN_OR_FILE' does the same.
     """
-    from ddenv.runs.folder import find_run
-    from ddenv.runs.subject import named
+    from ddenv.runs.folder import find_run, named
     from ddenv.workbench.launch import run_workbench
     from ddenv.world.access import is_folder
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Numbers, reading_options, scenarios, together
+from ddenv.cli.options import Numbers, reading_options, remembered_option, scenarios, together
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
@@ -34,6 +34,7 @@ TO_THE_RIGHT = ("links", "yaw")
 world_argument = together(
     click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
     reading_options,
+    remembered_option,
 )
 
 
@@ -42,9 +43,11 @@ def world_group() -> None:
     """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
 
 
-def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
-    """The world of an SDF file, or of a scenario, and how it was read. Raises UserError."""
-    from ddenv.runs.subject import named_file, reading_of
+def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
+    """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
+    from ddenv.runs.folder import named_file
+    from ddenv.runs.remedies import with_remembered
+    from ddenv.runs.subject import reading_of
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN
     from ddenv.world.sdf.read import read_world
@@ -52,7 +55,10 @@ def _read(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     kind, path = named_file(str(file)) or ("world", file)
     scenario = load_scenario(path) if kind == "scenario" else None
     file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
-    read_as = reading_of(own, **reading)
+    reads_remembered = options.pop("remembered")
+    read_as = reading_of(own, **options)
+    if reads_remembered:
+        read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as
 
 

@@ -78,16 +78,16 @@ def runs() -> Iterator[Finding]:
     folder = runs_folder()
     yield Finding("runs", "folder", f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
-    yield _space("room", nearest, "runs")
+    yield _space("disk space", nearest, "runs")
 
 
 def _space(what: str, folder: Path, group: str) -> Finding:
-    """Whether files can be made in a folder, and how much room there is."""
+    """Whether files can be made in a folder, and how much disk space is free."""
     free = shutil.disk_usage(folder).free
     says = f"{free / 1e9:.1f} GB free in {folder}"
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(b"room")
+            file.write(b"ddenv")
     except OSError as error:
         says, advice = f"{folder} cannot be written: {error.strerror}", "set another one in DDENV_HOME or TMPDIR"
         return Finding(group, what, says, "wrong", advice)

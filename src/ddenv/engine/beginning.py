@@ -84,7 +84,7 @@ def _differs(journal: Journal, result: RunResult | Broken) -> str:
 def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal) -> None:
     """Notes what the files alone show of the start, before the first test."""
     if journal.state.baseline is None:
-        for about, words in notes_on_start(world, robot, scenario.robot.spawn):
+        for about, words in notes_on_start(world, robot, scenario.robot.spawn, (scenario.goal.x, scenario.goal.y)):
             note(journal, about, words)
 
 

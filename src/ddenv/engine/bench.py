@@ -11,7 +11,7 @@ import numpy as np
 
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failures_of, result_data, rows_of
+from ddenv.engine.judging import failures_of, motions_of, result_data, rows_of
 from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
@@ -26,7 +26,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Comparing, Implied, TestFinished, TestStarted, TrialJudged
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
-from ddenv.runfile.store import ROBOT, Motions
+from ddenv.runfile.store import ROBOT
 from ddenv.text import count
 from ddenv.world.scenario import FailureSpec, Reduction, seed_of
 
@@ -262,10 +262,6 @@ class Bench:
         self._live_shown = bool(live)
 
     def _record(self, test: int, result: RunResult | Broken) -> None:
-        motions: Motions = {}
-        if isinstance(result, RunResult):
-            motions = {ROBOT: _samples(result.trajectory)}
-            motions |= {name: _samples(motion) for name, motion in result.motions.items()}
         data, journal = result_data(result, self._counted()), self._journal
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
@@ -277,7 +273,7 @@ class Bench:
             "first_touched": journal.in_order(data["first_touched"]),
             "took_part": journal.models(data["took_part"]) if "took_part" in data else None,
         }
-        journal.record(TestFinished(test, **data | by_number), motions)
+        journal.record(TestFinished(test, **data | by_number), motions_of(result))
         compare(journal, [journal.state.tests[test - 1]])
 
     def _counted(self) -> tuple[Failure, ...]:
@@ -287,7 +283,3 @@ class Bench:
             spec = FailureSpec.model_validate(state.scenario["failure"])
             self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
         return self._failures
-
-
-def _samples(trajectory: np.ndarray) -> bytes:
-    return np.ascontiguousarray(trajectory, dtype="<f8").tobytes()

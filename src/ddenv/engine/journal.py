@@ -42,10 +42,10 @@ class Journal:
         self._ties: tuple[object, Ties] = None, Ties.among(())
         self._remember(RunState(), self.state)
 
-    def record(self, event: Event, motions: Motions | None = None) -> None:
+    def record(self, event: Event, motions: Motions | None = None, number: int | None = None) -> None:
         """Writes an event."""
         before = self.state
-        self.state = apply(before, self.file.append(event, motions, self.command))
+        self.state = apply(before, self.file.append(event, motions, self.command, number))
         self._remember(before, self.state)
 
     def _remember(self, before: RunState, after: RunState) -> None:

@@ -22,7 +22,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
 from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import BROKEN, RunState, Test
-from ddenv.runfile.store import RunFile
+from ddenv.runfile.store import ROBOT, Motions, RunFile
 from ddenv.runs.playback import table
 from ddenv.text import count
 from ddenv.world.extent import center, model_bounds
@@ -61,6 +61,14 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
         "cut": result.cut,
         **more,
     }
+
+
+def motions_of(result: RunResult | Broken) -> Motions:
+    """How the robot and other models moved, as a run file has it."""
+    if isinstance(result, Broken):
+        return {}
+    rows = {ROBOT: result.trajectory, **result.motions}
+    return {name: np.ascontiguousarray(each, dtype="<f8").tobytes() for name, each in rows.items()}
 
 
 def nearest(judgements: Sequence[Judgement]) -> Judgement:

@@ -7,12 +7,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from ddenv.engine.bench import MOST_BROKEN, WAIT
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failures_of, result_data
+from ddenv.engine.judging import failures_of, motions_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
 from ddenv.engine.worker import Broken, Run
@@ -24,6 +24,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runs.changes import beside
 from ddenv.world.extent import center
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario, seed_of
@@ -74,6 +75,12 @@ def find_margins(
         if now is None or (now.wanted, now.asked.budget) != (tuple(one.name for one in numbers), budget):
             _begin(journal, numbers, budget, stood if now is None else (now.asked.status, now.asked.before))
     _Search(parts, journal, pool, control).carry_out()
+    margins = journal.state.margins
+    if margins is not None and (pairs := known.pairs_of(margins)) and not margins.asked.numbers[0].together:
+        left = margins.asked.budget - len(margins.runs) + margins.before_call
+        if left >= known.FIRST_LOOK:
+            journal.record(replace(margins.asked, numbers=pairs, budget=left))
+            _Search(parts, journal, pool, control).carry_out()
     journal.record(events.MarginsFinished())
 
 
@@ -86,7 +93,8 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
             numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
             environment=journal.number(journal.environment),
             rate=rate,
-            error=known.error_each(rate, min(budget, known.MOST_OF_NUMBER * len(numbers))),
+            # Two numbers may be changed together at the end.
+            error=known.error_each(rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1)))),
             budget=budget,
             certified=certificate is not None,
             status="stopped" if stood[0] == "stopped" else "finished",
@@ -102,6 +110,8 @@ class _Search:
         self._running: dict[int, Wanted] = {}
         self._kept = frozenset(journal.state.environments[self._now.asked.environment].names(journal.state.elements))
         self._submitted, self._broken = len(journal.state.tests), 0
+        left = beside(journal.state)
+        self._beside = None if left is None else left.run
         # How many looks at a number are over: the second one has the runs that are left.
         self._looks = 0
         # The values of the current number that are known to be possible.
@@ -159,10 +169,13 @@ class _Search:
         most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.asked.budget - used)
         return known.wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
 
+    def _changes(self, name: str, value: float) -> tuple[tuple[str, float], ...]:
+        return known.changes_at(next(one.asked for one in self._now.numbers if one.asked.name == name), value)
+
     def _is_impossible(self, name: str, value: float) -> bool:
         """Whether a value is not possible; that is recorded then."""
         try:
-            check(*self._parts, self._kept, name, value)
+            check(*self._parts, self._kept, dict(self._changes(name, value)))
         except NotPossible as error:
             self._journal.record(events.MarginImpossible(name, value, str(error)))
             return True
@@ -184,13 +197,15 @@ class _Search:
         # Fresh runs are full ones, as those of a certificate.
         seed, full = seed_of(self._parts[0].reduction, run), run >= known.FIRST_FIX_RUN
         limit = wall_limit(self._journal.state)
-        self._pool.submit(self._submitted, Run(self._kept, seed, full, limit, ((name, value),)))
+        self._pool.submit(self._submitted, Run(self._kept, seed, full, limit, self._changes(name, value)))
         self._control.started()
 
     def _record(self, one: Wanted, result: RunResult | Broken) -> None:
         data, seed = result_data(result, self._failures), seed_of(self._parts[0].reduction, one[2])
         kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
-        self._journal.record(events.MarginRan(*one, seed, **kept))
+        # Of each value, the run that can be played beside one of what is left.
+        motions = motions_of(result) if one[2] == self._beside else None
+        self._journal.record(events.MarginRan(*one, seed, **kept), motions, -1 - self._now.made)
         self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(f"{self._broken} runs in a row broke; the last one: {data['failure']}")

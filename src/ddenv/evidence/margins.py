@@ -215,6 +215,27 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
     return tuple(sorted(found, key=lambda one: (one.share, one.name)))
 
 
+def pairs_of(margins: Margins) -> tuple[NumberAsked, ...]:
+    """Two numbers to change together where no change of one was found to lead to the goal: the two with the nearest values at
+    which something else happens than f, each towards the end of its range.
+    """
+    one_sided = [(one.asked, side, side.gone) for one in margins_of(margins) for side in one.sides if side.gone]
+    gone = [(asked, side, value) for asked, side, value in one_sided if value.verdict == "other" and not asked.together]
+    gone.sort(key=lambda each: abs(each[2].value - each[0].now) / each[0].scale)
+    first = next(iter(gone), None)
+    second = next((each for each in gone if first and each[0].name != first[0].name), None)
+    if first is None or second is None or any(fix.confirmed is not False for fix in fixes_of(margins)):
+        return ()
+    parts = tuple((asked.name, asked.now, side.end) for asked, side, _ in (first, second))
+    return (NumberAsked(" & ".join(name for name, *_ in parts), 0.0, 0.0, 100.0, 100.0, 2.0, "%", parts),)
+
+
+def changes_at(asked: NumberAsked, value: float) -> tuple[tuple[str, float], ...]:
+    """The numbers that a value of `asked` means, with their values."""
+    parts = ((name, float(f"{now + value / 100.0 * (end - now):.9g}")) for name, now, end in asked.together)
+    return tuple(parts) or ((asked.name, value),)
+
+
 def steps(asked: NumberAsked, up: bool) -> tuple[float, ...]:
     """The values outward from the present one to the end of the range; none if that is no farther than the resolution."""
     reach = asked.high - asked.now if up else asked.now - asked.low

@@ -64,6 +64,11 @@ def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE) -> Footpri
     return Footprint(model.name, polygons, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
 
 
+def rings(model: Model, moved: Pose) -> tuple[np.ndarray, ...]:
+    """The outlines of a model that has `moved`, as closed lines (N, 2), m."""
+    return tuple(np.vstack([each, each[:1]]) for each in footprint(model, moved=moved).polygons)
+
+
 def _outline(collision: Collision, corners: int, moved: Pose) -> np.ndarray:
     pose = moved @ collision.pose
     vertices, radius = vertices_of(collision.shape, corners)

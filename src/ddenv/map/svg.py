@@ -91,7 +91,7 @@ def _tooltip(each: Drawn) -> str:
     size = " x ".join(f"{part:.2f}" for part in each.size)
     kind = "static" if each.model.static else "dynamic"
     yaw = each.model.pose.yaw()
-    words = f"{kind}, {size} m\npose {x:.2f}, {y:.2f}, {z:.2f} m, yaw {yaw:.2f} rad, top at {each.top:.2f} m"
+    words = f"{kind}, {size} m\npose {x:z.2f}, {y:z.2f}, {z:z.2f} m, yaw {yaw:z.2f} rad, top at {each.top:.2f} m"
     return f"{written(each.model.name)}\n{words}"
 
 

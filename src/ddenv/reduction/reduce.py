@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count, takewhile
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -441,4 +441,4 @@ def _place(values: Any) -> Place | None:
 
 
 def _time(value: Any) -> float | None:
-    return float(value) if isinstance(value, Real) and 0.0 <= float(value) <= LARGEST else None
+    return float(value) if isinstance(value, Real) and 0 <= cast(float, value) <= LARGEST else None

@@ -11,15 +11,18 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from ddenv.map.drawing import FAR, Frame, Point, at, badge, labels, path_of, plot, written
-from ddenv.map.footprints import Drawn
+from ddenv.map.footprints import Drawn, rings
 from ddenv.page.step_chart import opening
 from ddenv.report.run_data import Record
 from ddenv.runfile.run_settings import settings
+from ddenv.runs.changes import Limit
 from ddenv.runs.playback import table
 
 # Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.
 Ways = Mapping[str, "array[float] | None"]
-PATHS = ("way", "last", "with", "without")
+PATHS = ("way", "last", "with", "without", "now", "changed")
+# Outlines of models that have moved, by the verdict there.
+LIMITS = {"f": "until", "goal": "from", "other": "over", "impossible": "over"}
 
 # Of the legend: entries in a line, and pixels from line to line.
 ACROSS, LINE = 4, 24.0
@@ -40,6 +43,11 @@ WORDS = {
     "last": "path, last similar run",
     "with": "path with it",
     "without": "path without it",
+    "now": "path now",
+    "changed": "path, number changed",
+    "until": "f up to here",
+    "from": "goal from here",
+    "over": "no f from here",
     "start": "start",
     "goal": "goal",
     "end": "end of f",
@@ -62,11 +70,12 @@ def picture(
     name: str = "all",
     ways: Ways | None = None,
     named: Collection[str] | None = None,
+    limits: Sequence[Limit] = (),
 ) -> str:
     """The map of a run as SVG. `name` is different for each map of a page.
 
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
-    these models, in place of those that are left.
+    these models, in place of those that are left. `limits` are outlined.
     """
     frame = _frame(record.models, list(_places(record).values()))
     if ways is None:
@@ -77,12 +86,14 @@ def picture(
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS
     drawn = {way: path for way, samples in ways.items() if (path := _way(samples, frame))}
-    shown = {*sorts.values(), *drawn, *places}
+    outlines = [(LIMITS[verdict], ring) for verdict, model, moved in limits for ring in rings(model, moved)]
+    shown = {*sorts.values(), *drawn, *places, *(sign for sign, _ in outlines)}
     legend = [name for name in WORDS if name in shown]
     bottom = float(frame.box[3]) + AXIS
     height = bottom + LINE * -(-len(legend) // ACROSS) + 6
     inside = [
         *(_model(each, sorts[each.model.name], frame, coarse) for each in models),
+        *(f'<path class="{sign}" d="{_line(frame, ring)}"/>' for sign, ring in outlines),
         *(f'<path class="{way}" d="{path}"/>' for way, path in drawn.items()),
         *_near(record, frame, places),
     ]
@@ -139,7 +150,11 @@ def _way(samples: array[float] | None, frame: Frame) -> str:
     step = max(1, -(-len(points) // MOST_POINTS))
     # The end matters most.
     chosen = np.vstack([points[::step], points[-1:]])
-    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in frame.pixels(chosen))
+    return _line(frame, chosen)
+
+
+def _line(frame: Frame, points: np.ndarray) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in frame.pixels(points))
 
 
 def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator[str]:
@@ -157,7 +172,7 @@ def _legend(shown: Sequence[str], top: float) -> Iterator[str]:
         sign = f'<rect class="{name}" x="1" y="-7" width="24" height="14"/>'
         if name in MARKS:
             sign = at((13, 0), MARKS[name])
-        elif name in PATHS:
+        elif name in PATHS or name in LIMITS.values():
             sign = f'<path class="{name}" d="M0 0H26"/>'
         row, column = divmod(number, ACROSS)
         place = LEFT + (WIDTH - LEFT) / ACROSS * column, top + LINE * row + 10

@@ -17,6 +17,7 @@ from ddenv.runfile.fold import recorded_scenario, steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
+from ddenv.runs.changes import Change, changes
 from ddenv.runs.reasons import Nearest, Reason, nearest, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.world.model import World
@@ -34,8 +35,8 @@ class Record:
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
     removed, `kept` those of them that are left. `reasons` say what happens without each of these, `nearest`
-    what the nearest world that passes lacks; `ways` are the robot's paths in the tests that they compare. `models` are those of the
-    world, as they are drawn.
+    what the nearest world that passes lacks, `changes` what other values of numbers do; `ways` are the robot's paths in the tests
+    that they compare. `models` are those of the world, as they are drawn.
     """
 
     path: Path
@@ -54,6 +55,7 @@ class Record:
     kept: frozenset[str]
     reasons: tuple[Reason, ...]
     nearest: Nearest | None
+    changes: tuple[Change, ...]
     ways: Mapping[int, array[float]]
 
 
@@ -72,7 +74,9 @@ def read_run(path: Path) -> Record:
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = None if current(state) is None else _tried(lambda: reasons(file, state), troubles)
         passing = nearest(file, state)
-        partings = [*(reason.parting for reason in why or ()), passing.parting if passing else None]
+        numbers = changes(file, state, world)
+        partings = [reason.parting for reason in why or ()] + [change.parting for change in numbers]
+        partings.append(passing.parting if passing else None)
         compared = [test for one in partings if one for test in (one.with_test, one.without_test)]
         ways = {test: file.trajectory(test) for test in compared}
     return Record(
@@ -92,6 +96,7 @@ def read_run(path: Path) -> Record:
         kept=frozenset(state.environment),
         reasons=why or (),
         nearest=passing,
+        changes=numbers,
         ways=ways,
     )
 

@@ -109,7 +109,22 @@ def margins(record: Record) -> Section | None:
     if known is None or not (found := rows(known)):
         return None
     table = Table(HEAD, tuple((Name(one.cells[0]), *one.cells[1:]) for one in found), {1, 4})
-    return Section("Margins", (table, *(say(plain(words)) for words in said(known))))
+    blocks: list[Block] = [table, *(say(plain(words)) for words in said(known))]
+    if record.models and record.changes:
+        blocks += _limits(record)
+    return Section("Margins", tuple(blocks))
+
+
+def _limits(record: Record) -> tuple[Block, Block]:
+    """What is left with the outlines of all limits, and two ways of the smallest change to the goal that can be compared."""
+    compared = [(one, one.parting) for one in record.changes if one.parting is not None]
+    words, ways = "How far each model may move before f disappears.", {}
+    if compared:
+        one, parting = min(compared, key=lambda each: (each[0].verdict != "goal", each[0].share))
+        ways = {"now": record.ways[parting.with_test], "changed": record.ways[parting.without_test]}
+        words += f" The robot's paths now and with {one.name} = {one.value:.4g}, seed {parting.seed}."
+    limits = [limit for one in record.changes for limit in one.limits]
+    return say(plain(words)), Picture("margins", picture(record, "margins", ways, None, limits), plain(words))
 
 
 def _passing(record: Record, found: Nearest) -> list[Block]:
@@ -135,7 +150,7 @@ def _map(
     words: str,
     named: Collection[str] | None,
 ) -> Picture:
-    """The world of the models `kept` without those `gone`, with the two ways of a parting; `named` models bear their names."""
+    """The world of the models `kept` without those `gone`, with two diverging paths; `named` models bear their names."""
     ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
     drawn = picture(replace(record, kept=kept - frozenset(gone)), name, ways, named)
     return Picture(name, drawn, plain(f"{words}, seed {one.seed}."))

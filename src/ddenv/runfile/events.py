@@ -524,6 +524,7 @@ class NumberAsked:
     """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try.
 
     A change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.
+    Numbers that are changed `together`, in %, have each a name, the present value and that at 100 %.
     """
 
     name: str
@@ -533,6 +534,7 @@ class NumberAsked:
     scale: Positive
     resolution: Positive
     unit: str = ""
+    together: tuple[tuple[str, Real, Real], ...] = ()
 
 
 class MarginsStarted(Event):

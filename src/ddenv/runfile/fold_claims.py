@@ -141,7 +141,7 @@ def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Chang
     asked = tuple(NumberTried(one, event.rate, event.error) for one in event.numbers)
     last = state.margins
     if last is None or last.asked.environment != event.environment:
-        return {"margins": Margins(event, asked)}
+        return {"margins": Margins(event, asked, earlier=0 if last is None else last.made)}
     numbers = (*(one for one in last.numbers if one.asked.name not in names), *asked)
     now = replace(last, asked=event, numbers=numbers, before_call=len(last.runs), ended=False, broken_off=False)
     return {"margins": now}

@@ -245,13 +245,14 @@ class NumberTried:
 class Margins:
     """How far numbers may change in the environment that was asked for, as `runs` and values that are `impossible` show.
 
-    The last call is as it was `asked`, after the first `before_call` runs. `ended`: the search is over; `broken_off`: a decision of
-    the user ended it.
+    The last call is as it was `asked`, after the first `before_call` runs, and `earlier` runs in other environments. `ended`: the
+    search is over; `broken_off`: a decision of the user ended it.
     """
 
     asked: MarginsStarted
     numbers: tuple[NumberTried, ...]
     before_call: int = 0
+    earlier: int = 0
     runs: tuple[MarginRan, ...] = ()
     impossible: tuple[MarginImpossible, ...] = ()
     ended: bool = False
@@ -261,6 +262,11 @@ class Margins:
     def wanted(self) -> tuple[str, ...]:
         """The names of the numbers that the last call asks for."""
         return tuple(one.name for one in self.asked.numbers)
+
+    @property
+    def made(self) -> int:
+        """How many runs with a changed number the file has. The motion of the latest one has the number -made."""
+        return self.earlier + len(self.runs)
 
 
 @dataclass(frozen=True, slots=True)

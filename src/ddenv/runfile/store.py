@@ -293,25 +293,30 @@ class RunFile:
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
-    def append(self, event: Event, motions: Motions | None = None, command: int | None = None) -> Recorded:
+    def append(
+        self, event: Event, motions: Motions | None = None, command: int | None = None, number: int | None = None
+    ) -> Recorded:
         """Records one event, with the trajectories of its test, in one transaction; `command` is the number of what caused it.
+
+        The trajectories of a run that is no test need a `number`, which is negative.
 
         Raises UserError if the run file was deleted or replaced meanwhile: SQLite would go on to write what nobody can read.
         """
         while True:
             try:
-                return self._append(event, motions, command)
+                return self._append(event, motions, command, number)
             except NoRoom as full:
                 if self._wait is None or not self._wait(full):
                     raise
 
-    def _append(self, event: Event, motions: Motions | None, command: int | None) -> Recorded:
+    def _append(self, event: Event, motions: Motions | None, command: int | None, number: int | None) -> Recorded:
         new = Recorded(0, time.time(), event, command)
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
             new = replace(new, id=_insert(db, "event", new.kind, new.data, new.time))
-            if motions and isinstance(event, TestFinished | Implied):
-                rows = [(event.test, model, samples) for model, samples in motions.items()]
+            test = event.test if isinstance(event, TestFinished | Implied) else number
+            if motions and test is not None:
+                rows = [(test, model, samples) for model, samples in motions.items()]
                 db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
             db.execute("COMMIT")
         if not self._logs:

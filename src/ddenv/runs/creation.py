@@ -11,8 +11,16 @@ from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.export import renamed
-from ddenv.runs.folder import run_path
-from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, named, read_parts, scenario_named
+from ddenv.runs.folder import named, run_path
+from ddenv.runs.subject import (
+    RESOURCE,
+    Announce,
+    check_parts,
+    has_options,
+    load_parts,
+    read_parts,
+    scenario_named,
+)
 from ddenv.runs.trust import check_cluster, check_named, trust_cluster, trusted_scenario
 from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.files.resources import Resources
@@ -38,8 +46,12 @@ def create_named(
     if output is not None and is_world(output) and output.exists():
         raise UserError(f"--output: {output} exists already; choose another name")
     if given.get("inside") and (of_run := named(subject)) is not None and of_run[0] == "run":
+        if has_options(given, "inside"):
+            raise UserError(
+                "--inside: a run keeps its own options; give only --name, --output, --jobs, --trust and --json"
+            )
         with RunFile(of_run[1]) as file:
-            scenario = trusted_scenario(file, asks, given["cluster"])
+            scenario = trusted_scenario(file, asks, None)
         path = run_path(f"{scenario.name}-inside", name, output)
         return path, create_inside(of_run[1], path)
     scenario = scenario_named(subject, given, announce)

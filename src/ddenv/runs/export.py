@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,14 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import removed_in_passing
-from ddenv.runs.subject import RESOURCE, read_parts
+from ddenv.runs.subject import RESOURCE, Subject, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
 from ddenv.world.access import Missing, Unusable, check_ending, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
-from ddenv.world.sdf.numbers import OF_SCENARIO, NotPossible, Number, changed, numbers_of
+from ddenv.world.sdf.numbers import NotPossible, Number, changed, numbers_of
 from ddenv.world.sdf.read import parse_model, parse_world
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
@@ -36,11 +36,11 @@ class Exported:
 
 
 def export_world(
-    run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margin: str | None = None
+    run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margins: Sequence[str] = ()
 ) -> Exported:
     """Writes the current environment of a run, or the nearest world that `passes`, to `sdf`, and a scenario for it if asked.
 
-    With a `margin`, NAME or NAME=VALUE, that number is changed: to the value nearest to the present one at which the robot
+    With `margins`, NAME or NAME=VALUE, these numbers are changed: to the value nearest to the present one at which the robot
     reaches its goal if no other is given. Raises UserError.
     """
     with RunFile(run) as file:
@@ -51,16 +51,10 @@ def export_world(
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
-    if margin is not None:
-        number, value = _margin(state, numbers_of(scenario, world, machine, state.environment), margin, run)
-        if scenario_file is None and number in OF_SCENARIO:
-            raise UserError(
-                f"--margin: {number} is a number of the scenario, not of the world: also give --scenario FILE"
-            )
-        try:
-            scenario, world = changed(scenario, world, {number: value})
-        except NotPossible as error:
-            raise UserError(f"--margin: {number} cannot be {value:g}: {error}") from None
+    there = with_margins(Subject(scenario, world, machine, run, state), margins)
+    if scenario_file is None and there.scenario != scenario:
+        raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
+    scenario, world = there.scenario, there.world
     try:
         text = without(world, removed)
     except ValueError as error:
@@ -86,6 +80,20 @@ def export_world(
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
     return Exported([sdf, model, scenario_file], needs)
+
+
+def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
+    """A run's world and scenario with the changes that `margins`, each NAME or NAME=VALUE, mean. Raises UserError."""
+    scenario, world, state = subject.scenario, subject.world, subject.state
+    for margin in margins:
+        if subject.run is None or state is None:
+            raise UserError("--margin: needs a run; a scenario has no margins yet")
+        name, value = _margin(state, numbers_of(scenario, world, subject.robot, state.environment), margin, subject.run)
+        try:
+            scenario, world = changed(scenario, world, {name: value})
+        except NotPossible as error:
+            raise UserError(f"--margin: {name} cannot be {value:g}: {error}") from None
+    return replace(subject, scenario=scenario, world=world)
 
 
 def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:

@@ -1,4 +1,4 @@
-"""Names and paths of run files."""
+"""Names and paths of run files, and what a name on the command line stands for."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import shlex
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
+from typing import Literal
 from urllib.parse import unquote, urlsplit
 
 import platformdirs
@@ -16,6 +17,7 @@ from ddenv.text import plain
 from ddenv.world.access import WORLD_ENDINGS, is_world
 
 SUFFIX = ".ddenv"
+SCENARIO_FILES = (".yaml", ".yml")
 # The run in the folder of a bundle.
 BUNDLED_RUN = f"run{SUFFIX}"
 # Maximum length of a run's name, bytes: leaves room for a number and for the suffixes of the files beside it.
@@ -36,6 +38,31 @@ def find_run(name: str) -> Path:
     stored = path if len(path.parts) > 1 else runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
     bundled = path / BUNDLED_RUN
     return bundled if not stored.is_file() and bundled.is_file() else stored
+
+
+def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
+    """What `name` stands for, with its file, which need not exist if its suffix says what it is; None for any other name.
+
+    A run comes before a bundled scenario, and every file before both.
+    """
+    run = find_run(name)
+    if (run.is_file() and not is_world(run) and run.suffix.lower() not in SCENARIO_FILES) or name.endswith(SUFFIX):
+        return "run", run
+    return named_file(name)
+
+
+def named_file(name: str) -> tuple[Literal["scenario", "world"], Path] | None:
+    """The same where no run is meant."""
+    from ddenv.world.load import SCENARIOS, bundled_names
+
+    path = Path(name)
+    if is_world(path):
+        return "world", path
+    if path.suffix.lower() in SCENARIO_FILES:
+        return "scenario", path
+    if name in bundled_names() and not path.exists():
+        return "scenario", SCENARIOS / f"{name}.yaml"
+    return None
 
 
 def attach_name(run: Path) -> str:

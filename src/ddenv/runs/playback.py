@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
 from ddenv.runfile.tested import purpose
+from ddenv.runs.changes import changed_run
 from ddenv.world.pose import Pose, pose_at
 
 # Time between two frames: a run file has a row of each motion so often, s.
@@ -55,18 +56,19 @@ class Played:
 def played(file: RunFile, position: Position, number: int) -> Played:
     """The finished test with this number. Raises UserError if there is none; what the file lacks of it is said in `lacks`."""
     tests = position.end.tests
-    if not 0 < number <= len(tests):
+    if number < 0:
+        one, test = changed_run(position.end, number)
+        words = f"{one.name} = {one.value:.4g}"
+    elif 0 < number <= len(tests):
+        test = tests[number - 1]
+    else:
         raise UserError(f"{file.path}: there is no test {number}")
-    test = tests[number - 1]
     if not test.is_finished:
         why = "is still running" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
     lacks = [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
-    try:
-        start = position.start_of(number)
-        words = purpose(position.end if start is None else start.after, test)
-    except UserError:
-        words = f"test {number}"
+    if number > 0:
+        words = _purpose(position, test)
     rows, moving = array("d"), {}
     for name, samples in _stored(file, number, lacks).items():
         stored = table(samples)
@@ -76,11 +78,21 @@ def played(file: RunFile, position: Position, number: int) -> Played:
             rows = samples
         else:
             moving[name] = stored
+    if number < 0 and rows:
+        test = replace(test, simulated_seconds=rows[-COLUMNS])
     if not rows:
         lacks.append(
             f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
     return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
+
+
+def _purpose(position: Position, test: Test) -> str:
+    try:
+        start = position.start_of(test.id)
+        return purpose(position.end if start is None else start.after, test)
+    except UserError:
+        return f"test {test.id}"
 
 
 def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:

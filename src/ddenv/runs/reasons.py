@@ -197,22 +197,22 @@ def _does(end: End) -> str:
 
 
 def parting_sentence(reason: Reason) -> str:
-    """Where the ways with and without the models part, in one or two sentences; "" if no pair of runs shows it."""
+    """Where the paths with and without the models diverge, in one or two sentences; "" if no pair of runs shows it."""
     it = "it" if len(reason.gone) == 1 else "one of them"
     return parting_words(reason.parting, reason.lacks, f"With {it} there,", it)
 
 
 def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> str:
-    """Where two ways part, or why that is not known; then a sentence that begins with `met`, if the robot met `it`."""
+    """Where two paths diverge, or why that is not known; then a sentence that begins with `met`, if the robot met `it`."""
     if one is None:
         return f"Where the paths diverge is not known: {lacks}." if lacks else ""
     if one.met is None:
-        return _where_they_part(one)
+        return _where_they_diverge(one)
     did = "touches" if one.touched else "senses"
-    return f"{_where_they_part(one)} {met} the robot {did} {it} after {one.met:.1f} s."
+    return f"{_where_they_diverge(one)} {met} the robot {did} {it} after {one.met:.1f} s."
 
 
-def _where_they_part(one: Parting) -> str:
+def _where_they_diverge(one: Parting) -> str:
     """When two runs begin to differ, and when and where they are visibly apart, in one sentence."""
     if one.apart is None or one.place is None:
         # Their ways may be equal to the end.

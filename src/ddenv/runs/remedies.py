@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.runs.remembered import read_state, state_file, write_state
 from ddenv.text import first_of, shortened
 from ddenv.world.access import MissingFiles, is_folder, without_tilde
-from ddenv.world.scenario import Scenario
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Reading
 
 REMEDIES = "remedies.json"
 # Maximum numbers of URIs that are kept, and that a line names, and the maximum width of each in cells.
@@ -67,19 +69,19 @@ def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[
     return {**options, **{name: (*options.get(name, ()), *each) for name, each in more.items() if each}}
 
 
-def with_remembered(scenario: Scenario, announce: Callable[[str], None] | None = None) -> Scenario:
-    """The scenario with the remedies that the user chose for files which its world lacks; it says which these are.
+def with_remembered(world: Path, reading: Reading, announce: Callable[[str], None] | None = None) -> Reading:
+    """How to read a world, with the remedies that the user chose for files which it lacks; it says which these are.
 
     Whatever else is wrong with the world shows when it is read.
     """
     from ddenv.runs.subject import reading_of
     from ddenv.world.sdf.read import read_world
 
-    known, found, reading = remembered(), dict[str, str](), scenario.reading
+    known, found, read_as = remembered(), dict[str, str](), reading
     while known:
-        reading = reading_of(scenario.reading, **with_remedies({}, found))
+        read_as = reading_of(reading, **with_remedies({}, found))
         try:
-            read_world(scenario.world, reading)
+            read_world(world, read_as)
             break
         except MissingFiles as error:
             fresh = {uri: known[uri] for uri in error.uris if uri in known and uri not in found}
@@ -91,4 +93,4 @@ def with_remembered(scenario: Scenario, announce: Callable[[str], None] | None =
     if found and announce is not None:
         names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED)
         announce(f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out")
-    return scenario.model_copy(update={"reading": reading}) if found else scenario
+    return read_as if found else reading

@@ -8,20 +8,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runs.folder import SUFFIX, find_run
+from ddenv.runs.folder import named
 from ddenv.runs.remedies import with_remembered
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
 from ddenv.world.access import is_world, read_bytes, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
-from ddenv.world.load import SCENARIOS, SDF, bundled_names, find_scenario, load_scenario, validate
+from ddenv.world.load import SDF, find_scenario, load_scenario, validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
 from ddenv.world.scenario import PLAIN, Reading, Scenario
@@ -29,7 +29,6 @@ from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_world
 from ddenv.world.sdf.standin import parse_option
 
 Announce = Callable[[str], None]
-SCENARIO_FILES = (".yaml", ".yml")
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
@@ -60,7 +59,7 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
     if kind != "run":
         scenario = scenario_named(name, given, announce)
         return Subject(scenario, *load_parts(scenario))
-    if any(value is not None and value != () for option, value in given.items() if option != "remembered"):
+    if has_options(given):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
             "a run keeps its own"
@@ -69,27 +68,9 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
         return read_subject(file)
 
 
-def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
-    """What `name` stands for, with its file, which need not exist if its suffix says what it is; None for any other name.
-
-    A run comes before a bundled scenario, and every file before both.
-    """
-    run = find_run(name)
-    if (run.is_file() and not is_world(run) and run.suffix.lower() not in SCENARIO_FILES) or name.endswith(SUFFIX):
-        return "run", run
-    return named_file(name)
-
-
-def named_file(name: str) -> tuple[Literal["scenario", "world"], Path] | None:
-    """The same where no run is meant."""
-    path = Path(name)
-    if is_world(path):
-        return "world", path
-    if path.suffix.lower() in SCENARIO_FILES:
-        return "scenario", path
-    if name in bundled_names() and not path.exists():
-        return "scenario", SCENARIOS / f"{name}.yaml"
-    return None
+def has_options(given: Mapping[str, Any], *but: str) -> bool:
+    """Whether any of these options was given, `but` some."""
+    return any(value is not None and value != () for name, value in given.items() if name not in ("remembered", *but))
 
 
 # From files and options.
@@ -117,7 +98,9 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
-    return with_remembered(scenario, announce) if remembered else scenario
+    if not remembered:
+        return scenario
+    return scenario.model_copy(update={"reading": with_remembered(scenario.world, read_as, announce)})
 
 
 def reading_of(

@@ -80,9 +80,11 @@ def left_said(state: RunState, at_work: bool) -> tuple[str, ...]:
 def _is_overdue(state: RunState) -> bool:
     """Whether the search, or the certificate, takes more tests than were foretold."""
     forecast, now = state.forecast, in_the_making(state)
+    if state.ended:
+        return False
     if now is not None:
         return fresh_runs_made(state, now) >= expected_fresh_runs(state, now)[-1]
-    searches = not (state.ended or state.confirming or state.isolating is not None)
+    searches = not (state.confirming or state.isolating is not None)
     return searches and forecast is not None and state.tests_done - forecast.tests_done >= forecast.tests[-1]
 
 

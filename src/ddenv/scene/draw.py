@@ -133,6 +133,11 @@ class Scenery:
         path, color = (GHOST_TRAIL, colors.GHOST_TRAIL) if ghost else (TRAIL, colors.TRAIL)
         return self._stage.drawn(path, self._tube(self._points(samples), color))
 
+    def ghost_of(self, model: Model) -> list[bytes]:
+        """The messages that draw a model, as the ghost sees it, for one browser."""
+        surface = merge([replace(one, tints=None, alpha=1.0) for one in paint(model)])
+        return [self._stage.drawn((*GHOST_TRAIL, "model"), plain(surface, colors.GHOST))] if len(surface.faces) else []
+
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
         return [self._stage.drawn(path, thing) for path, thing in self._together(shot)]

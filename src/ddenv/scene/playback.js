@@ -213,7 +213,7 @@ function mark() {
   if (pair === null) return;
   option.value = at;
   place("marks").append(option);
-  button.textContent = `they part at ${at.toFixed(1)} s`;
+  button.textContent = `paths diverge at ${at.toFixed(1)} s`;
   put(node("parting"), ghost.robot, at);
   node("parting").quaternion.set(0, 0, 0, 1);
 }
@@ -256,7 +256,7 @@ async function offer() {
   place("test").max = found.tests;
   while (which.options.length > 1) which.remove(1);
   for (const [number, one] of found.pairs.entries()) {
-    const option = new Option(`with and ${one.title}`, number);
+    const option = new Option(one.title, number);
     option.pair = one;
     which.add(option);
   }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runfile.tested import Wanted, made_for
+from ddenv.runs.changes import changed_run, changes
 from ddenv.runs.playback import played, table
 from ddenv.runs.reasons import Parting, nearest, reasons
 from ddenv.runs.subject import read_parts
@@ -27,6 +29,7 @@ from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
+from ddenv.world.sdf.numbers import changed
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5
@@ -115,12 +118,14 @@ class Player:
         """
         found: list[tuple[str, Parting | None]] = []
         with suppress(UserError):
-            found += [(f"without {each.without}", each.parting) for each in reasons(self._run, self._state)]
+            found += [(f"with and without {each.without}", each.parting) for each in reasons(self._run, self._state)]
         if (near := nearest(self._run, self._state)) is not None:
-            found.append(("the nearest world that passes", near.parting))
+            found.append(("with and the nearest world that passes", near.parting))
+        others = changes(self._run, self._state, None)
+        found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
         pairs = [
             {
-                "title": f"{words} (tests {one.with_test} and {one.without_test}, seed {one.seed})",
+                "title": f"{words} ({_numbers(one)}, seed {one.seed})",
                 "test": one.with_test,
                 "ghost": one.without_test,
                 "equal": one.equal,
@@ -141,10 +146,25 @@ class Player:
         rows = table(self._run.trajectory(test))
         # The path of the evidence is drawn anyway.
         hidden = what == "way" and test == self._evidence
-        return [self._scenery.way(rows[:0] if hidden else rows, what == "ghost-way")]
+        way = self._scenery.way(rows[:0] if hidden else rows, what == "ghost-way")
+        return [way, *self._moved(test)] if what == "ghost-way" and test < 0 else [way]
+
+    def _moved(self, number: int) -> list[bytes]:
+        """The messages that draw where the changed model stands in a run with a changed number."""
+        scenario, world, _ = read_parts(self._run)
+        one, _ = changed_run(self._state, number)
+        owner = one.name.rpartition(".")[0]
+        if owner not in self._elements:
+            return []
+        after = changed(scenario, world, {one.name: one.value})[1].model(owner)
+        return [] if after == world.model(owner) else self._scenery.ghost_of(after)
 
     def _shot_of(self, test: int) -> Shot:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
+        if test < 0:
+            run, one = changed_run(self._state, test)
+            found = shot_of_test(self._state, "replay", one)
+            return replace(found, title=f"{run.name} = {run.value:.4g} · {one.outcome}")
         start, state = self._position.start_of(test), self._state
         if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")
@@ -221,6 +241,10 @@ class Player:
         if self._state.f_position is not None:
             place, size = self._state.f_position, self._scenery.scale
             mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
+
+
+def _numbers(one: Parting) -> str:
+    return f"tests {one.with_test} and {one.without_test}" if one.without_test > 0 else f"test {one.with_test}"
 
 
 def _row(time: float, pose: Pose) -> list[float]:

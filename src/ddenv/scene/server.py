@@ -74,7 +74,7 @@ class Server:
             (f"/{self.token}/", _Page, {"server": self}),
             (rf"/{self.token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
             (rf"/{self.token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
-            (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
+            (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(-?\d{{1,9}}))?", _Asked, {"server": self}),
             (rf"/alive/{name_of(self.token)}/([0-9a-f]{{32}})", _Alive, {"server": self}),
         ]
         application = tornado.web.Application(

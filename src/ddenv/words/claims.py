@@ -65,12 +65,12 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
         _at_most(certificate),
     )
-    often = rate(most) if bound is None else f"{_seldom(removals)} (at most {percent(bound)} as often)"
+    often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 
 def _seldom(removals: Sequence[Claim]) -> str:
-    """How often f showed at most without any one model: "f in none of 12 fresh runs each"."""
+    """How often f showed at most with one model removed: "f in none of 12 fresh runs each"."""
     most = max(removals, key=lambda claim: (claim.shown / max(1, claim.runs), claim.high))
     each = " each" if len(removals) > 1 else ""
     if most.shown:
@@ -106,7 +106,7 @@ def _kept(certificate: Certificate) -> float:
 
 
 def _at_most(certificate: Certificate) -> float | None:
-    """How often f shows without any one model, as a share of its rate with it; None if that was not bounded."""
+    """How often f shows with any one model removed, at most, as a share of its rate with it; None if that was not bounded."""
     bounds = [claim.bound for claim in certificate.claims if claim.without is not None]
     return max((bound for bound in bounds if bound is not None), default=None) if None not in bounds else None
 
@@ -176,7 +176,7 @@ def for_everyone(certificate: Certificate) -> str:
     if certificate.seeds:
         return f"{said}; none of the {most.runs} chosen runs failed like this without {one}"
     seldom = f"at most {most.shown}" if most.shown else "none"
-    return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
+    return f"{said}; with {one} removed, in {seldom} of {most.runs} (at most {percent(most.high)})"
 
 
 def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
@@ -316,7 +316,7 @@ def terms(certificate: Certificate, pinned: int = 0) -> str:
     if certificate.seeds:
         return f"they measure how often what is left shows f with seeds other than {seeds_of(certificate)}"
     aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
-    return f"they have to show that what is left keeps {aim}, and that f is rarer without {_any_one(pinned)}"
+    return f"they have to show that what is left keeps {aim}, and that removing {_any_one(pinned)} makes f rarer"
 
 
 def promise(state: RunState, certificate: Certificate) -> str:
@@ -330,7 +330,7 @@ def promise(state: RunState, certificate: Certificate) -> str:
     most = _at_most(certificate)
     often = "rarer" if most is None else f"at most {percent(most)} as often"
     return (
-        f"minimal means: what is left keeps at least {kept}; without {_any_one(pinned)} f shows {often}; "
+        f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f shows {often}; "
         f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
     )
 

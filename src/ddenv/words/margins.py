@@ -14,6 +14,7 @@ from ddenv.evidence.margins import (
     Margin,
     Side,
     Value,
+    changes_at,
     fixes_of,
     margins_of,
 )
@@ -107,9 +108,13 @@ def nearest_fix(margins: Margins) -> str:
     if not judged:
         return ""
     one = next((one for one in judged if one.confirmed), judged[-1])
-    now = next(each.asked.now for each in margins.numbers if each.asked.name == one.name)
+    asked = next(each.asked for each in margins.numbers if each.asked.name == one.name)
     low, high = anytime_interval(one.reached, one.runs)
-    change = f"{one.name} from {now:.4g} to {one.value:.4g}, {100.0 * one.share:.2g} % of its scale"
+    now = {name: now for name, now, _ in asked.together} or {asked.name: asked.now}
+    change = " and ".join(f"{name} from {now[name]:.4g} to {to:.4g}" for name, to in changes_at(asked, one.value))
+    change += (
+        f", {100.0 * one.share:.2g} % of its scale" if not asked.together else f", {one.value:.2g} % of their ranges"
+    )
     only, first = ("", "The nearest fix found") if one.confirmed else (" only", "No fix is certified")
     fresh = f"in {one.reached} of {count(one.runs, 'fresh run')} ({percent(low)} to {percent(high)})"
     return f"{first}: {change}; the robot reaches its goal{only} {fresh}."

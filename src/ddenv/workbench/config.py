@@ -131,8 +131,11 @@ def read_config() -> Config:
         notify: StrictBool = True
         keys: dict[str, str] | None = None
 
+    data = read_yaml(path) or {}
+    if not isinstance(data, dict):
+        raise UserError(f"{path}: expected lines such as 'theme: {DARK.name}'; 'ddenv config --example' prints some")
     try:
-        found = File.model_validate(read_yaml(path) or {})
+        found = File.model_validate(data)
     except ValidationError as error:
         key, words = complaint(error.errors()[0], File)
         raise UserError(f"{path}: {key}: {words}") from None

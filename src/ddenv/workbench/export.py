@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar
 
-from textual import on, work
+from textual import events, on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
@@ -20,7 +20,7 @@ from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import ended
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open, is_open
-from ddenv.workbench.shared.bindings import keys
+from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 
@@ -34,6 +34,15 @@ KINDS = (
     ("test", "pytest (folder)", ("",)),
 )
 TICKED = ("world", "scenario", "report")
+# What the one under the cursor is good for.
+MEANINGS = {
+    "world": "The world that is left, for Gazebo or any other simulator.",
+    "scenario": "Runs the robot in that world, with 'ddenv run' or 'ddenv test'.",
+    "report": "A page to read, print or mail.",
+    "bundle": "All that a colleague needs: run, world, report, ISSUE.md, repro.py.",
+    "mcap": "ROS 2 messages for Foxglove, Rerun and ros2 bag; takes a few runs.",
+    "test": "A test that fails as long as the robot does, with the run beside it.",
+}
 WRITING = "writing ... escape stops it"
 # Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
@@ -60,7 +69,7 @@ class ExportScreen(ModalScreen[None]):
     AUTO_FOCUS = "#export-world"
     BINDINGS: ClassVar = [
         *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
-        *keys("export", ("close", "escape", "dismiss", "close", "close this dialog")),
+        *keys("export", HELP, ("close", "escape", "dismiss", "close", "close this dialog")),
     ]
 
     def __init__(self, run: Path, world: Path = Path()) -> None:
@@ -72,7 +81,7 @@ class ExportScreen(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         names = suggested(self._file, self._world)
-        with Framed("Export", "tab moves   space ticks   enter writes   escape closes", id="export"):
+        with Framed("Export", "tab moves   space ticks   enter writes   ? help   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)
@@ -82,6 +91,7 @@ class ExportScreen(ModalScreen[None]):
                     title = title.replace("SDF", "YAML") if is_directives(self._world) else title
                     yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")
                     yield Input(name, id=f"export-{id}-name", compact=True)
+            yield Static("", id="export-meaning", markup=False)
             with VerticalScroll(id="export-results", can_focus=False):
                 yield Static("", id="export-words", markup=False)
                 yield Static("", id="export-wrong", classes="wrong", markup=False)
@@ -94,6 +104,10 @@ class ExportScreen(ModalScreen[None]):
     @work(thread=True, group="look")
     def _look(self) -> None:
         call_if_open(self, self.query_one("#export-left", Static).update, what_is_left(self._file))
+
+    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
+        kind = (event.widget.id or "").removeprefix("export-").removesuffix("-name")
+        self.query_one("#export-meaning", Static).update(MEANINGS.get(kind, ""))
 
     @on(Checkbox.Changed)
     def _chosen(self, event: Checkbox.Changed) -> None:

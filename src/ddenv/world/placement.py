@@ -112,12 +112,25 @@ class Inside:
     depth: float
 
 
-def notes_on_start(world: World, robot: Model, spawn: Spawn) -> Iterator[tuple[str, str]]:
-    """What is wrong with the start of the robot in `world`: a word and a sentence for each."""
+def notes_on_start(
+    world: World, robot: Model, spawn: Spawn, goal: tuple[float, float] | None = None
+) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the robot in `world`, and with its `goal` (x, y), m: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
         yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
+    if goal is not None and (blocker := _blocker(world, np.array([*goal, spawn.z]))):
+        yield "goal", f"at the height of the start, the goal lies inside {blocker}; move the goal"
     yield from note_inside(world)
+
+
+def _blocker(world: World, point: np.ndarray) -> str | None:
+    """The first model that a point (3,), m, is inside of. Planes and meshes, which may be ground, do not count."""
+    for model in world.models:
+        for one in model.collisions:
+            if not isinstance(one.shape, (Plane, Mesh)) and _depth(Hull(point[None]), one) > TOLERANCE:
+                return model.name
+    return None
 
 
 def note_inside(world: World) -> Iterator[tuple[str, str]]:

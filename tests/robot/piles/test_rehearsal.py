@@ -43,6 +43,10 @@ def test_scripts_are_held_in_a_bounded_memory(world_of, monkeypatch):
     for _ in range(2):
         assert repertoire.add(heap, everything, script(*heap), 0.1).script
         assert not repertoire.find(heap, everything)
+    # What cannot be simulated takes memory, too: the names of the models that stay.
+    monkeypatch.setattr(rehearsal, "MEMORY", 0)
+    repertoire.add(("e",), everything, None, 0.1)
+    assert repertoire.find(("e",), everything) is None
 
 
 @pytest.mark.rates

@@ -201,7 +201,12 @@ async def test_any_run_is_stepped_through_forward_and_back():
         await pilot.press("left_parenthesis", "right_parenthesis", "right_parenthesis")
         await pilot.press("p")
         assert course.page.question is not None
-        await pilot.press("s")
+        asked_at = course.at
+        await pilot.press("enter")
+        assert course.at == asked_at and course.page.chosen is None, "an open question is not passed over"
+        await pilot.press("down", "enter")
+        assert course.page.chosen == 0
+        await pilot.press("right", "p", "s")
         assert "Skipped" in text(pilot)
         await pilot.press("enter")
         assert course.page.question is None

@@ -253,6 +253,21 @@ def fake_sensed(state, test, sensed):
     return replace(test, first_sensed=sensed, took_part=met)
 
 
+async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(busy):
+    async with Shown(busy) as (_, world):
+        assert world.legend(25).plain == "S start G goal × end of f"
+        assert world.legend(30).plain == "S start  G goal  × end of f"
+        assert world.legend(30, 2).plain.splitlines()[1].startswith("A B parts  ")
+        assert max(map(len, world.legend(30, 2).plain.splitlines())) <= 30
+
+
+async def test_before_the_first_round_the_legend_has_no_letters(run):
+    run.created().baseline()
+    async with Shown(run) as (_, world):
+        assert world.legend(200).plain.startswith("S start  G goal  × end of f")
+        assert "parts" not in world.legend(200).plain
+
+
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
     async with Shown(busy) as (_, world):
         before = world.picture.canvas.chars.copy()

@@ -78,6 +78,16 @@ def test_every_setting_has_an_option(scenarios, own, asked_by):
     assert path.name == "it's <mine>.ddenv"
 
 
+def test_a_long_number_is_shown_rounded_and_stays_what_it_is(scenarios, own, asked_by):
+    texts = form.texts_of(own)
+    assert texts["certify_rate"] == "0.667"
+    asked = form.asked_of(own, texts, own.reduction.pair, own.reduction.algorithm)
+    assert asked.reduction.certify_rate == own.reduction.certify_rate == 2 / 3
+    assert command_words(scenarios / "crates.yaml", own, asked, jobs=4, reading={})[3:] == []
+    asked = form.asked_of(own, texts | {"certify_rate": "0.66"}, own.reduction.pair, own.reduction.algorithm)
+    assert asked.reduction.certify_rate == 0.66
+
+
 @pytest.mark.parametrize("typed", ["", " none"])
 def test_a_limit_can_be_taken_back(scenarios, own, asked_by, typed):
     asked = form.asked_of(own, form.texts_of(own) | {"budget": typed}, "timeseg/random", "ddmin")
@@ -132,7 +142,7 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
     async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",), "model_path": (folder,)}) as session:
         await session.open(path)
         assert session.told("command") == ""
-        assert "not ready: spawn x m: is missing" in session.told("cost")
+        assert "not ready: spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
         session.place()
         await session.pilot.pause()
         words = shlex.split(session.told("command"))[1:]

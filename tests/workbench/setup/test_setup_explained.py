@@ -29,7 +29,9 @@ async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
         await session.press("enter", "tab")
         assert session.app.focused.id == "partitioning"
         assert session.explained() == ("partitioning model2model", explanation("partitioning", "model2model"))
-        await session.press("enter", "down", "enter")
+        await session.press("enter", "down")
+        assert session.explained()[0] == "partitioning model2model", "an open list belongs to its field"
+        await session.press("enter")
         assert session.explained() == ("partitioning timeseg", explanation("partitioning", "timeseg"))
         session.screen.query_one("#prioritization", Select).value = "random"
         await session.pilot.pause()

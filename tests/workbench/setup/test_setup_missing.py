@@ -14,6 +14,7 @@ from ddenv.runs.subject import load_parts, scenario_named
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.missing_files import AskRemedy, MissingList
 from ddenv.world.model import Box, Cylinder
+from tests.command import in_process, is_one_line
 from tests.workbench.setup.setup_session import Opened
 
 BARREL, SHELF = "model://construction_barrel/barrel.dae", "model://old_shelf"
@@ -208,7 +209,15 @@ async def test_the_question_for_the_start_comes_back_to_the_map(depot):
         await session.press("a")
         assert session.screen.focused is session.screen.query_one(WorldMap)
         assert "the start: move the crosshair" in session.told("picking")
-        assert "spawn x m: is missing" in session.told("cost")
+        assert "spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
+
+
+def test_commands_on_a_world_use_what_the_workbench_remembers(depot, monkeypatch, capsys):
+    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none"})
+    done = in_process(monkeypatch, capsys, "world", "check", depot)
+    assert done.returncode == 0
+    assert BARREL in done.stderr and "--no-remembered" in done.stderr
+    is_one_line(in_process(monkeypatch, capsys, "world", "check", depot, "--no-remembered"), "construction_barrel")
 
 
 def test_commands_use_what_the_workbench_remembers_and_say_so(depot):

@@ -138,10 +138,10 @@ async def test_an_open_list_shows_all_its_names(scenarios):
 # One of each kind; `tests/test_settings.py` has the range of every setting.
 WRONG = (
     ("iterations", "three", "iterations: expected a whole number, found 'three'"),
-    ("timeout", "", "timeout s: is missing"),
+    ("timeout", "", "timeout s: missing"),
     ("spawn_yaw", "-inf", "yaw rad: expected -1000 to 1000, found -inf"),
     ("jobs", "0", "jobs: expected 1 to 1024, found 0"),
-    ("name", " ", "run name: is missing"),
+    ("name", " ", "run name: missing"),
 )
 
 
@@ -162,6 +162,21 @@ async def test_an_error_is_shown_beside_the_field_and_nothing_is_written(scenari
             assert session.wrong() == ""
         await session.press("ctrl+s")
         assert len(started) == 1
+
+
+async def test_all_wrong_fields_are_named_and_the_first_one_gets_the_cursor(scenarios, started):
+    async with Opened() as session:
+        session.fill(iterations="three", goal_x="", goal_y="")
+        await session.press("ctrl+s")
+        missing = "goal x m, goal y m: missing; press g for the goal, on the map"
+        assert session.wrong() == f"✗ iterations: expected a whole number, found 'three'; {missing}"
+        assert session.told("cost").endswith(missing)
+        assert session.app.focused.id == "iterations"
+        for field in ("iterations", "goal_x", "goal_y"):
+            assert session.screen.query_one(f"#{field}", Input).has_class("-wrong")
+        session.fill(iterations="3")
+        await session.pilot.pause()
+        assert session.wrong() == f"✗ {missing}"
 
 
 async def test_a_field_is_checked_when_it_is_left_and_its_error_goes_when_it_is_right(scenarios):

@@ -94,8 +94,8 @@ def test_values_that_are_not_possible_and_why(parts):
         ("ball.mass", -1.0, "mass"),
     ):
         with pytest.raises(NotPossible, match=why.replace("(", r"\(")):
-            check(scenario, world, robot, kept, name, value)
-    check(scenario, world, robot, kept, "ode.z", 0.2)
+            check(scenario, world, robot, kept, {name: value})
+    check(scenario, world, robot, kept, {"ode.z": 0.2})
 
 
 def test_numbers_are_chosen_by_their_names(parts):

@@ -93,7 +93,8 @@ class Repertoire:
         near = frozenset(self._static) if script is None else frozenset(self._near(script.motions, margin))
         known = Known(names, near, near & present, script)
         self._known.setdefault(names, []).append(known)
-        self._size += 0 if script is None else script.size
+        # A pile that cannot be rehearsed takes memory, too: the names of all models that stay.
+        self._size += 128 * len(near) + (0 if script is None else script.size)
         if self._size > MEMORY:
             self._known, self._size = {}, 0
         return known

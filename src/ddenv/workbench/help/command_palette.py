@@ -1,4 +1,4 @@
-"""The list of ctrl+p: every action of the screen, the themes, and the models of a run by name."""
+"""The list of ctrl+p: every action of the screen, the themes, and the models on its map by name."""
 
 from __future__ import annotations
 
@@ -49,9 +49,13 @@ class Commands(Provider):
         wanted = query.strip().casefold()
         if not wanted:
             return []
-        names = dict.fromkeys(name for world in self.screen.query(WorldMap) for name in world.snapshot.state.elements)
+        names = dict.fromkeys(each.name for world in self.screen.query(WorldMap) for each in world.place.prints)
         return list(islice((name for name in names if wanted in name.casefold()), MOST_MODELS))
 
     def _go_to(self, name: str) -> None:
+        # Where the screen shows one pane at a time, the map may be hidden.
+        show_pane = getattr(self.screen, "action_pane", None)
+        if show_pane is not None:
+            show_pane("map")
         for world in self.screen.query(WorldMap):
-            world.go_to(name)
+            world.call_after_refresh(world.go_to, name)

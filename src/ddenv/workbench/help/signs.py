@@ -7,7 +7,7 @@ from typing import ClassVar
 from ddenv.runfile import branches
 from ddenv.words.signs import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.help.shortcuts import Reading
-from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, OF_WAYS
+from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, NO_PART, OF_WAYS, PARTS
 from ddenv.workbench.shared.bindings import keys
 
 Signs = tuple[tuple[str, str], ...]
@@ -15,7 +15,12 @@ Signs = tuple[tuple[str, str], ...]
 
 def signs() -> dict[str, Signs]:
     return {
-        "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate shown"), *MORE_SIGNS[1:], *LEGEND),
+        "On the map": (
+            PARTS,
+            ("a b", "not in the candidate shown; with the layer participants: no effect on the run"),
+            *(sign for sign in MORE_SIGNS if sign not in (PARTS, NO_PART)),
+            *LEGEND,
+        ),
         "On the map of tests played back": (*OF_WAYS, ("a", "in only one of the two")),
         "On the time of a test": (
             ("●", "the instant shown"),

@@ -217,12 +217,12 @@ class LessonScreen(LearnScreen[bool]):
             self.dismiss(True)
         elif self.course.go_on():
             self._moved()
-        elif self._opened is None:
-            self.action_move("moment", 1)
         elif self.course.is_open:
             # Without a cursor the frame says how to answer.
             if (place := self.query_one(LessonPane).cursor) is not None:
                 self.action_answer(place)
+        elif self._opened is None:
+            self.action_move("moment", 1)
         else:
             self.say("this is the end of the lesson: escape leaves it, backspace goes back")
 

@@ -35,7 +35,7 @@ DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
 # Maximum width of a model's name, in cells.
-NAME = 20
+NAME = 26
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 # A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
 _Line = tuple[np.ndarray, int, int]
@@ -221,9 +221,11 @@ def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> N
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
     layers, snapshot = shown.layers, shown.snapshot
-    if shown.ways:
+    signs = {"f": palette.failure, "goal": palette.goal}
+    limits = [(ring, signs.get(verdict, palette.shade(DULL)), 0) for verdict, ring in shown.limits]
+    if shown.ways or limits:
         both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
-        return [(way.points, color, dash) for way, color, dash in both][::-1]
+        return [*limits, *[(way.points, color, dash) for way, color, dash in both][::-1]]
     lines = [(_path(snapshot.evidence), palette.shade(PATH), 0)] if "path" in layers else []
     if "original" in layers and not shown.same_paths:
         lines.insert(0, (_path(snapshot.original), palette.shade(ORIGINAL), DASH))

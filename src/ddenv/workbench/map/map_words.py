@@ -45,15 +45,19 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
     ("⠒", "the first path"),
     ("⠒ ⠒", "the second path"),
     ("→ ⇒", "their robots"),
-    (PARTING, "they part"),
+    (PARTING, "paths diverge"),
 )
+LIMITS = ("▭", "limits")
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
+# The first signs of `LEGEND` are places, which no map goes without. Two cells apart, they need so many cells.
+PLACES, GAP, WITH_GAPS = 3, 2, 28
 
 
-def legend(shown: Shown, width: int) -> Text:
+def legend(shown: Shown, width: int, lines: int = 1) -> Text:
+    """The signs on the map with their meanings, as many as fit: first where the robot starts, has to go and ended."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
-        PARTS: bool(state.elements) and "partitions" in layers,
+        PARTS: state.round is not None and "partitions" in layers,
         SELECTED: bool(shown.selection),
         PINNED: bool(state.pinned) and "pinned" in layers,
         FALLING: shown.candidate is not None and bool(drops(state, shown.candidate)),
@@ -62,18 +66,27 @@ def legend(shown: Shown, width: int) -> Text:
         FIRST_PATH: "original" in layers and not shown.same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]
-    usual = LEGEND if state.elements else LEGEND[:2]
-    text = Text(no_wrap=True, overflow="ellipsis")
-    for sign, meaning in _of_ways(shown) if shown.ways else (*signs, *usual):
-        if text.cell_len + len(sign) + len(meaning) + 3 > width:
+    usual = (*LEGEND[:PLACES], *signs, *LEGEND[PLACES:]) if state.elements else LEGEND[:2]
+    text, used, gap = Text(no_wrap=True, overflow="ellipsis"), 0, GAP if width >= WITH_GAPS else 1
+    for sign, meaning in _of_ways(shown) if shown.ways or shown.limits else usual:
+        cells = len(sign) + 1 + len(meaning)
+        if used and used + gap + cells > width:
+            lines -= 1
+            used = 0
+        if not lines or cells > width:
             break
-        text.append(sign, "bold").append(f" {meaning}  ", "dim")
+        if text:
+            text.append(" " * gap if used else "\n")
+        text.append(sign, "bold").append(f" {meaning}", "dim")
+        used += (gap if used else 0) + cells
     return text
 
 
 def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
     for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
         yield sign, way.name
+    if shown.limits:
+        yield LIMITS
     if shown.parting is not None:
         yield PARTED
     if shown.apart is not None:
@@ -127,16 +140,16 @@ def _standing(state: RunState, name: str) -> str:
 
 
 class MapLines(Widget):
-    """One line on what is shown, and one of signs."""
+    """One line on what is shown, and one of signs; two of signs where nothing is to be said."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._shown: tuple[int, Candidate | Trial | None, Names, Callable[[int], Text]] | None = None
+        self._shown: tuple[int, Candidate | Trial | None, Names, Callable[[int, int], Text]] | None = None
 
     def show(
-        self, selected: int, shown: Candidate | Trial | None, fallen: Names, legend: Callable[[int], Text]
+        self, selected: int, shown: Candidate | Trial | None, fallen: Names, legend: Callable[[int, int], Text]
     ) -> None:
-        """`selected` models are selected, those of `shown` stand out; `legend` makes the line of signs for a width.
+        """`selected` models are selected, those of `shown` stand out; `legend` makes lines of signs for a width.
 
         `fallen` would drop without the selected ones, or without those that are not shown.
         """
@@ -155,5 +168,7 @@ class MapLines(Widget):
         elif shown is not None:
             text.append(f"{shown.label}: {drop or count(shown.size, 'model')}", "bold")
             text.append("" if drop else "  others in small letters", "dim")
+        if not text:
+            return legend(width, 2)
         text.truncate(width, overflow="ellipsis")
-        return text.append("\n").append_text(legend(width))
+        return text.append("\n").append_text(legend(width, 1))

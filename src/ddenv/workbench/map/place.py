@@ -63,7 +63,8 @@ class Shown:
 
     `layers` are from LAYERS; `selection` are the names of the models that the user selected. With `ways`, one or two, these are
     shown in place of the run's own paths; they part at `parting`, m. `apart` are the sign and the words of the
-    models that are not in both, for the legend.
+    models that are not in both, for the legend. `limits` are outlines, (N, 2) m, of a model where it may move, each with its
+    verdict, such as "f".
     """
 
     place: Place = field(default_factory=Place)
@@ -74,6 +75,7 @@ class Shown:
     ways: tuple[Way, ...] = ()
     parting: Point | None = None
     apart: tuple[str, str] | None = None
+    limits: tuple[tuple[str, np.ndarray], ...] = ()
 
     @property
     def start(self) -> Point | None:

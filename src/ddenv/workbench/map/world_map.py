@@ -27,6 +27,8 @@ from ddenv.workbench.shared.bindings import keys
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
+    import numpy as np
+
     from ddenv.map.cells import Cell
     from ddenv.map.footprints import Footprint
     from ddenv.map.paint import Canvas
@@ -159,12 +161,17 @@ class WorldMap(Widget, can_focus=True):
         same = len(known) == len(ways) and all(way.points is old for way, old in zip(ways, known, strict=True))
         self.draw() if same or not self.viewport.fitted else self._refit()
 
+    def show_limits(self, limits: tuple[tuple[str, np.ndarray], ...]) -> None:
+        """Outlines of a model at the limits up to which it may move (see `Shown`)."""
+        self.shown = replace(self.shown, limits=limits)
+        self.draw()
+
     def toggle_layer(self, name: str) -> None:
         self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
 
-    def legend(self, width: int) -> Text:
-        return legend(self.shown, width)
+    def legend(self, width: int, lines: int = 1) -> Text:
+        return legend(self.shown, width, lines)
 
     @property
     def model_at_cursor(self) -> str | None:

@@ -7,7 +7,7 @@ import time
 from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import islice
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -35,6 +35,9 @@ from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
 from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.world.pose import pose_at
+
+if TYPE_CHECKING:
+    import numpy as np
 
 # Simulated seconds in a second.
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -91,7 +94,10 @@ FIRST = ids("playback", "help close play beside frame_back frame_on parting slow
 
 
 class Playback(Screen[None]):
-    """Plays test number `test` of a run, over test `beside` if that is given; `place` is the run's world, if it is read already."""
+    """Plays test number `test` of a run, over test `beside` if that is given; `place` is the run's world, if it is read already.
+
+    Runs with a changed number have negative numbers; `limits` are outlines of what it moves (see `Shown`).
+    """
 
     CSS_PATH = "playback.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
@@ -108,7 +114,7 @@ class Playback(Screen[None]):
         ("faster", "greater_than_sign", "speed(1)", "faster", "faster", ">"),
         ("start", "home", "go(0)", "start", "to the start of the test"),
         ("end", "end", "go(1)", "end", "to the end of the test"),
-        ("parting", "p", "parting", "they part", "to the instant at which the paths of the two tests part"),
+        ("parting", "p", "parting", "paths diverge", "to the instant at which the paths of the two tests diverge"),
         ("beside", "o", "beside", "two tests", "play another test over this one, or this one alone again"),
         ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
         ("before", "up", "test(-1)", "test before", "the finished test before this one"),
@@ -119,7 +125,15 @@ class Playback(Screen[None]):
         ("close", "escape,q", "dismiss", "close", "back to where it was opened", "esc"),
     )
 
-    def __init__(self, file: RunFile, position: Position, place: Place, test: int, beside: int | None = None) -> None:
+    def __init__(
+        self,
+        file: RunFile,
+        position: Position,
+        place: Place,
+        test: int,
+        beside: int | None = None,
+        limits: tuple[tuple[str, np.ndarray], ...] = (),
+    ) -> None:
         """Raises UserError if a test is not finished."""
         super().__init__()
         self._file, self._position, self._place = file, position, place
@@ -129,6 +143,7 @@ class Playback(Screen[None]):
         self.playing = Playing(0.0)
         self._ticked = now()
         self.map = WorldMap(id="playback-map")
+        self.map.show_limits(limits)
         self._take([test] if beside is None else [test, beside])
 
     def compose(self) -> ComposeResult:
@@ -165,7 +180,7 @@ class Playback(Screen[None]):
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
         self._tests, self._parting = tests, None
-        self._ways = tuple(RobotWay(one, f"test {one.test.id}" if len(tests) == 2 else "its way") for one in tests)
+        self._ways = tuple(RobotWay(one, called(one) if len(tests) == 2 else "its way") for one in tests)
         self._prints = MovedPrints(self._place)
         if len(tests) == 2 and all(one.rows for one in tests):
             _, at, place = parted(tests[0].rows, tests[1].rows)
@@ -196,7 +211,7 @@ class Playback(Screen[None]):
         moved = len(first.moving.keys() & self._place.movable.keys())
         moves = f"{count(moved, 'model')} that moved" if moved else "no model moved"
         self.query_one("#playback-world").border_title = Text(f"World · {moves}" if first.rows else "World")
-        lines = [f"test {one.test.id}: {plain(one.words)}, seed {one.test.seed}" for one in self._tests]
+        lines = [f"{called(one)}: {plain(one.words)}, seed {one.test.seed}" for one in self._tests]
         if len(lines) == 2:
             lines = [f"{sign} {line}" for sign, line in zip(ROBOTS, lines, strict=True)]
         titles = (" Playback", "         ")
@@ -308,6 +323,10 @@ class Playback(Screen[None]):
             self._change([number])
         else:
             refuse(self, "there is no finished test after this one" if by > 0 else "there is no test before this one")
+
+
+def called(one: Played) -> str:
+    return f"test {one.test.id}" if one.test.id > 0 else "changed"
 
 
 def others(tests: Sequence[Test], one: Test) -> list[Test]:

@@ -15,6 +15,7 @@ from ddenv.guiding.course import GoBack, Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
+from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name, run_path
 from ddenv.workbench.help.pick import Pick
@@ -24,7 +25,7 @@ from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Layers, copied
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, failures, rounds
 from ddenv.workbench.run.facts import FactsDialog
-from ddenv.workbench.shared.background import is_open
+from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.shared.messages import ShowRun
 
 if TYPE_CHECKING:
@@ -52,6 +53,9 @@ class Opening:
         if not names:
             self._asking.refuse("there are no models to choose from")
             return
+        if not self._screen.world.is_on_screen:
+            # The map shows the model under the cursor.
+            self._screen.action_pane("map")
         pinned = self._poll.snapshot.state.pinned
         dialog = ChooseModels(title, names, several=several, mark=self._screen.world.mark, pinned=pinned, chosen=chosen)
         self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
@@ -162,21 +166,24 @@ class Opening:
     def inside(self) -> None:
         """Begins a run inside the models that are left, and shows it."""
         snapshot = self._poll.snapshot
+        if why := self._asking.barred:
+            self._asking.refuse(why)
+            return
         if snapshot.engine != "absent" or not snapshot.state.ended:
-            self._asking.refuse("something is still running: what is left can be opened when it has ended")
+            self._asking.refuse(_not_over(snapshot))
             return
         self._screen.run_worker(self._begin_inside, group="inside", exclusive=True, thread=True)
 
     def _begin_inside(self) -> None:
         from ddenv.runs.creation import create_inside
 
-        path = run_path(f"{self._poll.path.stem}-inside", None, None)
         try:
+            path = run_path(f"{self._poll.path.stem}-inside", None, None)
             create_inside(self._poll.path, path)
         except UserError as error:
-            self._screen.app.call_from_thread(self._asking.refuse, str(error))
+            call_if_open(self._screen, self._asking.refuse, str(error))
             return
-        self._screen.app.call_from_thread(self._screen.post_message, ShowRun(path))
+        call_if_open(self._screen, self._screen.post_message, ShowRun(path))
 
     def method(self) -> None:
         options = settings(self._poll.snapshot.state)
@@ -222,6 +229,18 @@ class Opening:
 
     def _exit(self, words: str) -> None:
         self._screen.app.exit(0, message=Text(words))
+
+
+def _not_over(snapshot: Snapshot) -> str:
+    """Why no run inside what is left can begin yet: what is going on, and what ends it."""
+    what, state = "the reduction", snapshot.state
+    if state.isolating is not None:
+        what = "the search for a world that passes"
+    elif state.margining is not None:
+        what = "the search for margins"
+    if snapshot.engine == "absent":
+        return f"{what} is not over: r goes on with it, then I works"
+    return f"{what} goes on{'; i stops it' if state.isolating is not None else ''}: I works once it is over"
 
 
 def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tuple[int | None, int | None]:

@@ -22,7 +22,7 @@ from ddenv.workbench.terminal.themes import ink
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.
 SHRINK = (
-    *("cut", "time", "left", "engine", "scene", "tests", "drift", "left", "left", "mode", "tests", "drift"),
+    *("cut", "time", "left", "engine", "scene", "tests", "drift", "left", "mode", "drift", "left", "tests"),
     *("asked", "engine", "tests", "drift", "state"),
 )
 # Which states end with a notification: the first one of these that follows another state.

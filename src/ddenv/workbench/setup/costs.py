@@ -76,13 +76,13 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     if budget is not None:
         low, middle, high = (min(each, budget) for each in (low, middle, high))
     words = f"about {count(rounded(middle), 'test')} ({between(low, high)})"
-    parts = f"baseline {reduction.baseline_runs}, certificate {rounded(rough.certificate[1])}"
+    baseline, search, certificate = reduction.baseline_runs, rounded(rough.search[1]), rounded(rough.certificate[1])
+    parts = f"{baseline} for the baseline, {search} for the search, {certificate} for the certificate"
     if budget is not None and middle >= budget:
         # The certificate may not be reached.
-        words, parts = f"{count(budget, 'test')} at most", f"baseline {reduction.baseline_runs}"
-    if past.rate is None:
-        words = f"{words} if the failure always shows"
+        words, parts = f"{count(budget, 'test')} at most", f"{baseline} for the baseline, then the search"
+    rare = "; more if the failure is rare" if past.rate is None else ""
     if past.seconds is None:
-        return f"{words}; {parts}"
+        return f"{words}: {parts}{rare}"
     spent = about(*(each * past.seconds / jobs for each in (middle, low, high)))
-    return f"{words}, {spent} with {count(jobs, 'job')} at {past.seconds:.1f} s a test, as before; {parts}"
+    return f"{words}: {parts}{rare}; {spent} with {count(jobs, 'job')} at {past.seconds:.1f} s a test, as before"

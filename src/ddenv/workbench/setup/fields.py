@@ -21,7 +21,7 @@ from ddenv.schemas import OURS, names, uses
 from ddenv.text import plain
 from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.form import Field
+from ddenv.workbench.setup.form import FIELDS, Field
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 MARK = "✗ "
 MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
-FIELDS = {field.id: field for field in form.ALL}
 
 
 def not_used(field: Field, algorithm: str) -> str:
@@ -167,7 +166,10 @@ class OptionsForm(Vertical):
 
     def _explain(self, widget: Widget | None) -> None:
         """The field that has the focus, or else the algorithm, which most depends on."""
-        id, (pair, algorithm) = "" if widget is None else widget.id or "", self.method
+        # An open list of names is a widget inside its field.
+        near = [] if widget is None else [each.id for each in (widget, widget.parent) if each is not None]
+        id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
+        pair, algorithm = self.method
         partitioning, _, prioritization = pair.partition("/")
         panel = self.query_one(Explained)
         if id in FIELDS:
@@ -198,15 +200,14 @@ class OptionsForm(Vertical):
         command.tooltip = plain(words) or None
 
     def complain(self, error: UserError) -> None:
-        """Shows an error below the fields, until it is corrected; the wrong field is marked and gets the cursor."""
+        """Shows an error below the fields, until it is corrected; wrong fields are marked, and the first one gets the cursor."""
         if not isinstance(error, form.FieldError):
             self.show_message(f"{MARK}{error}")
             return
-        id = error.field
-        if FIELDS[id] in form.ADVANCED:
+        if any(FIELDS[id] in form.ADVANCED for id in error.wrong):
             self._show_more(True)
-        self._message, self._problems = "", {id: str(error)} | self._problems | {id: str(error)}
-        self.call_after_refresh(self._point_at, id)
+        self._message, self._problems = "", error.wrong | self._problems | error.wrong
+        self.call_after_refresh(self._point_at, next(iter(error.wrong)))
 
     def _point_at(self, id: str) -> None:
         self._show_problems()
@@ -218,8 +219,8 @@ class OptionsForm(Vertical):
         self._show_problems()
 
     def _show_problems(self) -> None:
-        first = next(iter(self._problems.values()), "")
-        line, words = self.query_one("#wrong", Static), f"{MARK}{first}" if first else self._message
+        line = self.query_one("#wrong", Static)
+        words = f"{MARK}{form.in_words(self._problems)}" if self._problems else self._message
         line.display = bool(words)
         line.update(Text(plain(words)))
         for id, field in self._fields():

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 ON, OFF = "on", "off"
+# Longer numbers are shown rounded, in characters.
+LONGEST_NUMBER = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +69,23 @@ NAME = Field("name", "run name", str, meaning=NAMED)
 ACCEPTED = "Whether each reduction is accepted at once (automatic), or waits for you to accept or reject it (ask)."
 ACCEPT = Field("accept", "accept", str, choices=("automatic", "ask"), meaning=ACCEPTED)
 ALL = (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)
+FIELDS = {field.id: field for field in ALL}
 
 
 class FieldError(UserError):
-    """A field's text is wrong; `field` is its id."""
+    """Texts of fields are wrong: `wrong` says why, by the ids of the fields."""
 
-    def __init__(self, field: str, message: str) -> None:
-        super().__init__(message)
-        self.field = field
+    def __init__(self, wrong: Mapping[str, str]) -> None:
+        super().__init__(in_words(wrong))
+        self.wrong = dict(wrong)
+
+
+def in_words(wrong: Mapping[str, str]) -> str:
+    """Why fields are wrong, in one line. Those that are wrong for the same reason are named together."""
+    labels: dict[str, list[str]] = {}
+    for id, why in wrong.items():
+        labels.setdefault(why, []).append(FIELDS[id].label)
+    return "; ".join(f"{', '.join(fields)}: {why}" for why, fields in labels.items())
 
 
 def value(field: Field, text: str) -> Value:
@@ -85,14 +96,14 @@ def value(field: Field, text: str) -> Value:
     if field.empty and text in ("", field.empty):
         return None
     if not text:
-        raise FieldError(field.id, f"{field.label}: is missing; {_wanted(field)}")
+        raise FieldError({field.id: f"missing; {_wanted(field)}"})
     try:
         found = str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
         wanted = "a whole number" if field.kind is int else "a number"
-        raise FieldError(field.id, f"{field.label}: expected {wanted}, found '{text[:40]}'") from None
+        raise FieldError({field.id: f"expected {wanted}, found '{text[:40]}'"}) from None
     if allowed := _out_of_range(field, found):
-        raise FieldError(field.id, f"{field.label}: expected {allowed}, found {text[:40]}")
+        raise FieldError({field.id: f"expected {allowed}, found {text[:40]}"})
     return found
 
 
@@ -112,14 +123,18 @@ def _out_of_range(field: Field, found: Value) -> str:
 
 
 def problem(field: Field, text: str) -> str:
+    """Why the text is wrong, or ""."""
     try:
         value(field, text)
     except FieldError as error:
-        return str(error)
+        return error.wrong[field.id]
     return ""
 
 
 def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Value]:
+    """The values of the texts, by the ids of the fields. Raises FieldError, which names all that are wrong."""
+    if wrong := {field.id: why for field in fields if (why := problem(field, texts.get(field.id, "")))}:
+        raise FieldError(wrong)
     return {field.id: value(field, texts.get(field.id, "")) for field in fields}
 
 
@@ -148,9 +163,15 @@ def read_key(data: Mapping[str, Any], key: str) -> Any:
 
 def texts_of(scenario: Scenario) -> dict[str, str]:
     data = scenario.model_dump(mode="json")
-    values = {field.id: read(data, field.setting) for field in ALL if field.key and field.setting}
-    places = {field.id: read_key(data, field.key) for field in PLACES}
-    return {id: text_of(value) for id, value in (values | places).items()}
+    values = {field.id: _short(read(data, field.setting)) for field in ALL if field.key and field.setting}
+    places = {field.id: text_of(read_key(data, field.key)) for field in PLACES}
+    return values | places
+
+
+def _short(value: Value) -> str:
+    """A setting's value for people: two thirds are 0.667, which `asked_of` takes for unchanged."""
+    text = text_of(value)
+    return f"{value:.3g}" if isinstance(value, float) and len(text) > LONGEST_NUMBER else text
 
 
 def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str) -> Scenario:
@@ -159,9 +180,9 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
     from ddenv.world.load import validate
 
     data = base.model_dump(mode="json")
-    given = values(tuple(field for field in ALL if field.key), texts)
-    # What is unchanged is not asked for: one field may set what others show.
-    known = {name: one for name, one in SETTINGS.items() if name in given}
+    given, before = values(tuple(field for field in ALL if field.key), texts), texts_of(base)
+    # What is unchanged is not asked for: one field may set what others show, and a long number is shown rounded.
+    known = {name: one for name, one in SETTINGS.items() if name in given and texts.get(name) != before[name]}
     chosen = {name: given[name] for name, one in known.items() if given[name] != read(data, one)}
     data = with_values(data, chosen | {"pair": pair, "algorithm": algorithm})
     for field in PLACES:

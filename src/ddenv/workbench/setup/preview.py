@@ -18,7 +18,6 @@ from textual.widgets import Static
 from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
-from ddenv.map.raster import arrow
 from ddenv.runs.remedies import remember_remedies
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
@@ -36,6 +35,7 @@ from ddenv.workbench.shared.background import call_if_open
 REMEDIES = {
     "start": "s moves it to a free place",
     "drop": "lower the spawn's z",
+    "goal": "move the goal",
     "inside": "move one model, or make both static",
 }
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
@@ -177,7 +177,7 @@ class Preview(Vertical):
             start = (spawn[0], spawn[1], spawn[3]) if spawn else None
             self.map.set_marks(start, (goal[0], goal[1]) if goal else None)
             self._show_picking()
-            self._look_at_start(self.choice, spawn)
+            self._look_at_start(self.choice, spawn, goal)
 
     def _fill_z(self, choice: Choice) -> None:
         texts = self._form.texts
@@ -237,6 +237,8 @@ class Preview(Vertical):
         return {"spawn_yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
 
     def _show_picking(self) -> None:
+        from ddenv.map.raster import arrow
+
         line, what = self.query_one("#picking", Static), self.picked_next
         line.set_class(bool(what), "-on")
         text = Text(no_wrap=True, overflow="ellipsis")
@@ -255,8 +257,8 @@ class Preview(Vertical):
             line.update(next((form for form in forms if form.cell_len <= line.content_size.width), forms[-1]))
 
     @work(thread=True, group="notes", exclusive=True)
-    def _look_at_start(self, choice: Choice, spawn: tuple[float, ...] | None) -> None:
-        found, free = notes(choice, spawn)
+    def _look_at_start(self, choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None) -> None:
+        found, free = notes(choice, spawn, goal)
         if not get_current_worker().is_cancelled:
             call_if_open(self, self._show_notes, found, free)
 
@@ -280,7 +282,9 @@ class Preview(Vertical):
         line.tooltip = words or None
 
 
-def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[tuple[str, str], ...], Point | None]:
+def notes(
+    choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None
+) -> tuple[tuple[tuple[str, str], ...], Point | None]:
     """What is wrong with the start, as the run would note it: a word and a sentence for each; and where it had better be, m."""
     from ddenv.world.placement import note_inside, notes_on_start, stands_inside
     from ddenv.world.scenario import Spawn
@@ -294,7 +298,7 @@ def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[tuple[
         return tuple(note_inside(choice.world)), None
     x, y, z, yaw = spawn
     start = Spawn(x=x, y=y, z=z, yaw=yaw)
-    others = tuple(notes_on_start(choice.world, robot, start))
+    others = tuple(notes_on_start(choice.world, robot, start, (goal[0], goal[1]) if goal else None))
     if (inside := stands_inside(choice.world, robot, start)) is None:
         return others, None
     why, place = inside

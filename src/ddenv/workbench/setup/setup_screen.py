@@ -134,11 +134,12 @@ class SetupScreen(Screen[None]):
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
-        self._list_files()
+        # Reading scenarios, worlds and runs computes for longer than the first picture, which would wait for that.
+        self.call_after_refresh(self._list_files)
         self.query_one(FileList).focus()
 
     def on_screen_resume(self) -> None:
-        self.query_one(RunList).read()
+        self.call_after_refresh(self.query_one(RunList).read)
 
     def on_resize(self, event: events.Resize) -> None:
         width, height = event.size
@@ -334,7 +335,7 @@ class SetupScreen(Screen[None]):
 
     def _complain(self, error: UserError) -> None:
         self._busy = False
-        if isinstance(error, form.FieldError) and error.field != form.NAME.id:
+        if isinstance(error, form.FieldError) and form.NAME.id not in error.wrong:
             self._show_pane("settings")
         self.form.complain(error)
 

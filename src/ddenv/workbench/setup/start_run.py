@@ -91,11 +91,11 @@ def run_file(scenario_name: str, name: str) -> Path:
     try:
         path = run_path(scenario_name, None, Path(name)) if is_path else run_path(scenario_name, name, None)
     except UserError as error:
-        raise form.FieldError("name", f"run name: {str(error).partition(': ')[2]}") from None
+        raise form.FieldError({"name": str(error).partition(": ")[2]}) from None
     try:
         exists = path.exists()
     except OSError as error:
-        raise form.FieldError("name", f"run name: {path} cannot be written: {error.strerror}") from None
+        raise form.FieldError({"name": f"{path} cannot be written: {error.strerror}"}) from None
     if exists:
-        raise form.FieldError("name", f"run name: {path} exists already; choose another name")
+        raise form.FieldError({"name": f"{path} exists already; choose another name"})
     return path

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -13,12 +14,18 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
+from ddenv.runs.changes import changes
+from ddenv.runs.folder import attach_name
 from ddenv.runs.reasons import Nearest, Parting, Reason, nearest, no_reasons, parting_sentence, reasons, sentence
+from ddenv.runs.subject import read_parts
 from ddenv.text import as_sentence, padded, percent, plain, shortened
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
 from ddenv.words.signs import CLAIM
 from ddenv.workbench.playback.moving import snapshot_with
+
+if TYPE_CHECKING:
+    import numpy as np
 
 # The maximum number of models in the list.
 LISTED = 200
@@ -32,7 +39,7 @@ class Entry:
     """Something that is left out of the environment of `snapshot`: the models `gone`, which have the sign `letter` on the map.
 
     `sentence` says what happens then, `more` the rates; `parting` compares two runs with one seed, whose ways are called `ways`;
-    `claim` is that of a certificate.
+    `claim` is that of a certificate. A number that is changed has `limits` to draw, and `figures` for its row.
     """
 
     name: str
@@ -44,6 +51,8 @@ class Entry:
     ways: tuple[str, str]
     snapshot: Snapshot
     claim: Claim | None = None
+    limits: tuple[tuple[str, np.ndarray], ...] = ()
+    figures: str = ""
 
     @property
     def text(self) -> str:
@@ -58,7 +67,25 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
     passing = nearest(file, state)
     last = () if passing is None else (_of_nearest(state, passing),)
-    return (*models, *last), len(found) - len(listed)
+    return (*models, *last, *_of_numbers(file, state)), len(found) - len(listed)
+
+
+def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
+    """What happens where a number has another value."""
+    if state.margins is None:
+        return
+    # What needs NumPy comes after the first paint.
+    from ddenv.map.footprints import rings
+
+    snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
+    for one in changes(file, state, read_parts(file)[1]):
+        value, given = f"{one.value:.4g}", " ".join([run, *(f"--margin {name}={to:.9g}" for name, to in one.changes)])
+        again = (
+            f"Again: ddenv test --minimal {given} --repeat 10\nAs a world: ddenv export {given} --output changed.sdf"
+        )
+        limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
+        figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
+        yield Entry(one.name, "", (), one.sentence, (again,), one.parting, ways, snapshot, None, limits, figures)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
@@ -91,6 +118,9 @@ def head(width: int) -> Text:
 
 def row(one: Entry, width: int) -> Text:
     """The letter of a model on the map, its name, how often f shows without it, and the interval of that in %."""
+    if one.figures:
+        room = max(4, width - len(one.figures) - 4)
+        return Text(f"   {padded(shortened(one.name, room), room)} {one.figures}", no_wrap=True)
     if one.claim is None:
         return Text(f"{'○' if one.name == NEAREST else ' '}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
     name, claim = padded(shortened(one.name, _name(width)), _name(width)), one.claim

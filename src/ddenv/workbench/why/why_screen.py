@@ -142,8 +142,10 @@ class WhyScreen(Screen[None]):
         now = self._look_at()
         state, works = now.state, now.works
         self._show_isolation(now)
-        known = current(state) is not None or state.isolated is not None
-        seen = current(state), state.isolated, works, state.status, 0 if known else state.tests_done
+        # Margins are shown once their search is over.
+        margins = state.margins if state.margining is None else None
+        known = current(state) is not None or state.isolated is not None or margins is not None
+        seen = current(state), state.isolated, margins, works, state.status, 0 if known else state.tests_done
         if seen == self._seen:
             return
         self._seen, self._state = seen, state
@@ -188,7 +190,8 @@ class WhyScreen(Screen[None]):
             self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
             return
         beyond = f" · {more} more are not listed" if more else ""
-        self.query_one("#why-models").border_title = Text(f"Without each model{beyond}")
+        numbers = ", and with other numbers" if found[-1].figures else ""
+        self.query_one("#why-models").border_title = Text(f"Without each model{numbers}{beyond}")
         self._list()
 
     def _list(self) -> None:
@@ -217,7 +220,9 @@ class WhyScreen(Screen[None]):
         self.query_one("#why-scroll").scroll_home(animate=False)
         self.map.show(one.snapshot, without(one.snapshot.state.environment, one.gone))
         parting = None if one.parting is None else one.parting.place
-        self.map.show_ways(ways, parting, (one.letter.lower(), "left out in one"), self._place.prints)
+        apart = (one.letter.lower(), "left out in one") if one.gone else None
+        self.map.show_limits(one.limits)
+        self.map.show_ways(ways, parting, apart, self._place.prints)
         title = "World" if one.parting is None or not ways else f"The two paths, seed {one.parting.seed}"
         self.query_one("#why-world").border_title = Text(title)
         legend = self.query_one("#why-legend", Static)
@@ -241,12 +246,12 @@ class WhyScreen(Screen[None]):
         if one is None or one.parting is None:
             refuse(
                 self,
-                "there are no two runs to play: none with the model and one without it share a seed and end differently",
+                "there are no two runs to play: none that share a seed and end differently are stored",
             )
             return
         try:
             both = one.parting.with_test, one.parting.without_test
-            self.app.push_screen(Playback(self._file, self._position, self._place, *both))
+            self.app.push_screen(Playback(self._file, self._position, self._place, *both, one.limits))
         except UserError as error:
             refuse(self, str(error))
 

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import product
 from typing import Any
 
 from pydantic import ValidationError
@@ -200,22 +201,20 @@ def part_of(
     return scenario.model_copy(update={"whole": whole}), world
 
 
-def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], name: str, value: float) -> None:
-    """Raises NotPossible if a number cannot have a value: then the robot stands in a model at its start, or a changed model in
+def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], changes: Mapping[str, float]) -> None:
+    """Raises NotPossible if numbers cannot have these values: then the robot stands in a model at its start, or a changed model in
     another one that it did not stand in.
     """
     try:
-        there, after = part_of(scenario, world, kept, {name: value})
+        there, after = part_of(scenario, world, kept, changes)
         found = stands_inside(after, robot, there.robot.spawn)
     except UserError as error:
         raise NotPossible(str(error)) from None
     if found is not None:
         raise NotPossible(found[0])
-    owner = name.rpartition(".")[0]
-    if name in OF_SCENARIO or owner not in kept:
-        return
-    before, model = world.model(owner), after.model(owner)
-    for other in after.models:
+    owners = {name.rpartition(".")[0] for name in changes if name not in OF_SCENARIO} & kept
+    for owner, other in product(sorted(owners), after.models):
+        before, model = world.model(owner), after.model(owner)
         # What stands on the ground may sink into it, and two that never move push nothing apart.
         if other.name == owner or (model.static and is_ground(other)):
             continue
@@ -244,18 +243,24 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     return after
 
 
-def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: str, value: float) -> bytes:
-    """The text with a model in another place."""
+def move_of(model: Model, what: str, value: float) -> Pose:
+    """How a model moves in the world where one of its x, y, z (m) and yaw (rad) has this value; not at all for other numbers."""
     turn = value - model.pose.yaw() if what == "yaw" else 0.0
     x, y, z = (value if axis == what else now for axis, now in zip("xyz", model.pose.position, strict=True))
+    return Pose.from_rpy(x, y, z, 0.0, 0.0, turn) @ Pose(model.pose.position).inverse()
+
+
+def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: str, value: float) -> bytes:
+    """The text with a model in another place."""
     pose = at.find("pose")
     words = [] if pose is None else (pose.text or "").split()
     if pose is not None and not pose.attrib and len(words) == 6 and len(model.spans) == 1:
         # A turn about the vertical is the last one of roll, pitch and yaw.
-        place, now = (5, float(words[5]) + turn) if what == "yaw" else ("xyz".index(what), value)
+        turned = float(words[5]) + value - model.pose.yaw()
+        place, now = (5, turned) if what == "yaw" else ("xyz".index(what), value)
         words[place] = f"{now:.9g}"
         return edited(world.text, [_said(world.text, pose, " ".join(words))])
-    move = Pose.from_rpy(x, y, z, 0.0, 0.0, turn) @ Pose(model.pose.position).inverse()
+    move = move_of(model, what, value)
     return with_places(world, {model.name: [move @ link.pose for link in model.links]}, scenario.reading)[0]
 
 

@@ -1,0 +1,95 @@
+"""Runs with a changed number beside one of what is left with the same seed: as tests that can be played, compared and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from ddenv.errors import UserError
+from ddenv.evidence.margins import MOST_RUNS, Margin, changes_at
+from ddenv.runfile.events import MarginRan
+from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.store import RunFile
+from ddenv.runs.reasons import F, Parting, parted, parting_words
+from ddenv.words.margins import rows
+from ddenv.world.model import Model, World
+from ddenv.world.pose import Pose
+from ddenv.world.sdf.numbers import move_of
+
+# A model that has moved to a limit: the verdict there, such as "f", the model, and how it has moved.
+Limit = tuple[str, Model, Pose]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A number with another `value`, `share` of its scale away, at a limit of its margin, as `sentence` says; it means `changes` of
+    numbers to values. `parting` compares two runs with one seed, of what is left as it is and with that value; None where no such
+    pair is stored. `limits` are those up to which its model may move, if the number is a place.
+    """
+
+    name: str
+    value: float
+    share: float
+    changes: tuple[tuple[str, float], ...]
+    verdict: str
+    sentence: str
+    parting: Parting | None
+    limits: tuple[Limit, ...]
+
+
+def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change, ...]:
+    """A change for each number with a limit: to the nearest value at which the robot reaches its goal, or else f is gone."""
+    margins = state.margins
+    if margins is None:
+        return ()
+    by_name = {} if world is None else {model.name: model for model in world.models}
+    found = []
+    for row in rows(margins):
+        one = row.margin
+        limits = [value for side in one.sides for value in (side.goal, side.gone) if value and value.outcomes]
+        if limits:
+            value = min(limits, key=lambda each: (each.verdict != "goal", abs(each.value - one.asked.now)))
+            parting = _parting(file, state, one.asked.name, value.value)
+            moved = tuple(_limits(by_name, one))
+            share = abs(value.value - one.asked.now) / one.asked.scale
+            words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
+            to = changes_at(one.asked, value.value)
+            found.append(Change(one.asked.name, value.value, share, to, value.verdict, words, parting, moved))
+    return tuple(found)
+
+
+def _limits(models: Mapping[str, Model], one: Margin) -> Iterator[Limit]:
+    owner, _, what = one.asked.name.rpartition(".")
+    if owner in models and what in ("x", "y", "yaw"):
+        for value in (each for side in one.sides for each in (side.until, side.gone) if each):
+            yield value.verdict, models[owner], move_of(models[owner], what, value.value)
+
+
+def beside(state: RunState) -> Test | None:
+    """The run of what is left that shows f and with which those with changed numbers are compared; None if there is none."""
+    margins = state.margins
+    there = margins and margins.asked.environment
+    tests = (test for test in state.tests if test.environment == there and test.outcome == F and test.run < MOST_RUNS)
+    return min(tests, key=lambda test: test.run, default=None)
+
+
+def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
+    """The run with a changed number that has this negative `number` in the file, also as a test. Raises UserError."""
+    margins = state.margins
+    place = -1 if margins is None else -number - 1 - margins.earlier
+    if margins is None or not 0 <= place < len(margins.runs):
+        raise UserError(f"there is no run {-number} with a changed number")
+    one = margins.runs[place]
+    ended = one.outcome, one.failure, one.distance, one.end_pose
+    return one, Test(number, margins.asked.environment, "margin", None, None, one.run, one.seed, *ended)
+
+
+def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:
+    left, margins = beside(state), state.margins
+    if left is None or margins is None:
+        return None
+    for place, one in enumerate(margins.runs):
+        number = -1 - margins.earlier - place
+        if (one.name, one.value, one.run) == (name, value, left.run) and (samples := file.motion(number)):
+            return Parting(left.id, number, left.seed, *parted(file.trajectory(left.id), samples), None, False)
+    return None
