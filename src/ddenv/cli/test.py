@@ -14,7 +14,7 @@ import click
 
 from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
-from ddenv.text import count, percent, printable
+from ddenv.text import coordinates, count, percent, printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.progress import Claim
@@ -96,8 +96,7 @@ def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust:
 def line(result: Mapping[str, Any]) -> str:
     how = result["failure"]
     if result["end_pose"] is not None:
-        x, y, z = result["end_pose"][:3]
-        how = f"ended at ({x:.2f}, {y:.2f}, {z:.2f}) m after {result['simulated_seconds']:.1f} s"
+        how = f"ended at ({coordinates(result['end_pose'][:3])}) m after {result['simulated_seconds']:.1f} s"
         how += f"  {result['failure']}" if result["failure"] else ""
         how += "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     without = f"  without {result['without']}" if result["without"] else ""

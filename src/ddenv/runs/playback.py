@@ -41,7 +41,7 @@ class Played:
     @property
     def robot(self) -> np.ndarray:
         """The robot's rows, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
-        return _table(self.rows)
+        return table(self.rows)
 
     @property
     def length(self) -> float:
@@ -73,13 +73,13 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         words = f"test {number}"
     rows, moving = array("d"), {}
     for name, samples in _stored(file, number, lacks).items():
-        table = _table(samples)
-        if not _makes_sense(table):
+        stored = table(samples)
+        if not _makes_sense(stored):
             lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
         elif name == ROBOT:
             rows = samples
         else:
-            moving[name] = table
+            moving[name] = stored
     if rows:
         test = replace(test, simulated_seconds=test.simulated_seconds or rows[-COLUMNS])
     else:
@@ -109,5 +109,6 @@ def _makes_sense(rows: np.ndarray) -> bool:
     return bool(in_time and (np.abs(rows) <= FARTHEST).all())
 
 
-def _table(samples: array[float]) -> np.ndarray:
+def table(samples: array[float]) -> np.ndarray:
+    """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
     return np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS) if samples else np.zeros((0, COLUMNS))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from array import array
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -18,7 +17,7 @@ from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runfile.tested import Wanted, made_for
 from ddenv.runs.changes import changed_run, changes
-from ddenv.runs.playback import played
+from ddenv.runs.playback import played, table
 from ddenv.runs.reasons import Parting, nearest, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.scene import colors
@@ -33,11 +32,6 @@ from ddenv.world.sdf.numbers import changed
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5
-
-
-def rows_of(samples: array[float]) -> np.ndarray:
-    """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
-    return np.asarray(samples, dtype=float).reshape(-1, COLUMNS)
 
 
 class Player:
@@ -149,7 +143,7 @@ class Player:
         """
         if what == "still":
             return self._scenery.still(self._shot_of(test))
-        rows = rows_of(self._run.trajectory(test))
+        rows = table(self._run.trajectory(test))
         # The path of the evidence is drawn anyway.
         hidden = what == "way" and test == self._evidence
         way = self._scenery.way(rows[:0] if hidden else rows, what == "ghost-way")
@@ -241,7 +235,7 @@ class Player:
     def _show_evidence(self) -> None:
         self._evidence = self._state.evidence_test
         samples = None if self._evidence is None else self._run.motion(self._evidence)
-        self._scenery.evidence(None if samples is None else rows_of(samples))
+        self._scenery.evidence(None if samples is None else table(samples))
         if self._state.f_position is not None:
             place, size = self._state.f_position, self._scenery.scale
             mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
