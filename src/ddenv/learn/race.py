@@ -24,7 +24,7 @@ from ddenv.text import count, first_of
 # The least and the most searches of a race, and how many searches a sentence names.
 RACERS = (2, 4)
 NAMED = 5
-BOUND = "The last line: how many yes-or-no answers it takes to single out such a set without prior knowledge."
+BOUND = "The last line: no search can be sure to find such a set with fewer yes-or-no answers."
 
 
 @dataclass(frozen=True, slots=True)

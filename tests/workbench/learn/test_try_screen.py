@@ -87,7 +87,11 @@ async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again(at_the_s
         await pilot.press("w")
         assert not screen.attempt.tried, "nothing is marked"
         await without(pilot, "bin")
-        await pilot.press("m", "m")
+        await pilot.press("m", "escape")
+        assert pilot.app.screen is screen and "Sure" not in said(pilot), "escape takes back the claim, not the search"
+        await pilot.press("m")
+        assert not screen.attempt.ended, "the claim is asked for again"
+        await pilot.press("m")
         await pilot.pause()
         assert "✗ More can go: f also shows without any one of bench, plant" in said(pilot)
         await pilot.press("n")

@@ -175,7 +175,7 @@ class RaceScreen(LearnScreen[None]):
         if self.race.go(self.race.at + by):
             self._show()
         else:
-            self.say("the race is over" if by > 0 else "the race begins here")
+            self.say("the race is over: esc leaves" if by > 0 else "the race begins here")
 
     def action_go(self, at: int) -> None:
         self._pause()

@@ -35,7 +35,7 @@ class TryScreen(LearnScreen[None]):
 
     AUTO_FOCUS = "WorldMap"
     NAME = "try"
-    FIRST = "help close on without done map.pick only map.next back again"
+    FIRST = "help close on without done mark only map.next back again"
     BINDINGS: ClassVar = keys(
         "try",
         ("mark", "space", "mark", "mark", "mark or unmark the model under the crosshair"),
@@ -105,7 +105,9 @@ class TryScreen(LearnScreen[None]):
             said.update(Text("\n\n").join((verdict, Text(plain(sentence)))))
             return
         many = count(len(attempt.held), "model")
-        sure = Text(f"Sure that no single one of {many} can go? m again confirms it and ends the search.", "bold")
+        sure = Text(
+            f"Sure that no single one of {many} can go? m again confirms it and ends the search, esc goes on.", "bold"
+        )
         said.update(Text("\n").join((sure if self._asked else _last(attempt), *self._models())))
 
     def _models(self) -> tuple[Text, Text]:
@@ -119,7 +121,9 @@ class TryScreen(LearnScreen[None]):
         if not self.attempt.tests_left:
             return models, Text("No tests are left. m: the verdict on what you keep.", "dim")
         if not marked:
-            return models, Text("Mark models with enter or a click. When no single one can go, press m.", "dim")
+            return models, Text(
+                "space or a click marks a model, ] goes to the next. When no single one can go, press m.", "dim"
+            )
         left = len(self.attempt.held) - len(marked)
         return models, Text(f"{len(marked)} marked (*): w tests the other {left}, o tests these alone.", "dim")
 
@@ -140,6 +144,13 @@ class TryScreen(LearnScreen[None]):
     def action_on(self) -> None:
         self.action_close()
 
+    def action_close(self) -> None:
+        if not self._asked:
+            super().action_close()
+            return
+        self._asked = False
+        self._say_where()
+
     def action_mark(self) -> None:
         self._map.action_pick()
 
@@ -149,7 +160,7 @@ class TryScreen(LearnScreen[None]):
     def action_test(self, only: bool) -> None:
         marked, held = self._map.selection, frozenset(self.attempt.held)
         if not marked:
-            self.say("mark some models first: enter or a click on the map")
+            self.say("mark some models first: space, or a click on the map")
             return
         self._do(lambda: self.attempt.test(marked if only else held - marked))
 
