@@ -101,6 +101,7 @@ PICTURES = {
     "rounds": Picture("Pick", "The rounds of a run"),
     "facts": Picture("FactsDialog", "The raw facts of a test"),
     "why": Picture("WhyScreen", "Why it fails: what happens without each model"),
+    "changed": Picture("WhyScreen", "A number at a value with which the robot reaches its goal"),
     "margins": Picture("MarginsDialog", "How far numbers may change before f goes"),
     "playback": Picture("Playback", "A test played over another one with the same seed"),
     "beside": Picture("Pick", "Which test to play beside another one"),
@@ -357,11 +358,14 @@ async def tell_why(pilot: Pilot[int]) -> None:
 async def show_margins() -> None:
     """Margins of what is left in the friction world."""
     run = new_run("friction")
-    for options in ({}, {"margins": '["*.friction", "barrel_0?.y"]', "most_runs": 250}):
+    for options in ({}, {"margins": '["*.friction", "*_0?.y"]', "most_runs": 300}):
         await asyncio.to_thread(start_engine(run, 2, **options).wait)
     async with opened(run) as pilot:
         await press(pilot, "W")
         await drawn(pilot)
+        # After three models and the friction of the patch: how far it may be moved.
+        await press(pilot, *["down"] * 4)
+        await take(pilot, "changed")
         await press(pilot, "m")
         await take(pilot, "margins")
 

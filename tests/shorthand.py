@@ -108,7 +108,8 @@ class Writing:
             self._state = fold(self._file.events(self._state.revision), self._state)
         command = data.get("command")
         for event in typed(self._state, kind, {key: data[key] for key in data if key != "command"}):
-            self._file.append(event, motions, command)
+            made = None if self._state.margins is None else -1 - self._state.margins.made
+            self._file.append(event, motions, command, made)
 
 
 def raw(file: RunFile, kind: str, data: object) -> None:

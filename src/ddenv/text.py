@@ -105,6 +105,11 @@ def about(middle: float, low: float = 0.0, high: float = 0.0) -> str:
     return f"{rounded(middle / unit):,} {name}{interval}"
 
 
+def coordinates(place: Sequence[float]) -> str:
+    """A place, m, as it is said: 5.42, -0.56."""
+    return ", ".join(f"{value:z.2f}" for value in place)
+
+
 def percent(part: float) -> str:
     """A fraction as a whole percentage that is never rounded to certainty."""
     value = round(100 * part)

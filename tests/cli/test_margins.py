@@ -1,8 +1,10 @@
 """`ddenv margins`, and where its table is shown: with the report, the issue of a bundle, the workbench; and a fix as a world."""
 
 import json
+import re
 import signal
 import subprocess
+from collections import Counter
 
 import pytest
 
@@ -50,6 +52,34 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch,
     for text in ((tmp_path / "report.md").read_text(), (tmp_path / "handed" / "ISSUE.md").read_text()):
         assert FRICTION in text.replace("\\", "")
         assert FIX in text.replace("\\", "")
+
+
+def test_the_report_outlines_how_far_a_model_may_move_and_has_both_paths(run, tmp_path):
+    fake_moments.with_margins(run)
+    write_report(run.path, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    section = page[page.index("<h2>Margins") : page.index("</section>", page.index("<h2>Margins"))]
+    assert "paths now and with crate_00.friction = 0.4, seed 0." in section
+    signs = re.findall(r'<path class="(until|from|over|now|changed)" d="M[-\d]', section)
+    # Of crate_01.y: no f below, f above, and beyond that it would be inside another model; then the legend has one line of each.
+    assert Counter(signs) == {"over": 3, "until": 2, "now": 2, "changed": 2}
+
+
+def test_a_value_is_tried_again_in_what_is_left(run, monkeypatch, capsys):
+    fake_moments.with_margins(run)
+    asked = []
+    monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *given: asked.append(given) or [])
+    words = ["--minimal", "--margin", "crate_01.y=1.5", "--margin", "crate_00.friction", "--repeat", 3]
+    assert in_process(monkeypatch, capsys, "test", run.path, *words).returncode == 0
+    ((subject, trials, _),) = asked
+    assert subject.world.model("crate_01").pose.position[1] == 1.5
+    # Without a value it is that of the fix.
+    assert {one.mu for one in subject.world.model("crate_00").collisions} == {0.4}
+    assert [set(trial.keep) for trial in trials] == 3 * [set(run.state.environment)]
+    is_one_line(in_process(monkeypatch, capsys, "test", run.path, "--margin", "crate_01.y"), "no value of crate_01.y")
+    is_one_line(
+        in_process(monkeypatch, capsys, "test", "ditch", "--margin", "asphalt_far.x=4"), "--margin: needs a run"
+    )
 
 
 def test_bars_stand_on_one_scale(run):

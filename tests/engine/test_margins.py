@@ -105,6 +105,23 @@ def test_whoever_works_on_it_and_however_often_it_is_killed_the_table_is_the_sam
     )
 
 
+@pytest.mark.parametrize("budget", [24, 31, 37])
+def test_where_the_runs_run_out_the_table_is_the_same_with_any_number_of_workers(tmp_path, budget):
+    def doubtful(keep, seed, changes):
+        return "similar" if changes.get("wall.y", 0.0) < 0.3 or seed % 3 else "other"
+
+    found = []
+    for jobs in (1, 2, 5):
+        (tmp_path / str(jobs)).mkdir()
+        path = new_run(tmp_path / str(jobs))
+        drive(path, fake())
+        pool = fake(jobs, 4)
+        pool.changed = doubtful
+        found.append(work(path, pool, globs=["wall.y"], budget=budget))
+    assert table(found[0]) == table(found[1]) == table(found[2])
+    assert all(len(state.margins.runs) <= budget for state in found)
+
+
 def test_a_stop_keeps_all_and_the_run_is_as_it_was(path):
     before, pool = state_of(path), fake()
     made = []

@@ -40,7 +40,7 @@ def resumed(path, kill=True, **options):
 
 
 def another_drake(monkeypatch):
-    monkeypatch.setattr(shared, "version", lambda name: "0.9")
+    monkeypatch.setattr(processor, "versions", lambda *names: ", ".join(f"{name} 0.9" for name in names))
 
 
 def other_bits(monkeypatch):

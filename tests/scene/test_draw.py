@@ -23,6 +23,7 @@ from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual, World
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.read import read_model, read_world
 from tests.conftest import ROOT
+from tests.scene.conftest import straight
 
 ARM = ROOT / "docs/examples/arm"
 ROBOT = read_model(SDF / "robots" / "husky.sdf")
@@ -150,6 +151,35 @@ def test_a_finished_test_is_played_by_the_browser(writer, screen, player):
     # The path of the evidence is there already.
     screen.take(*player.drawings("way", 2))
     assert "/world/trail" not in screen.things
+
+
+def test_a_run_with_a_moved_model_is_the_ghost_of_one_without(writer, screen, player):
+    """The model stands where it was, and as a ghost where it is in that run; of a friction there is no such ghost."""
+    writer.round()
+    writer.reduce()
+    number = {"now": 1.5, "low": -1.5, "high": 4.5, "scale": 3.0, "resolution": 0.01, "unit": "m"}
+    numbers = [number | {"name": name} for name in ("left wall.y", "left wall.friction")]
+    began = {"environment": 1, "rate": 1.0, "error": 0.01, "budget": 50, "certified": False, "status": "stopped"}
+    writer.append("margins_started", {"numbers": numbers, "before": "stopped", **began})
+    ended = {"failure": "", "distance": None, "end_pose": None, "wall_seconds": 0.1}
+    for one in numbers:
+        for run in range(6):
+            ran = {"name": one["name"], "value": 2.5, "run": run, "seed": run, "outcome": "pass"} | ended
+            writer.append("margin_ran", ran, {"": straight(6.0).tobytes()})
+    writer.append("margins_finished", {})
+    player.tick(20)
+    pairs = player.pairs()["pairs"]
+    assert [(pair["test"], pair["ghost"], round(pair["apart"], 3)) for pair in pairs] == [(2, -1, 0.3), (2, -7, 0.3)]
+    assert pairs[0]["title"] == "now and with left wall.y = 2.5 (test 2, seed 0)"
+    play = player.play(-1)
+    assert (play["title"], play["robot"][-1][:2]) == ("left wall.y = 2.5 · pass", [8, 6])
+    screen.take(*player.drawings("ghost-way", -7))
+    assert "/world/ghost-trail/model" not in screen.things
+    for message in player.drawings("ghost-way", -1):
+        screen.take(message)
+    assert {"/world/ghost-trail", "/world/ghost-trail/model"} <= screen.things.keys()
+    with pytest.raises(UserError, match="there is no run 13 with a changed number"):
+        player.play(-13)
 
 
 def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen, player, words):

@@ -144,9 +144,9 @@ def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
     assert json.loads(told("pairs")) == {"tests": 1, "pairs": []}
     drawn = told("way/1")
     assert int.from_bytes(drawn[:4], "big") == len(drawn) - 4
-    for path in ("play/2", "play/0", "play/999999999", "still/7", "ghost-way/7"):
+    for path in ("play/2", "play/0", "play/-1", "play/999999999", "still/7", "ghost-way/7"):
         assert refusal(url + path, 404).count(b"\n") == 0
-    for path in ("play/-1", "play/1/2", "play/x", "play/1000000000", "index.js", "main.js"):
+    for path in ("play/--1", "play/1-", "play/1/2", "play/x", "play/1000000000", "index.js", "main.js"):
         refusal(url + path, 403)
     for path in ("../__init__.py", "%2e%2e/%2e%2e/visualizer.py"):
         refusal(url + path, 403)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ddenv.evidence.claims import is_minimal
+from ddenv.runfile.store import ROBOT
 from ddenv.words.claims import verdict_on
-from tests.workbench.fake_run import FakeRun
+from tests.workbench.fake_run import FakeRun, path_samples
 
 
 def mid_round(run: FakeRun) -> FakeRun:
@@ -177,7 +178,18 @@ def margin_ran(run: FakeRun, name: str, value: float, number: int, letter: str) 
     """A run with another value ends as this letter says: f, the goal, or lost."""
     outcome, failure = {"s": ("similar", "stuck"), "p": ("pass", ""), "o": ("other", "lost")}[letter]
     ended = {"distance": None, "end_pose": None, "wall_seconds": 2.0}
-    run.write("margin_ran", name=name, value=value, run=number, seed=number, outcome=outcome, failure=failure, **ended)
+    motions = {ROBOT: path_samples().tobytes()}
+    run.write(
+        "margin_ran",
+        motions,
+        name=name,
+        value=value,
+        run=number,
+        seed=number,
+        outcome=outcome,
+        failure=failure,
+        **ended,
+    )
 
 
 def uncertified(run: FakeRun) -> FakeRun:

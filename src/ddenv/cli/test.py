@@ -14,7 +14,7 @@ import click
 
 from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
-from ddenv.text import count, percent, printable
+from ddenv.text import coordinates, count, percent, printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.progress import Claim
@@ -48,25 +48,17 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @options.trust_option
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
 def test_command(
-    subject: str,
-    keep: str | None,
-    margin: tuple[str, ...],
-    simulator: Path | None,
-    jobs: int,
-    trust: bool,
-    as_json: bool,
-    **given: Any,
+    subject: str, keep: str | None, simulator: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
     from ddenv.engine.single_test import plan, run_trials
     from ddenv.runs.export import with_margins
 
-    planned = {name: given.pop(name) for name in PLANNED}
+    planned, margins = {name: given.pop(name) for name in PLANNED}, given.pop("margin")
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     results = []
     with ExitStack() as robots:
-        what = _subject(subject, given, simulator, trust, robots)
-        what = with_margins(what, margin)
+        what = with_margins(_subject(subject, given, simulator, trust, robots), margins)
         for result in run_trials(what, plan(what, keep=names, **planned), jobs):
             results.append(result)
             if not as_json:
@@ -104,8 +96,7 @@ def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust:
 def line(result: Mapping[str, Any]) -> str:
     how = result["failure"]
     if result["end_pose"] is not None:
-        x, y, z = result["end_pose"][:3]
-        how = f"ended at ({x:.2f}, {y:.2f}, {z:.2f}) m after {result['simulated_seconds']:.1f} s"
+        how = f"ended at ({coordinates(result['end_pose'][:3])}) m after {result['simulated_seconds']:.1f} s"
         how += f"  {result['failure']}" if result["failure"] else ""
         how += "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     without = f"  without {result['without']}" if result["without"] else ""

@@ -22,7 +22,8 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
 from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import BROKEN, RunState, Test
-from ddenv.runfile.store import COLUMNS, ROBOT, Motions, RunFile
+from ddenv.runfile.store import ROBOT, Motions, RunFile
+from ddenv.runs.playback import table
 from ddenv.text import count
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
@@ -120,7 +121,7 @@ def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> O
 
 def rows_of(file: RunFile, test: int) -> np.ndarray:
     """The robot's trajectory in a test, shape (N, COLUMNS). Raises UserError if it is missing."""
-    return np.array(file.trajectory(test)).reshape(-1, COLUMNS)
+    return table(file.trajectory(test))
 
 
 def fix_failure(

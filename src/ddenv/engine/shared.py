@@ -11,17 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY, RunState, Test
-from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
+from ddenv.runfile.store import ROBOT, RunFile
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
+from ddenv.runs.playback import table
 from ddenv.world.scenario import Scenario
 
 OURS = ("straight", "costmap")
@@ -99,7 +98,7 @@ def result_of(place: Place) -> RunResult | None:
     test = place.test
     try:
         with RunFile(place.path) as other:
-            motions = {name: np.array(rows).reshape(-1, COLUMNS) for name, rows in other.motions(test.id).items()}
+            motions = {name: table(rows) for name, rows in other.motions(test.id).items()}
     except UserError:
         return None
     trajectory = motions.pop(ROBOT, None)

@@ -299,6 +299,8 @@ def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUM
             continue
         made = known.outcomes.get(value, ())
         more = rule.surely_needed(made)
-        # Each side has its part, so that no race of tests decides which one gets the last runs.
-        if sum(len(one.outcomes) for one in side.tried) + more <= most * length // sum(lengths):
-            yield from ((value, len(made) + run) for run in range(more))
+        # Each side has its part, so that no race of tests decides which one gets the last runs. Where they may run out before this
+        # value is decided, one run after the other says whether more are needed.
+        left = most * length // sum(lengths) - sum(len(one.outcomes) for one in side.tried)
+        if more <= left:
+            yield from ((value, len(made) + run) for run in range(more if MOST_RUNS - len(made) <= left else 1))

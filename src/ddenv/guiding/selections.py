@@ -11,7 +11,7 @@ from ddenv.evidence.claims import current, helping
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Asked, Situation, Words, label_of, named, new_search
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
-from ddenv.text import count, printable, shortened
+from ddenv.text import coordinates, count, printable, shortened
 
 NONE_HELPS = "no certificate shows a model that only helps"
 
@@ -287,4 +287,4 @@ def _question(state: RunState, test: Test, instead: bool) -> str:
 
 
 def _position(pose: tuple[float, ...] | None) -> str:
-    return "an unknown place" if pose is None else "({:.2f}, {:.2f}, {:.2f}) m".format(*pose[:3])
+    return "an unknown place" if pose is None else f"({coordinates(pose[:3])}) m"

@@ -28,7 +28,7 @@ from ddenv.runfile.events import (
 from ddenv.runfile.position import Position
 from ddenv.runfile.store import Recorded
 from ddenv.schemas import names, nearest, pairs
-from ddenv.world.access import read_bytes
+from ddenv.world.access import not_yaml, read_bytes
 
 LONGEST = 1_000_000  # bytes of a lesson's file
 ANSWERS = (2, 6)
@@ -55,12 +55,8 @@ def read_lesson(file: Path, places: Callable[[Path], Find]) -> Lesson:
         raise UserError(f"{file}: is larger than {LONGEST // 1000} kB")
     try:
         root = yaml.compose(content, Loader=yaml.SafeLoader)
-    except (yaml.YAMLError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = "" if mark is None else f":{mark.line + 1}"
-        raise UserError(f"{file}{line}: not valid YAML: {getattr(error, 'problem', None) or 'not text'}") from None
-    except RecursionError:
-        raise UserError(f"{file}: not valid YAML: nested too deeply") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise not_yaml(file, error) from None
     top = _Node(file, root, "").keys(_KEYS, "title", "aim", "run", "steps")
     run = _beside(top["run"])
     oracle = _beside(top["oracle"]) if "oracle" in top else None

@@ -43,7 +43,7 @@ def _same(before: RunState, candidate: Candidate) -> Candidate | None:
 
 def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
     round = state.round
-    tests = () if candidate is None else _tests(state, candidate)
+    tests = [] if candidate is None else state.tests_of(candidate.tests)
     finished = [test for test in tests if test.is_finished]
     return {
         "E": f"{count(len(state.environment), 'model')}: {_names(state.environment)}" if state.nodes else "",
@@ -53,10 +53,6 @@ def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
         "result": "" if not tests else _result(tests[-1]),
         "results": " ".join(SIGNS.get(test.outcome, "?") for test in finished),
     }
-
-
-def _tests(state: RunState, candidate: Candidate) -> Sequence[Test]:
-    return [state.tests[id - 1] for id in candidate.tests if 0 < id <= len(state.tests)]
 
 
 def _names(names: Sequence[str]) -> str:

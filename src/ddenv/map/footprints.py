@@ -8,26 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.map.colors import RGB
-from ddenv.world.extent import convex_hull, model_bounds
-from ddenv.world.model import (
-    Box,
-    Capsule,
-    Collision,
-    Cylinder,
-    Ellipsoid,
-    Mesh,
-    Model,
-    Plane,
-    Shape,
-    Sphere,
-    World,
-    is_ground,
-)
+from ddenv.world.extent import circle, convex_hull, model_bounds, vertices_of
+from ddenv.world.model import Collision, Model, Plane, World, is_ground
 from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
 ROUND = 12
-_CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 STATIC: RGB = (150, 156, 166)
 DYNAMIC: RGB = (205, 140, 70)
 # A model is a floor (or a roof) if its area is `FLOOR_FACTOR` times the median, and at least `FLOOR_AREA`.
@@ -85,44 +71,9 @@ def rings(model: Model, moved: Pose) -> tuple[np.ndarray, ...]:
 
 def _outline(collision: Collision, corners: int, moved: Pose) -> np.ndarray:
     pose = moved @ collision.pose
-    return convex_hull(_points(collision.shape, pose, corners) + pose.position[:2])
-
-
-def _points(shape: Shape, pose: Pose, corners: int) -> np.ndarray:
-    """Points (N, 2), relative to the shape's origin, whose convex hull is the shape from above."""
-    circle, flat = _circle(corners), pose.rotation()[:2]
-    points: np.ndarray
-    match shape:
-        case Sphere(radius):
-            points = radius * circle
-        case Box(size):
-            points = _CUBE * size @ flat.T
-        case Cylinder(radius, length):
-            rim = radius * circle @ flat[:, :2].T
-            end = flat[:, 2] * length / 2
-            points = np.vstack([rim + end, rim - end])
-        case Capsule(radius, length):
-            end = flat[:, 2] * length / 2
-            points = np.vstack([radius * circle + end, radius * circle - end])
-        case Ellipsoid(radii):
-            points = _ellipse(flat * radii, circle)
-        case Mesh():
-            points = shape.vertices @ flat.T
-        case _:
-            raise TypeError(type(shape).__name__)
-    return points
-
-
-def _circle(corners: int) -> np.ndarray:
-    angles = np.linspace(0, math.tau, corners, endpoint=False)
-    return np.column_stack([np.cos(angles), np.sin(angles)])
-
-
-def _ellipse(half_axes: np.ndarray, circle: np.ndarray) -> np.ndarray:
-    """The outline of an ellipsoid whose three half axes, from above, are the columns of `half_axes`."""
-    directions, lengths, _ = np.linalg.svd(half_axes, full_matrices=False)
-    outline: np.ndarray = lengths * circle @ directions.T
-    return outline
+    vertices, radius = vertices_of(collision.shape, corners)
+    points = vertices @ pose.rotation()[:2].T + pose.position[:2]
+    return convex_hull((points[:, None] + radius * circle(corners)).reshape(-1, 2) if radius else points)
 
 
 def _distance(polygon: np.ndarray, point: np.ndarray) -> float:

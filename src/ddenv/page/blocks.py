@@ -110,12 +110,6 @@ def moment(time: float) -> str:
         return ""
 
 
-def place(values: tuple[float, ...]) -> str:
-    """x, y and z in m."""
-    # Adding zero makes -0.0 the same as 0.0.
-    return ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in values[:3])
-
-
 def thousands(number: int) -> str:
     """12 345."""
     return f"{number:,}".replace(",", " ")

@@ -21,7 +21,7 @@ from ddenv.runs.export import export_world
 from ddenv.runs.folder import BUNDLED_RUN
 from ddenv.runs.programs import how_to_install
 from ddenv.runs.reasons import sentence
-from ddenv.text import count, printable
+from ddenv.text import coordinates, count, printable
 from ddenv.words.claims import meaning, rate, seeds_of, uncertified
 from ddenv.words.margins import rows, said
 from ddenv.world.access import ending_of, write_file
@@ -132,7 +132,7 @@ def _needed(record: Record) -> set[int]:
 def _issue(record: Record, needs: list[str]) -> bytes:
     state, found = record.state, current(record.state)
     assert found is not None
-    at = f" at ({', '.join(f'{value:z.2f}' for value in state.f_position[:2])}) m" if state.f_position else ""
+    at = f" at ({coordinates(state.f_position[:2])}) m" if state.f_position else ""
     models = [f"- `{_code(name)}`" for name in state.environment[:MOST_NAMES]]
     if (more := len(state.environment) - MOST_NAMES) > 0:
         models.append(f"- and {count(more, 'more model')}")

@@ -17,7 +17,6 @@ from ddenv.page.blocks import (
     duration,
     moment,
     percent,
-    place,
     say,
     thousands,
 )
@@ -31,7 +30,7 @@ from ddenv.report.what_is_left import margins, what_is_left, why
 from ddenv.runfile.events import deed
 from ddenv.runfile.fold import spent
 from ddenv.runfile.state import RunState
-from ddenv.text import as_sentence, count, plain
+from ddenv.text import as_sentence, coordinates, count, plain
 from ddenv.words.claims import ended, for_everyone
 from ddenv.world.access import write_file
 
@@ -100,7 +99,7 @@ def _failure(state: RunState) -> list[Paragraph]:
     description, position = plain(state.scenario.get("description", "")), state.f_position
     said = [say(description)] if description else []
     if position is not None:
-        said.append(say(f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m."))
+        said.append(say(f"The failure f: the robot {deed(state.failure)} at ({coordinates(position)}) m."))
     elif state.tests_done:
         seen = count(state.tests_done, "run")
         said.append(say(f"The whole world is run first to determine the failure: {seen} ended so far."))

@@ -15,8 +15,8 @@ from ddenv.map.footprints import Drawn, rings
 from ddenv.page.step_chart import opening
 from ddenv.report.run_data import Record
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.store import COLUMNS
 from ddenv.runs.changes import Limit
+from ddenv.runs.playback import table
 
 # Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.
 Ways = Mapping[str, "array[float] | None"]
@@ -146,7 +146,7 @@ def _way(samples: array[float] | None, frame: Frame) -> str:
     """The robot's path, or "" if unknown."""
     if not samples:
         return ""
-    points = np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
+    points = table(samples)[:, 1:3]
     step = max(1, -(-len(points) // MOST_POINTS))
     # The end matters most.
     chosen = np.vstack([points[::step], points[-1:]])

@@ -74,7 +74,7 @@ def read_run(path: Path) -> Record:
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = None if current(state) is None else _tried(lambda: reasons(file, state), troubles)
         passing = nearest(file, state)
-        numbers = changes(file, state, world)
+        numbers = _tried(lambda: changes(file, state, world), troubles) or ()
         partings = [reason.parting for reason in why or ()] + [change.parting for change in numbers]
         partings.append(passing.parting if passing else None)
         compared = [test for one in partings if one for test in (one.with_test, one.without_test)]

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 from ddenv.evidence.claims import current
 from ddenv.map.footprints import Drawn
-from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, place, say
+from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, say
 from ddenv.report.report_map import picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
 from ddenv.runs.reasons import Nearest, Parting, no_reasons, parting_sentence, sentence
-from ddenv.text import count, first_of, plain
+from ddenv.text import coordinates, count, first_of, plain
 from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said
 
@@ -55,7 +55,7 @@ def _models(record: Record) -> list[Block]:
     columns: dict[str, list[Cell]] = {
         "model": [(Name(name), " (pinned)") if name in state.pinned else Name(name) for name in names],
         "kind": ["" if each is None else "static" if each.model.static else "dynamic" for each in drawn],
-        "centre x, y, z, m": ["" if each is None else place(each.center) for each in drawn],
+        "centre x, y, z, m": ["" if each is None else coordinates(each.center) for each in drawn],
         "size x × y × z, m": ["" if each is None else _size(each) for each in drawn],
     }
     # In the last similar run, s; old files do not say it.

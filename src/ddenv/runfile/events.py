@@ -12,7 +12,7 @@ from typing import Annotated, Any, dataclass_transform
 
 from ddenv.environment import NOTHING
 from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Positive, Real, Seconds, Share
-from ddenv.text import snake_case
+from ddenv.text import coordinates, snake_case
 
 Pair = tuple[Natural, Natural]
 Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
@@ -39,9 +39,7 @@ def deed(failure: str) -> str:
 def named(kinds: Sequence[str], position: Sequence[float]) -> str:
     """A failure in words, such as "stuck at (5.42, -0.56)"."""
     how = " or ".join(kind if kind in DEEDS else "failed" for kind in kinds) or "failed"
-    # Adding zero makes -0.0 the same as 0.0.
-    x, y = (round(value, 2) + 0.0 for value in position[:2])
-    return f"{how} at ({x:.2f}, {y:.2f})"
+    return f"{how} at ({coordinates(position[:2])})"
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))

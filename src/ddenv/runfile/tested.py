@@ -13,6 +13,8 @@ from ddenv.text import first_of
 
 def purpose(state: RunState, test: Test) -> str:
     """What `test` was made for, in words, as far as `state` knows: all of it in the state in which the test started."""
+    if test.id < 0:
+        return test.phase
     row = made_for(state, test)
     if row is not None:
         return f"{f'round {test.round} · ' if isinstance(row, Candidate) else ''}{row.label}"

@@ -74,14 +74,15 @@ def beside(state: RunState) -> Test | None:
 
 
 def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
-    """The run with a changed number that has this negative `number` in the file, also as a test. Raises UserError."""
+    """The run with this negative `number`, also as a test, whose phase says what was changed. Raises UserError."""
     margins = state.margins
     place = -1 if margins is None else -number - 1 - margins.earlier
     if margins is None or not 0 <= place < len(margins.runs):
         raise UserError(f"there is no run {-number} with a changed number")
     one = margins.runs[place]
     ended = one.outcome, one.failure, one.distance, one.end_pose
-    return one, Test(number, margins.asked.environment, "margin", None, None, one.run, one.seed, *ended)
+    changed = f"{one.name} = {one.value:.4g}"
+    return one, Test(number, margins.asked.environment, changed, None, None, one.run, one.seed, *ended)
 
 
 def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:

@@ -41,7 +41,7 @@ class Played:
     @property
     def robot(self) -> np.ndarray:
         """The robot's rows, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
-        return _table(self.rows)
+        return table(self.rows)
 
     @property
     def length(self) -> float:
@@ -57,8 +57,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     """The finished test with this number. Raises UserError if there is none; what the file lacks of it is said in `lacks`."""
     tests = position.end.tests
     if number < 0:
-        one, test = changed_run(position.end, number)
-        words = f"{one.name} = {one.value:.4g}"
+        _, test = changed_run(position.end, number)
     elif 0 < number <= len(tests):
         test = tests[number - 1]
     else:
@@ -67,32 +66,27 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         why = "is still running" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
     lacks = [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
-    if number > 0:
-        words = _purpose(position, test)
+    try:
+        start = position.start_of(number)
+        words = purpose(position.end if start is None else start.after, test)
+    except UserError:
+        words = f"test {number}"
     rows, moving = array("d"), {}
     for name, samples in _stored(file, number, lacks).items():
-        table = _table(samples)
-        if not _makes_sense(table):
+        stored = table(samples)
+        if not _makes_sense(stored):
             lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
         elif name == ROBOT:
             rows = samples
         else:
-            moving[name] = table
-    if number < 0 and rows:
-        test = replace(test, simulated_seconds=rows[-COLUMNS])
-    if not rows:
+            moving[name] = stored
+    if rows:
+        test = replace(test, simulated_seconds=test.simulated_seconds or rows[-COLUMNS])
+    else:
         lacks.append(
             f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
     return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
-
-
-def _purpose(position: Position, test: Test) -> str:
-    try:
-        start = position.start_of(test.id)
-        return purpose(position.end if start is None else start.after, test)
-    except UserError:
-        return f"test {test.id}"
 
 
 def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:
@@ -115,5 +109,6 @@ def _makes_sense(rows: np.ndarray) -> bool:
     return bool(in_time and (np.abs(rows) <= FARTHEST).all())
 
 
-def _table(samples: array[float]) -> np.ndarray:
+def table(samples: array[float]) -> np.ndarray:
+    """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
     return np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS) if samples else np.zeros((0, COLUMNS))

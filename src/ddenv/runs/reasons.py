@@ -17,7 +17,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
-from ddenv.text import count, first_of, percent
+from ddenv.text import coordinates, count, first_of, percent
 from ddenv.words.claims import of_passing, uncertified, verdict_on
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
@@ -193,11 +193,7 @@ def _does(end: End) -> str:
     # Rounded up: no run ends farther away than is said.
     near = "near" if end.reach <= NEAR else f"at most {math.ceil(10 * end.reach) / 10:.1f} m from"
     away = "elsewhere" if math.isnan(end.away) else f"{end.away:.1f} m from f's end"
-    return f"{DOES.get(end.kind, 'fails')} {away}, {near} {_point(end.place)}"
-
-
-def _point(place: tuple[float, float]) -> str:
-    return f"({place[0]:z.2f}, {place[1]:z.2f}) m"
+    return f"{DOES.get(end.kind, 'fails')} {away}, {near} ({coordinates(end.place)}) m"
 
 
 def parting_sentence(reason: Reason) -> str:
@@ -223,7 +219,7 @@ def _where_they_diverge(one: Parting) -> str:
         equal = f" equal until {one.equal:.1f} s, and" if one.equal else ""
         return f"With seed {one.seed} the two runs are{equal} never {APART:g} m apart."
     start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
-    apart = f"{APART:g} m apart after {one.apart:.1f} s, at {_point(one.place)}"
+    apart = f"{APART:g} m apart after {one.apart:.1f} s, at ({coordinates(one.place)}) m"
     return f"With seed {one.seed} the two runs differ {start}, and are {apart}."
 
 

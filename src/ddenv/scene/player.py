@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from array import array
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,7 @@ from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runfile.tested import Wanted, made_for
 from ddenv.runs.changes import changed_run, changes
-from ddenv.runs.playback import played
+from ddenv.runs.playback import played, table
 from ddenv.runs.reasons import Parting, nearest, reasons
 from ddenv.runs.subject import read_parts
 from ddenv.scene import colors
@@ -34,11 +32,6 @@ from ddenv.world.sdf.numbers import changed
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5
-
-
-def rows_of(samples: array[float]) -> np.ndarray:
-    """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
-    return np.asarray(samples, dtype=float).reshape(-1, COLUMNS)
 
 
 class Player:
@@ -127,8 +120,9 @@ class Player:
             found += [(f"with and without {each.without}", each.parting) for each in reasons(self._run, self._state)]
         if (near := nearest(self._run, self._state)) is not None:
             found.append(("with and the nearest world that passes", near.parting))
-        others = changes(self._run, self._state, None)
-        found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
+        with suppress(UserError):
+            others = changes(self._run, self._state, None)
+            found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
         pairs = [
             {
                 "title": f"{words} ({_numbers(one)}, seed {one.seed})",
@@ -149,7 +143,7 @@ class Player:
         """
         if what == "still":
             return self._scenery.still(self._shot_of(test))
-        rows = rows_of(self._run.trajectory(test))
+        rows = table(self._run.trajectory(test))
         # The path of the evidence is drawn anyway.
         hidden = what == "way" and test == self._evidence
         way = self._scenery.way(rows[:0] if hidden else rows, what == "ghost-way")
@@ -168,9 +162,7 @@ class Player:
     def _shot_of(self, test: int) -> Shot:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
         if test < 0:
-            run, one = changed_run(self._state, test)
-            found = shot_of_test(self._state, "replay", one)
-            return replace(found, title=f"{run.name} = {run.value:.4g} · {one.outcome}")
+            return shot_of_test(self._state, "replay", changed_run(self._state, test)[1])
         start, state = self._position.start_of(test), self._state
         if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")
@@ -243,7 +235,7 @@ class Player:
     def _show_evidence(self) -> None:
         self._evidence = self._state.evidence_test
         samples = None if self._evidence is None else self._run.motion(self._evidence)
-        self._scenery.evidence(None if samples is None else rows_of(samples))
+        self._scenery.evidence(None if samples is None else table(samples))
         if self._state.f_position is not None:
             place, size = self._state.f_position, self._scenery.scale
             mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
@@ -30,7 +30,7 @@ class Shot:
 
 def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf) -> Shot:
     """What to show, `idle` s after a test was last running. Stays with the `previous` test while it runs."""
-    running = [test for test in _tests(state, [row.test for row in live]) if test.outcome == "running"]
+    running = [test for test in state.tests_of(row.test for row in live) if test.outcome == "running"]
     before = previous if previous is not None and previous.kind == "live" else None
     if running:
         same = (test for test in running if before is not None and test.id == before.test)
@@ -45,7 +45,7 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
 
 def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Shot:
     """What to show of a candidate or a try: the test that runs, or the last one that showed f, or the last one that ended."""
-    tests = _tests(state, row.tests)
+    tests = state.tests_of(row.tests)
     # At an earlier moment of the run, what ran then has ended by now.
     running = [test for test in tests if test.outcome == "running"]
     similar = [test for test in tests if test.outcome == "similar"]
@@ -56,17 +56,13 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
     return shot_of_test(state, kind, test, row)
 
 
-def _tests(state: RunState, numbers: Iterable[int]) -> list[Test]:
-    return [state.tests[number - 1] for number in numbers if 0 < number <= len(state.tests)]
-
-
 def _to_replay(state: RunState) -> Test | None:
     shown = [state.evidence_test] if state.evidence_test is not None else []
     if state.waiting_candidate is not None and state.round is not None:
-        tests = _tests(state, state.round.candidates[state.waiting_candidate].tests)
+        tests = state.tests_of(state.round.candidates[state.waiting_candidate].tests)
         shown += [test.id for test in tests if test.outcome == "similar"]
     finished = (test for test in reversed(state.tests) if test.is_finished)
-    return next(reversed(_tests(state, shown)), None) or next(finished, None)
+    return next(reversed(state.tests_of(shown)), None) or next(finished, None)
 
 
 def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:
@@ -75,7 +71,7 @@ def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial 
     if test.id == state.evidence_test and kind == "replay" and row is None:
         name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
         models = frozenset(state.environment)
-    words = [name, f"test {test.id}"]
+    words = [name, f"test {test.id}"] if test.id > 0 else [name]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")
     words.append("runs now" if kind == "live" else test.outcome)

@@ -98,6 +98,14 @@ def size_of(path: Path) -> int:
     return status.st_size
 
 
+def not_yaml(where: object, error: Exception) -> UserError:
+    """What a YAML parser says of the file `where`, with the line."""
+    mark = getattr(error, "problem_mark", None)
+    line = "" if mark is None else f":{mark.line + 1}"
+    problem = "nested too deeply" if isinstance(error, RecursionError) else getattr(error, "problem", None)
+    return UserError(f"{where}{line}: not valid YAML: {problem or 'not text'}")
+
+
 def is_folder(path: Path) -> bool:
     """Whether `path` is an accessible folder."""
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
@@ -57,6 +58,40 @@ def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
         case _:
             raise TypeError(type(shape).__name__)
     return half
+
+
+# Sides of the prism that stands for a cylinder, and meridians of the ball that stands for an ellipsoid.
+SIDES = 16
+_CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
+
+
+def vertices_of(shape: Shape, sides: int = SIDES) -> tuple[np.ndarray, float]:
+    """The vertices (N, 3) m of a shape other than a plane in its own frame, and how much it is larger than their hull, m."""
+    ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
+    match shape:
+        case Box(size):
+            return _CUBE * size, 0.0
+        case Cylinder(radius, length):
+            rim = np.column_stack([circle(sides), np.zeros(sides)])
+            return np.vstack([rim + end for end in ends]) * (radius, radius, length), 0.0
+        case Sphere(radius):
+            return np.zeros((1, 3)), radius
+        case Capsule(radius, length):
+            return ends * length, radius
+        case Ellipsoid(radii):
+            tilts = np.linspace(0.0, math.pi, sides // 2 + 1)[:, None]
+            x, y = circle(sides).T
+            ball = [np.sin(tilts) * x, np.sin(tilts) * y, np.cos(tilts) + 0.0 * x]
+            return np.stack(ball, axis=-1).reshape(-1, 3) * radii, 0.0
+        case Mesh(_, vertices):
+            return vertices, 0.0
+    raise TypeError(type(shape).__name__)
+
+
+def circle(sides: int) -> np.ndarray:
+    """Corners (N, 2) on the unit circle."""
+    angles = np.arange(sides) * math.tau / sides
+    return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def filled_bounds(collision: Collision) -> Bounds:

@@ -16,7 +16,7 @@ from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
-from ddenv.world.access import is_folder, read_bytes, resolved
+from ddenv.world.access import is_folder, not_yaml, read_bytes, resolved
 from ddenv.world.scenario import Oracle, Scenario
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -91,13 +91,8 @@ def read_yaml(path: Path) -> Any:
     content = read_bytes(path)
     try:
         return yaml.safe_load(content)
-    except (yaml.YAMLError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = "" if mark is None else f":{mark.line + 1}"
-        problem = getattr(error, "problem", None) or "not text"
-        raise UserError(f"{path}{line}: not valid YAML: {problem}") from None
-    except RecursionError:
-        raise UserError(f"{path}: not valid YAML: nested too deeply") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise not_yaml(path, error) from None
 
 
 def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) -> Scenario:

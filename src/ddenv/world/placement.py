@@ -11,20 +11,8 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.text import count
-from ddenv.world.extent import Bounds, bounds, filled_bounds, shape_bounds, stacked
-from ddenv.world.model import (
-    Box,
-    Capsule,
-    Collision,
-    Cylinder,
-    Ellipsoid,
-    Mesh,
-    Model,
-    Plane,
-    Shape,
-    Sphere,
-    World,
-)
+from ddenv.world.extent import Bounds, bounds, filled_bounds, shape_bounds, stacked, vertices_of
+from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Spawn
 
@@ -213,10 +201,6 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
     return max(0.0, min(heights, default=0.0))
 
 
-# Sides of the prism that stands for a cylinder, and meridians of the ball that stands for an ellipsoid.
-SIDES = 16
-
-
 @dataclass(frozen=True)
 class Hull:
     """A convex body: the hull of `vertices` (N, 3) m, grown by `radius` m."""
@@ -233,7 +217,7 @@ class Hull:
 def hull(collision: Collision, place: Pose | None = None) -> Hull:
     """The convex body of a collision shape other than a plane, moved by `place`."""
     pose = collision.pose if place is None else place @ collision.pose
-    vertices, radius = _own(collision.shape)
+    vertices, radius = vertices_of(collision.shape)
     return Hull(vertices @ pose.rotation().T + pose.position, radius)
 
 
@@ -268,26 +252,3 @@ def distance(a: Hull, b: Hull) -> float:
 
 def _differences(a: Hull, b: Hull) -> np.ndarray:
     return np.asarray((a.vertices[:, None] - b.vertices).reshape(-1, 3))
-
-
-def _own(shape: Shape) -> tuple[np.ndarray, float]:
-    """The vertices (N, 3) m of a shape in its own frame, and how much it is larger than their hull, m."""
-    angles = np.arange(SIDES) * math.tau / SIDES
-    ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
-    match shape:
-        case Box(size):
-            return np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size, 0.0
-        case Cylinder(radius, length):
-            rim = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(SIDES)])
-            return np.vstack([rim + end for end in ends]) * (radius, radius, length), 0.0
-        case Sphere(radius):
-            return np.zeros((1, 3)), radius
-        case Capsule(radius, length):
-            return ends * length, radius
-        case Ellipsoid(radii):
-            tilts = np.linspace(0.0, math.pi, SIDES // 2 + 1)[:, None]
-            ball = [np.sin(tilts) * np.cos(angles), np.sin(tilts) * np.sin(angles), np.cos(tilts) + 0.0 * angles]
-            return np.stack(ball, axis=-1).reshape(-1, 3) * radii, 0.0
-        case Mesh(_, vertices):
-            return vertices, 0.0
-    raise TypeError(type(shape).__name__)

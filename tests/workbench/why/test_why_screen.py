@@ -244,6 +244,32 @@ async def test_margins_are_one_key_away(run, size):
         assert isinstance(session.app.screen, WhyScreen)
 
 
+async def test_a_number_is_shown_at_its_limits_and_played_beside_what_is_left(run):
+    fake_moments.with_margins(run)
+    async with Attached(run) as session:
+        screen = await opened(session)
+        assert "; other numbers" in str(screen.query_one("#why-models").border_title)
+        options = screen.query_one(OptionList)
+        rows = [str(options.get_option_at_index(number).prompt).split() for number in range(options.option_count)]
+        assert rows[-2:] == [["crate_00.friction", "goal", "at", "0.4"], ["crate_01.y", "no", "f", "at", "0.31"]]
+        await session.press("up", "up")
+        said = words(screen, "#why-said")
+        assert "the robot reaches its goal from 0.4" in said
+        assert f"ddenv test --repeat 10 --minimal {run.path.stem} --margin crate_00.friction=0.4" in said
+        assert f"ddenv export --output changed.sdf {run.path.stem} --margin crate_00.friction=0.4" in said
+        assert [way.name for way in screen.map.shown.ways] == ["now", "at 0.4"]
+        # A friction moves nothing; a place is outlined where f still shows, where it does not, and where the model cannot be.
+        assert screen.map.shown.limits == ()
+        await session.press("down")
+        middles = {verdict: ring[:-1, 1].mean() for verdict, ring in screen.map.shown.limits}
+        assert middles == pytest.approx({"other": 0.31, "f": 0.69, "impossible": 1.25})
+        assert "limits" in words(screen, "#why-legend")
+        await session.press("up", "enter")
+        assert "changed: crate_00.friction = 0.4" in words(session.app.screen, "#playback-header")
+        await session.press("end")
+        assert "reaches its goal" in session.said() or "pass" in picture_of(session)
+
+
 async def test_where_no_margins_are_known_the_command_is_named(run):
     fake_moments.finished(run)
     async with Attached(run) as session:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # The layers of the map, which can be hidden.
 LAYERS = ("partitions", "removed", "pinned", "sensed", "participants", "path", "original", "failure", "names")
 Point = tuple[float, float]
+# Outlines, (N, 2) m, of a model where it may move, each with its verdict, such as "f".
+Limits = tuple[tuple[str, "np.ndarray"], ...]
 # How long to retry a run file that another program has locked, s.
 PATIENCE = 10.0
 
@@ -63,8 +65,7 @@ class Shown:
 
     `layers` are from LAYERS; `selection` are the names of the models that the user selected. With `ways`, one or two, these are
     shown in place of the run's own paths; they part at `parting`, m. `apart` are the sign and the words of the
-    models that are not in both, for the legend. `limits` are outlines, (N, 2) m, of a model where it may move, each with its
-    verdict, such as "f".
+    models that are not in both, for the legend. `limits` say how far a model may move.
     """
 
     place: Place = field(default_factory=Place)
@@ -75,7 +76,7 @@ class Shown:
     ways: tuple[Way, ...] = ()
     parting: Point | None = None
     apart: tuple[str, str] | None = None
-    limits: tuple[tuple[str, np.ndarray], ...] = ()
+    limits: Limits = ()
 
     @property
     def start(self) -> Point | None:

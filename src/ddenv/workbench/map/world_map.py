@@ -21,14 +21,12 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_words import describe, legend
-from ddenv.workbench.map.place import Place, Point, Shown, Way
+from ddenv.workbench.map.place import Limits, Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
 from ddenv.workbench.shared.bindings import keys
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
-    import numpy as np
-
     from ddenv.map.cells import Cell
     from ddenv.map.footprints import Footprint
     from ddenv.map.paint import Canvas
@@ -161,8 +159,7 @@ class WorldMap(Widget, can_focus=True):
         same = len(known) == len(ways) and all(way.points is old for way, old in zip(ways, known, strict=True))
         self.draw() if same or not self.viewport.fitted else self._refit()
 
-    def show_limits(self, limits: tuple[tuple[str, np.ndarray], ...]) -> None:
-        """Outlines of a model at the limits up to which it may move (see `Shown`)."""
+    def show_limits(self, limits: Limits) -> None:
         self.shown = replace(self.shown, limits=limits)
         self.draw()
 

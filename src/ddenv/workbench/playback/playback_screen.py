@@ -7,7 +7,7 @@ import time
 from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -27,7 +27,7 @@ from ddenv.words.signs import outcome
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.pick import Pick
-from ddenv.workbench.map.place import MovedPrints, Place, Point, read_world
+from ddenv.workbench.map.place import Limits, MovedPrints, Place, Point, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
@@ -35,9 +35,6 @@ from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
 from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.world.pose import pose_at
-
-if TYPE_CHECKING:
-    import numpy as np
 
 # Simulated seconds in a second.
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -95,8 +92,7 @@ FIRST = ids("playback", "help close play beside frame_back frame_on parting slow
 
 class Playback(Screen[None]):
     """Plays test number `test` of a run, over test `beside` if that is given; `place` is the run's world, if it is read already.
-
-    Runs with a changed number have negative numbers; `limits` are outlines of what it moves (see `Shown`).
+    Runs with a changed number have negative numbers, and `limits`.
     """
 
     CSS_PATH = "playback.tcss"
@@ -126,13 +122,7 @@ class Playback(Screen[None]):
     )
 
     def __init__(
-        self,
-        file: RunFile,
-        position: Position,
-        place: Place,
-        test: int,
-        beside: int | None = None,
-        limits: tuple[tuple[str, np.ndarray], ...] = (),
+        self, file: RunFile, position: Position, place: Place, test: int, beside: int | None = None, limits: Limits = ()
     ) -> None:
         """Raises UserError if a test is not finished."""
         super().__init__()

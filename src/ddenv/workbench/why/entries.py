@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from shlex import quote
 
 from rich.text import Text
 
@@ -22,10 +22,8 @@ from ddenv.text import as_sentence, padded, percent, plain, shortened
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
 from ddenv.words.signs import CLAIM
+from ddenv.workbench.map.place import Limits
 from ddenv.workbench.playback.moving import snapshot_with
-
-if TYPE_CHECKING:
-    import numpy as np
 
 # The maximum number of models in the list.
 LISTED = 200
@@ -51,7 +49,7 @@ class Entry:
     ways: tuple[str, str]
     snapshot: Snapshot
     claim: Claim | None = None
-    limits: tuple[tuple[str, np.ndarray], ...] = ()
+    limits: Limits = ()
     figures: str = ""
 
     @property
@@ -79,13 +77,12 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
 
     snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
     for one in changes(file, state, read_parts(file)[1]):
-        value, given = f"{one.value:.4g}", " ".join([run, *(f"--margin {name}={to:.9g}" for name, to in one.changes)])
-        again = (
-            f"Again: ddenv test --minimal {given} --repeat 10\nAs a world: ddenv export {given} --output changed.sdf"
-        )
+        value, run_it = f"{one.value:.4g}", f"Again: ddenv test --repeat 10 --minimal {run}"
+        given = "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
+        more = f"{run_it}{given}", f"As a world: ddenv export --output changed.sdf {run}{given}"
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
         figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
-        yield Entry(one.name, "", (), one.sentence, (again,), one.parting, ways, snapshot, None, limits, figures)
+        yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
 
 
 def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:

@@ -22,7 +22,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
-from ddenv.text import plain
+from ddenv.text import plain, shortened
 from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
@@ -190,7 +190,7 @@ class WhyScreen(Screen[None]):
             self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
             return
         beyond = f" · {more} more are not listed" if more else ""
-        numbers = ", and with other numbers" if found[-1].figures else ""
+        numbers = "; other numbers" if found[-1].figures else ""
         self.query_one("#why-models").border_title = Text(f"Without each model{numbers}{beyond}")
         self._list()
 
@@ -283,7 +283,7 @@ class MarginsDialog(Reading):
         for one in found:
             name, now, until, goal, runs = map(plain, one.cells)
             lines += [
-                (name, bar(one.margin, 41)),
+                (shortened(name, 24), bar(one.margin, 41)),
                 ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
             ]
         groups = [("How far each number can change before f disappears", lines)]

@@ -20,7 +20,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.text import printable
-from ddenv.world.access import Missing, Unusable
+from ddenv.world.access import Missing, Unusable, not_yaml
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import FARTHEST
@@ -263,11 +263,7 @@ def _nodes(source: Source) -> Iterator[tuple[Node, Span, bool]]:
     try:
         root = _Loader(source.text).get_single_node()
     except (yaml.YAMLError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = "" if mark is None else f":{mark.line + 1}"
-        raise UserError(
-            f"{source.path}{line}: not valid YAML: {getattr(error, 'problem', None) or 'not text'}"
-        ) from None
+        raise not_yaml(source.path, error) from None
     if root is None:
         raise UserError(f"{source.path}: the file is empty; expected directives")
     listed: Any = source.keys(root, "file", ("*directives",))["directives"]
