@@ -316,6 +316,10 @@ async def other_failures(pilot: Pilot[int]) -> None:
 async def guide(pilot: Pilot[int]) -> None:
     """A platform is pinned, and the platforms are tried alone: they are enough."""
     await pause(pilot, True)
+    if state(pilot).status == "waiting":
+        # A pin would ask what becomes of the reduction that waits.
+        await press(pilot, "a")
+        await until(pilot, lambda: state(pilot).status == "paused")
     await press(pilot, "p", *"near", "tab", "enter")
     await until(pilot, lambda: bool(state(pilot).pinned))
     await press(pilot, "o", *"asphalt", "tab", "down", "tab")

@@ -39,7 +39,7 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch,
     assert said[0].split() == ["number", "now", "f", "until", "goal", "from", "runs"]
     assert said[1].split() == ["crate_00.friction", "0.1", "0", "(all)", "…", "0.2", "goal", "≥", "0.4", "17"]
     assert f"{FRICTION}." in said
-    assert "no f at 0.31 (0 of 7 runs), was lost in 7 instead" in done.stdout
+    assert "no f at 0.31 (0 of 7 runs), where the robot was lost in 7" in done.stdout
     assert "1.25 is not possible: crate_01 would be 0.20 m inside crate_00" in done.stdout
     assert FIX in done.stdout
     assert "at most 5 %" in said[-1]

@@ -179,3 +179,12 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
     finally:
         server.terminate()
         await server.wait()
+
+
+async def test_a_picture_of_the_screen_needs_no_folder_for_downloads(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("platformdirs.user_downloads_path", lambda: tmp_path / "none")
+    monkeypatch.chdir(tmp_path)
+    app = Workbench(run.created().path)
+    async with app.run_test() as pilot:
+        await pilot.press("f12")
+        await eventually(lambda: any(file.stat().st_size for file in tmp_path.glob("*.svg")))

@@ -81,7 +81,7 @@ def _said(side: Side) -> str:
     if side.gone is not None and side.gone.verdict == "impossible":
         words.append(f"{side.gone.value:.4g} is not possible: {side.gone.why}")
     elif side.gone is not None and side.gone.verdict == "other":
-        words.append(f"no f at {_in(side.gone, 'similar')}, {_instead(side.gone)} instead")
+        words.append(f"no f at {_in(side.gone, 'similar')}, where the robot {_instead(side.gone)}")
     if side.goal is not None:
         words.append(f"the robot reaches its goal {'from' if side.up else 'at'} {_in(side.goal, 'pass')}")
     if side.again is not None:
@@ -96,9 +96,11 @@ def _in(value: Value, outcome: str) -> str:
 
 
 def _instead(value: Value) -> str:
-    """What happened in runs that did not show f: "was lost in 5, goal in 1"."""
+    """What happened in runs that did not show f: "was lost in 5, reached its goal in 1"."""
     ends = zip(value.outcomes, value.failures, strict=True)
-    happened = Counter("goal" if end == "pass" else deed(how) for end, how in ends if end in ("pass", "other"))
+    happened = Counter(
+        "reached its goal" if end == "pass" else deed(how) for end, how in ends if end in ("pass", "other")
+    )
     return ", ".join(f"{what} in {runs}" for what, runs in happened.most_common())
 
 

@@ -222,6 +222,12 @@ class Workbench(App[int]):
 
         self.push_screen(Help(groups(self.screen)))
 
+    def action_screenshot(self, filename: str | None = None, path: str | None = None) -> None:
+        """Into the folder for downloads; servers have none, and there it is the current one."""
+        import platformdirs
+
+        super().action_screenshot(filename, path or (None if platformdirs.user_downloads_path().is_dir() else "."))
+
     def action_names(self) -> None:
         for world in self._maps:
             world.toggle_layer("names")

@@ -255,8 +255,8 @@ async def test_a_number_is_shown_at_its_limits_and_played_beside_what_is_left(ru
         await session.press("up", "up")
         said = words(screen, "#why-said")
         assert "the robot reaches its goal from 0.4" in said
-        assert f"ddenv test --repeat 10 --minimal {run.path.stem} --margin crate_00.friction=0.4" in said
-        assert f"ddenv export --output changed.sdf {run.path.stem} --margin crate_00.friction=0.4" in said
+        assert f"ddenv test {run.path.stem} --minimal --margin crate_00.friction=0.4 --repeat 10" in said
+        assert f"ddenv export {run.path.stem} --margin crate_00.friction=0.4 --output changed.sdf" in said
         assert [way.name for way in screen.map.shown.ways] == ["now", "at 0.4"]
         # A friction moves nothing; a place is outlined where f still shows, where it does not, and where the model cannot be.
         assert screen.map.shown.limits == ()

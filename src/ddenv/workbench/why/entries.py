@@ -77,9 +77,11 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
 
     snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
     for one in changes(file, state, read_parts(file)[1]):
-        value, run_it = f"{one.value:.4g}", f"Again: ddenv test --repeat 10 --minimal {run}"
-        given = "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
-        more = f"{run_it}{given}", f"As a world: ddenv export --output changed.sdf {run}{given}"
+        value, given = f"{one.value:.4g}", "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
+        more = (
+            f"Again: ddenv test {run} --minimal{given} --repeat 10",
+            f"As a world: ddenv export {run}{given} --output changed.sdf",
+        )
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
         figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
         yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
