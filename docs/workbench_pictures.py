@@ -32,6 +32,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.folder import free_run_path
 from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
@@ -545,7 +546,7 @@ def state(pilot: Pilot[int]) -> RunState:
 
 
 def new_run(name: str, **reduction: int) -> Path:
-    run = HOME / "runs" / f"{name}-1.ddenv"
+    run = free_run_path(name)
     scenario = load_scenario(find_scenario(name))
     create_run(scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)}), run)
     return run
