@@ -73,6 +73,10 @@ async def press_all(app, pilot, pressed, asked):
         if key in pressed or key not in offered(app):
             continue
         pressed.add(key)
+        if key == "0":
+            # A map that shows all already would not change.
+            await pilot.press("plus")
+            await settled(pilot)
         before = seen(app), asked()
         await pilot.press(key)
         await eventually(lambda: not app.is_running or (seen(app), asked()) != before, lambda: f"{key}: nothing")  # noqa: B023
