@@ -199,7 +199,7 @@ STATES = {
 def test_a_run_that_has_not_come_to_an_end_says_so(run, tmp_path, told):
     STATES[told](run)
     text = page(run, tmp_path).text
-    # Which tests idle workers made in vain is not known yet.
+    # It is not known yet which tests that idle workers started early were needed.
     assert told in text and "idle workers" not in text
 
 
