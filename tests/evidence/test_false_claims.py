@@ -26,7 +26,7 @@ pytestmark = pytest.mark.claims
 
 SIMULATED = int(os.environ.get("DDENV_CLAIMS", "150"))
 WHOLE, LEFT, REST = Environment.whole(6), Environment.whole(2), Environment.whole(1)
-TERMS = Terms(2 / 3, 0.8, error_of(1) / 2, 10)
+TERMS = Terms(2 / 3, 0.8, error_of(1), 10)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ NEEDED = {
 
 @pytest.mark.parametrize("world", NEEDED.values(), ids=NEEDED)
 def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world):
-    claims = [settle(falls(REST, LEFT, TERMS), world.shown(salt)) for salt in range(SIMULATED)]
+    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)) for salt in range(SIMULATED)]
     check(sum((claim.bound or 1.0) < world.rest / world.left for claim in claims), TERMS.error)
 
 
@@ -94,7 +94,7 @@ def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world):
 @pytest.mark.parametrize("rate", [0.4, 0.8, 1.0])
 def test_what_changes_nothing_rarely_helps(rate, together):
     world = World(rate, rate, rate, together)
-    claims = [settle(falls(REST, LEFT, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict for salt in range(SIMULATED)]
     check(claims.count("helps") + claims.count("needed"), 1.0 / REFUTED + TERMS.error)
 
 
