@@ -154,7 +154,7 @@ def test_where_f_always_shows_a_few_runs_are_enough():
 
 
 def test_the_whole_world_runs_only_where_what_is_left_missed_f_while_that_shows_f_often():
-    claim = settle(keeps(LEFT, WHOLE, Terms(0.9, 0.3, FIRST)), shown := outcomes((0.9, 0.85, 0.0), 3))
+    claim = settle(keeps(LEFT, WHOLE, Terms(2 / 3, 0.3, FIRST)), shown := outcomes((0.9, 0.8, 0.0), 5))
     left, whole = ({run for one, run in claim.rests_on if one == environment} for environment in (LEFT, WHOLE))
     assert sum(shown(LEFT, run) for run in left) > ALONE_SHARE * len(left) > 2 * ALONE_FIRST
     assert whole == {run for run in left if not shown(LEFT, run)}
