@@ -66,6 +66,13 @@ class Resources:
             self._meshes[key] = unpack(origin(uri, submesh, center, convex), packed)
         return self._meshes[key]
 
+    def rename(self, uri: str, base: Path, new: str, new_base: Path) -> None:
+        """Makes the mesh `new` in a file of `new_base` the one that is called `uri` in files of `base`."""
+        for key, content in list(self.taken.items()):
+            kind, asked, folder, *how = json.loads(key)
+            if (kind, asked, folder) == ("mesh", uri, str(base)):
+                self.taken[_key(kind, new, str(new_base), *how)] = content
+
     def _bytes(self, key: str, ask: Callable[[Sequence[Path]], bytes]) -> bytes:
         if key in self._failed:
             # A new exception each time: an exception raised again would collect a traceback of all its uses.
