@@ -29,16 +29,16 @@ Verdict = Literal[
 # The chance that any claim of a run is wrong, over all its certificates. It is not divided by the number of models: "each model is
 # needed" is wrong only if a certain one is not, and its own bet won by chance.
 ERROR = 0.05
-# A certificate's claims come in turn: that the rate is kept up to what it has to show, and then each model. A model's claim comes
-# only after the rate's, so one share of the error is enough for both. The rest is for claims out of turn: that more of the rate is
-# kept, or a model while the rate is not shown to be kept.
+# Claims come in turn: that the rate is kept, up to what has to be shown, and then those about models. If too little is kept, a claim
+# about a model is made only after that was already wrong, so this share of a certificate's error is enough for both. The rest is
+# for claims out of turn: that more of the rate is kept, or about a model while the rate is not shown to be kept.
 IN_TURN = 0.9
 # Without a needed model f shows in at most this share of the runs with it.
 NEEDED_SHARE = 0.8
 # At this wealth a bet against a claim ends the search for evidence.
 REFUTED = 20.0
-# While what is left shows f in such a share of its runs, looked at from so many of them on, the whole world runs only where it
-# missed f: more of these runs tell more than runs of the whole world do.
+# In the first runs, and while what is left shows f in such a share of them, the whole world runs only where what is left missed f:
+# one more seed tells more than a run of the whole world.
 ALONE_SHARE, ALONE_FIRST = 0.7, 10
 # The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
 # many times as fast as they did.
@@ -225,14 +225,14 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     if left == whole:
         return (yield from _of_whole(left, max(1, terms.at_least)))
     # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
-    assumed, sound, bound, run, shows = Pairs(), Pairs(), 0.0, 0, 0
+    assumed, sound, bound, run = Pairs(), Pairs(), 0.0, 0
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
     mine: Shown
     theirs: Shown
     while run < MOST_PAIRS or hits:
-        often = run < ALONE_FIRST or shows >= ALONE_SHARE * run
-        alone = often and run < MOST_PAIRS and not terms.at_once
+        shows_often = run < ALONE_FIRST or assumed.both + assumed.first >= ALONE_SHARE * run
+        alone = shows_often and run < MOST_PAIRS and not terms.at_once
         if hits and not alone:
             mine = True
             (theirs,) = yield Wanted(((whole, hits.pop(0)),), (whole,), bound)
@@ -245,10 +245,10 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
                 assumed, sound = assumed.after(True, True), sound.after(True, False)
             else:
                 (theirs,) = yield Wanted(((whole, run),), (left,), bound)
-            run, shows = run + 1, shows + (mine is True)
+            run += 1
         else:
             mine, theirs = yield Wanted(((left, run), (whole, run)), (left, whole), bound)
-            run, shows = run + 1, shows + (mine is True)
+            run += 1
         if theirs is not None:
             assumed = assumed.after(mine is True, theirs is not False)
             sound = sound.after(mine is not False, theirs is True)
