@@ -29,9 +29,9 @@ Verdict = Literal[
 # The chance that any claim of a run is wrong, over all its certificates. It is not divided by the number of models: "each model is
 # needed" is wrong only if a certain one is not, and its own bet won by chance.
 ERROR = 0.05
-# Claims come in turn: that the rate is kept, up to what has to be shown, and then those about models. If too little is kept, a claim
-# about a model is made only after that was already wrong, so this share of a certificate's error is enough for both. The rest is
-# for claims out of turn: that more of the rate is kept, or about a model while the rate is not shown to be kept.
+# Claims come in turn: that the rate is kept, up to what has to be shown, and then those about models. If too little is kept, a
+# claim about a model comes only after that was already wrong, so this share of a certificate's error is enough for both. The rest
+# is for claims out of turn: that more of the rate is kept, or about a model while the rate is not shown to be kept.
 IN_TURN = 0.9
 # Without a needed model f shows in at most this share of the runs with it.
 NEEDED_SHARE = 0.8
