@@ -18,8 +18,9 @@ from statistics import fmean
 import numpy as np
 
 import ddenv
+from ddenv.evidence.certificate import NEEDED_SHARE
 
-KEEP_RATE, ITERATIONS, BASELINE_RUNS = 0.8, 3, 10
+KEEP_RATE, CERTIFY_RATE, ITERATIONS, BASELINE_RUNS = 0.8, 2 / 3, 3, 10
 # Rates that are products must not fall below a limit by rounding.
 ROUNDING = 1e-9
 
@@ -128,6 +129,7 @@ def reduction(task: Task) -> list[float]:
         iterations=ITERATIONS,
         accept_rate=task.rule,
         keep_rate=KEEP_RATE,
+        certify_rate=CERTIFY_RATE,
         baseline_runs=BASELINE_RUNS,
         check=False,
         seed=task.seed,
@@ -150,8 +152,10 @@ def reduction(task: Task) -> list[float]:
         found.baseline_tests,
         found.search_tests,
         found.certificate_tests,
-        100.0 * (true_rate(None) < least - ROUNDING) if "kept" in said else float("nan"),
-        100.0 * any(true_rate(claim.without) >= least - ROUNDING for claim in needed) if needed else float("nan"),
+        100.0 * (true_rate(None) < CERTIFY_RATE * oracle.rate(whole) - ROUNDING) if "kept" in said else float("nan"),
+        100.0 * any(true_rate(claim.without) > NEEDED_SHARE * oracle.rate(left) + ROUNDING for claim in needed)
+        if needed
+        else float("nan"),
         100.0 * fmean(claim.low <= true_rate(claim.without) <= claim.high for claim in claims)
         if claims
         else float("nan"),

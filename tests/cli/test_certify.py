@@ -23,16 +23,16 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
     assert (found["rate_whole_world"]["shown"], found["rate_whole_world"]["runs"]) == (3, 4)
     left, first, second = found["certificate"]["claims"]
     assert (left["without"], left["verdict"], left["outcomes"]) == (None, "kept", {"similar": 23})
-    assert left["means"] == "keeps at least 77 % of the whole world's rate"
+    assert left["means"] == "keeps at least 81 % of the whole world's rate"
     assert (first["without"], first["rate"], second["shown"], second["runs"]) == ("crate_00", 0.0, 1, 12)
-    assert (left["keeps_at_least"], second["without_at_most"]) == pytest.approx((0.77, 0.74), abs=0.01)
+    assert (left["keeps_at_least"], second["without_at_most"]) == pytest.approx((0.81, 0.61), abs=0.01)
     assert found["certificate"]["whole_world"]["outcomes"] == {"similar": 22, "pass": 1}
     assert "minimal environment: 2 of 11 models" in lines
     assert (
-        "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 77 % of the whole world's rate" in lines
+        "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the whole world's rate" in lines
     )
     assert (
-        "without crate_01: f in 1 of 12 fresh runs (<1 % to 48 %): needed: without it f shows at most 74 % as often"
+        "without crate_01: f in 1 of 12 fresh runs (<1 % to 48 %): needed: without it f shows at most 61 % as often"
         in lines
     )
 

@@ -71,6 +71,21 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
     )
 
 
+def test_another_failure_of_the_same_kind_as_f_is_told_apart():
+    found = {"runs": 1, "failures": 1, "rate": 1.0, "low": 0.2, "high": 1.0, "failure_test": 1, "miss_chance": 0.0}
+    more = {"position": [1, 2, 0.5], "iterations_95": 0, "outcomes": {}, "distances": {}, "broken": 0}
+    more["seen"] = [{"test": 1, "runs": 1, "kinds": ["stuck"], "position": [1, 2, 0.5]}]
+    ways = {2: ("similar", "stuck"), 3: ("other", "stuck"), 4: ("other", "fell")}
+    happened = [event for test, way in ways.items() for event in (started(test), ended(test, *way))]
+    judged = ("candidate_judged", {"candidate": 1, "verdict": "dissimilar", "tests": [2, 3, 4], "known": 0})
+    first = (base(1), ended(1, "similar", "stuck"), ("baseline_finished", found | more))
+    for similarity, other in (("end-pose", "elsewhere"), ("trajectory", "differently")):
+        scenario = {"failure": {"similarity": similarity}}
+        *_, before, after = states(*first, *happened, judged, scenario=scenario)
+        words = f"  without A (3 models): dissimilar after 3 tests (1 stuck, 1 stuck {other}, 1 fell)"
+        assert news("candidate_judged", before, after) == words
+
+
 def base(test: int) -> tuple[str, dict]:
     return "test_started", {"test": test, "phase": "baseline", "round": None, "candidate": None, "run": 0, "seed": 0}
 

@@ -11,6 +11,7 @@ from ddenv.evidence.claims import in_the_making, never_left_out
 from ddenv.runfile.events import DEEDS, Implied, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
 from ddenv.runfile.progress import Removal, Returned
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import purpose
 from ddenv.text import count, first_of, plain
@@ -139,9 +140,20 @@ def _judgement(state: RunState, one: Candidate | Trial | Removal) -> str:
     else:
         what = f"{one.label} ({count(one.size, 'model')})"
     tests, implied = [test for test in state.tests_of(one.tests) if test.is_finished], implied_words(state, one.tests)
-    endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests)
+    endings = Counter(_ending(state, test) for test in tests)
     ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
     return f"{what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{f', {implied}' if implied else ''}"
+
+
+def _ending(state: RunState, test: Test) -> str:
+    """How a test ended: "stuck"; "stuck elsewhere" if f is to get stuck, but this is another failure."""
+    if test.failure not in DEEDS:
+        return test.outcome
+    seen = () if state.baseline is None else state.baseline.seen
+    f = {kind for one in seen if one.test in state.failures for kind in one.kinds}
+    if test.outcome != "other" or test.failure not in f:
+        return test.failure
+    return f"{test.failure} {'elsewhere' if settings(state).similarity == 'end-pose' else 'differently'}"
 
 
 def _waiting(_: RunState, after: RunState) -> str:
