@@ -71,7 +71,8 @@ class RunScreen(Screen[None]):
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
-        self.table, self.world, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
+        self.table, self.world = Candidates(self._row_chosen, id="candidates"), WorldMap(id="map")
+        self._legend = MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
@@ -261,7 +262,6 @@ class RunScreen(Screen[None]):
 
     # Panes and the map.
 
-    @on(Candidates.Chosen)
     def _row_chosen(self) -> None:
         self._show_map()
         self._show_keys()
