@@ -113,7 +113,8 @@ class RunScreen(Screen[None]):
 
     def on_mount(self) -> None:
         self.query_one(Panes).mark(self._pane)
-        self.following.begin()
+        # Reading the run takes longer than the first picture, which would wait for it.
+        self.call_after_refresh(self.following.begin)
         read_world(self, self.run, self._placed)
 
     def on_unmount(self) -> None:
