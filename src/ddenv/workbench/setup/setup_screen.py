@@ -33,11 +33,11 @@ from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, r
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.messages import ShowRun
-from ddenv.workbench.shared.processes import Engine
 from ddenv.workbench.widgets.panes import Panes
 from ddenv.workbench.widgets.question import once_trusted
 
 if TYPE_CHECKING:
+    from ddenv.workbench.shared.processes import Engine
     from ddenv.world.scenario import Scenario
 
 SMALLEST = (64, 18)
