@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual import events, on
 from textual.app import ComposeResult
@@ -31,7 +32,6 @@ from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
-from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
@@ -41,6 +41,9 @@ from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
+
+if TYPE_CHECKING:
+    from ddenv.workbench.run.opening import Opening
 
 SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
@@ -76,8 +79,15 @@ class RunScreen(Screen[None]):
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
-        self.opening, self.keys = Opening(self), KeyOffers(self)
+        self.keys = KeyOffers(self)
         self._pane = "map"
+
+    @cached_property
+    def opening(self) -> Opening:
+        # The dialogs are loaded with the first one: the screen comes before.
+        from ddenv.workbench.run.opening import Opening
+
+        return Opening(self)
 
     @property
     def snapshot(self) -> Snapshot:
