@@ -167,9 +167,10 @@ class RunScreen(Screen[None]):
         self.query_one(Header).show(snapshot)
         self._show_map()
         self._show_models()
-        # Its rows are wider than those of candidates.
-        self.set_class(snapshot.state.certificate is not None, "-certificate")
         panel = self.query_one("#round")
+        for each in (panel, self.query_one("#now")):
+            # Its rows are wider than those of candidates. As a class of the screen it would compute all styles again.
+            each.set_class(snapshot.state.certificate is not None, "-certificate")
         panel.border_title, panel.border_subtitle = round_title(snapshot.state)
         log, entries = self.query_one("#log", Lines), self._log.until(self.browsing.position.at)
         if len(entries) != len(log.items):
