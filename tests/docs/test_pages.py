@@ -5,6 +5,7 @@ import shlex
 
 import click
 import pytest
+from click import Context
 
 from ddenv.cli.command_line import app
 from ddenv.schemas import OURS, names
@@ -81,9 +82,8 @@ def test_the_reference_has_the_defaults(key: str, section: type[Section]):
 
 @pytest.mark.parametrize("command", ["run", "test", "study"])
 def test_the_reference_names_every_option(command):
-    options = {
-        option for parameter in app.commands[command].params for option in parameter.opts if option.startswith("--")
-    }
+    parameters = app.get_command(Context(app), command).params
+    options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
     assert {option for option in options if f"`{option}" not in REFERENCE} == set()
 
 
