@@ -106,8 +106,9 @@ COMMANDS = sorted({line for page in PAGES for line in COMMAND.findall(page.read_
 @pytest.mark.parametrize("line", COMMANDS)
 def test_the_commands_of_the_pages_exist_with_their_options(line):
     command, words = app, shlex.split(re.split(r" {2,}", line.strip())[0], comments=True)
-    while isinstance(command, click.Group) and words and words[0] in command.commands:
-        command = command.commands[words.pop(0)]
+    while isinstance(command, click.Group) and words and (named := command.get_command(Context(command), words[0])):
+        command = named
+        words.pop(0)
     assert command is not app, line
     options = {option for each in command.params for option in each.opts + each.secondary_opts}
     assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} - options == set()
