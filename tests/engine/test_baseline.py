@@ -199,8 +199,8 @@ def test_a_search_judges_by_the_rate_of_the_runs_that_chose_nothing(tmp_path):
     said = baseline(state)
     assert f" in {sum(shown)} of 10 runs" in said
     assert (
-        "The first 10 runs served only to choose f, and showed other failures: 2. stuck at (2.00, 0.00) in 3 runs"
-        in said
+        "The first 10 runs served only to choose f: stuck at (9.00, 0.00) in 7 of them; "
+        "other failures: 2. stuck at (2.00, 0.00) in 3 runs" in said
     )
 
 

@@ -39,10 +39,17 @@ def failed_in(state: RunState, found: BaselineFinished) -> str:
 
 
 def other_failures(found: BaselineFinished) -> str:
-    """The failures besides f of the runs that chose f, with their numbers; "" if there is none."""
+    """The failures besides f of the runs that chose f, with their numbers, and f itself if these runs only chose it; "" if
+    there is none.
+    """
     listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
-    chose = f"the first {count(found.chose, 'run')} served only to choose f, and showed " if found.chose else ""
-    return f"{chose}other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
+    if not listed:
+        return ""
+    others = f"other failures: {first_of(listed, MOST_FAILURES)}"
+    f = next((one for one in found.seen if one.test == found.failure_test), None)
+    if not found.chose or f is None:
+        return others
+    return f"the first {count(found.chose, 'run')} served only to choose f: {f.name} in {f.runs} of them; {others}"
 
 
 def missed(state: RunState) -> str:
