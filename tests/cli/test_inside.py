@@ -1,6 +1,7 @@
 """`ddenv run --inside`, on a world and on what a run has left, and its key in the workbench."""
 
 import json
+import shutil
 
 import pytest
 
@@ -32,11 +33,17 @@ def written(path, shapes, more=""):
 
 @pytest.mark.slow
 def test_what_a_run_has_left_is_reduced_inside_to_the_part_that_stops_the_robot(tmp_path):
-    """A post in the robot's way, in one model with others, beside a crate."""
+    """A post in the robot's way, in one model with others, which another file holds, beside a crate."""
     others = "".join(box(f"far_{number}", 1 + number, 3) for number in range(4))
     crate = f"<model name='crate'><static>true</static><link name='l'>{box('c', 2, -3)}</link></model>"
-    world = written(tmp_path / "yard.sdf", box("post", 2, 0) + others, crate)
+    yard = f"<model name='m'><static>true</static><link name='l'>{box('post', 0, 0) + others}</link></model>"
+    (tmp_path / "yard").mkdir()
+    (tmp_path / "yard" / "model.sdf").write_text(f"<sdf version='1.6'>{yard}</sdf>")
+    included = "<include><name>yard</name><pose>2 0 0 0 0 0</pose><uri>yard/model.sdf</uri></include>"
+    world = tmp_path / "world.sdf"
+    world.write_text(f"<sdf version='1.9'><world name='w'>{GROUND}{crate}{included}</world></sdf>")
     assert ddenv("run", world, *PLACES, "--output", tmp_path / "whole.ddenv").returncode == 0
+    shutil.rmtree(tmp_path / "yard")
     minimal = tmp_path / "minimal.sdf"
     done = ddenv("run", tmp_path / "whole.ddenv", "--inside", "--output", tmp_path / "inside.ddenv", "--json")
     assert json.loads(done.stdout)["kept"] == ["yard/post"]

@@ -102,6 +102,8 @@ def create_inside(run: Path, path: Path) -> World:
     documents["world"] = without(whole, removed)
     reading = scenario.reading.model_copy(update={"inside": True})
     world = parse_world(documents["world"], scenario.world, reading, stored)
+    documents["world"] = world.text
+    documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
     update = {
         "reading": reading,
         "whole": whole_of(whole, scenario),

@@ -1,12 +1,15 @@
 """Inside models: their collisions as models that can be removed, and the text without some of them."""
 
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF
 from ddenv.world.scenario import Reading
-from ddenv.world.sdf.read import parse_world, read_world
+from ddenv.world.sdf import copied
+from ddenv.world.sdf.read import disk_of, parse_world, read_world
 from ddenv.world.write import without
 
 BOX = "<geometry><box><size>1 1 1</size></box></geometry>"
@@ -92,17 +95,86 @@ def test_a_model_whose_parts_would_have_one_name_stays_whole_and_is_noted(read, 
     assert any("have one name" in note.why for note in world.notes)
 
 
-def test_what_moves_and_what_other_files_hold_stays_whole_and_is_noted(read, tmp_path):
-    (tmp_path / "hut.sdf").write_text(f"<sdf version='1.9'>{house(ROOMS).replace('house', 'hut')}</sdf>")
+def test_what_moves_and_what_others_are_placed_relative_to_stays_whole_and_is_noted(read):
     cart = f"<model name='cart'><link name='l'>{shape('collision', 'a')}{shape('collision', 'b')}</link></model>"
     base = house(ROOMS).replace("house", "base")
     lamp = f"<model name='lamp'><pose relative_to='base'/><static>1</static><link name='l'>{shape('collision', 'd')}</link></model>"
-    world = read(f"{cart}<include><uri>hut.sdf</uri></include>{base}{lamp}{house(ROOMS)}", inside=True)
-    assert world.elements()[:3] == ("cart", "hut", "lamp")
+    world = read(f"{cart}{base}{lamp}{house(ROOMS)}", inside=True)
+    assert world.elements()[:2] == ("cart", "lamp")
     whole = {note.model: note.why for note in world.notes if note.what == "--inside"}
     assert "it can move" in whole["cart"]
-    assert "ddenv world convert" in whole["hut"]
     assert "relative to it" in whole["base"]
+
+
+@pytest.fixture
+def models(tmp_path):
+    """A folder of models: a hut with a mesh, which includes a porch, and a shed that is a URDF file."""
+    for name in ("hut", "porch", "shed"):
+        (tmp_path / "models" / name / "meshes").mkdir(parents=True)
+    trimesh.creation.box((1, 1, 1)).export(tmp_path / "models" / "hut" / "meshes" / "a&b.obj")
+    mesh = "<collision name='m'><geometry><mesh><uri>meshes/a&amp;b.obj</uri></mesh></geometry></collision>"
+    porch = "<include><uri>model://porch</uri><pose relative_to='door'>0 0 1 0 0 0</pose></include>"
+    door = "<frame name='door'><pose>3 0 0 0 0 0</pose></frame>"
+    hut = f"<sdf version='1.7'>\n<model name='hut' canonical_link='walls'><pose>7 7 7 0 0 0</pose>{door}{ROOMS}"
+    hut += f"<link name='chimney'>{mesh}</link>{porch}</model>\n</sdf>"
+    (tmp_path / "models" / "hut" / "model.sdf").write_text(hut)
+    post = "<link name='post'>" + shape("collision", "p") + shape("collision", "q") + "</link>"
+    (tmp_path / "models" / "porch" / "model.sdf").write_text(
+        f"<sdf version='1.9'><model name='porch'><static>1</static>{post}</model></sdf>"
+    )
+    urdf_box = "<collision><geometry><box size='1 1 1'/></geometry></collision>"
+    link = f"<link name='l'>{2 * urdf_box}</link>"
+    (tmp_path / "models" / "shed" / "shed.urdf").write_text(f"<robot name='shed'>{link}</robot>")
+    return (tmp_path / "models",)
+
+
+def include(uri, more=""):
+    return f"<include><uri>{uri}</uri><static>1</static>{more}</include>"
+
+
+HUTS = (
+    include("model://hut", "<name>a&amp;b</name><pose>1 2 0 0 0 1</pose>")
+    + f"<model name='yard'><static>1</static>{include('models/hut/model.sdf')}</model>"
+)
+
+
+def test_included_models_are_copied_and_opened(read, models):
+    whole, world = read(HUTS, model_path=models), read(HUTS, model_path=models, inside=True)
+    assert not [note for note in world.notes if note.what == "--inside"]
+    named = {name: [part for part in world.models if part.inside == name] for name in ("a&b", "yard")}
+    assert [part.name for part in named["a&b"]] == [
+        *("a&b/walls/a", "a&b/walls/b", "a&b/chimney", "a&b/shed/roof", "a&b/porch/post/p", "a&b/porch/post/q"),
+    ]
+    for model in whole.models:
+        parts = [one for part in named[model.name] for one in part.collisions]
+        assert [(one.pose, one.mu) for one in parts] == [(one.pose, one.mu) for one in model.collisions]
+
+
+@pytest.mark.parametrize("removed", [(), ("a&b/chimney",), ("a&b/walls/a", "a&b/porch/post/p", "yard/hut/chimney")])
+def test_what_is_left_of_an_included_model_reads_alike_with_and_without_the_files(read, models, removed):
+    world = read(HUTS, model_path=models, inside=True)
+    text = without(world, frozenset(removed))
+    left = [one for model in world.models if model.name not in removed for one in model.collisions]
+    for resources in (Resources(world.resources), disk_of(world.path, Reading(model_path=models))):
+        again = parse_world(text, world.path, Reading(model_path=models), resources)
+        assert [one for model in again.models for one in model.collisions] == left
+
+
+def test_what_cannot_be_copied_stays_whole_and_is_noted(read, models):
+    world = read(include("model://shed/shed.urdf") + include("model://hut"), model_path=models, inside=True)
+    (note,) = [note for note in world.notes if note.what == "--inside"]
+    assert note.model == "shed"
+    assert "ddenv world convert" in note.why
+    assert "shed" in world.elements() and "hut/chimney" in world.elements()
+
+
+def test_a_large_file_is_not_copied_again_and_again(read, models, monkeypatch):
+    monkeypatch.setattr(copied, "MOST_COPIED", 2000)
+    world = read(
+        "".join(include("model://hut", f"<name>{name}</name>") for name in "abc"), model_path=models, inside=True
+    )
+    assert world.elements() == ("a", "b", "c")
+    assert len(world.text) < 1000
 
 
 @given(removed=st.sets(st.sampled_from(DITCH.elements())))

@@ -66,6 +66,12 @@ class Resources:
             self._meshes[key] = unpack(origin(uri, submesh, center, convex), packed)
         return self._meshes[key]
 
+    def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
+        """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
+        old = _key("mesh", uri, folder)[:-1]
+        taken = {key: content for key, content in self.taken.items() if key.startswith(f"{old},")}
+        self.taken |= {_key("mesh", new, new_folder)[:-1] + key[len(old) :]: taken[key] for key in taken}
+
     def _bytes(self, key: str, ask: Callable[[Sequence[Path]], bytes]) -> bytes:
         if key in self._failed:
             # A new exception each time: an exception raised again would collect a traceback of all its uses.

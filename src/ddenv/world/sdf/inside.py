@@ -51,7 +51,7 @@ def _closed(model: Model, element: Element, is_anchor: bool) -> str:
     if is_anchor:
         return "other models are placed relative to it"
     if element.tag == "include" or element.find(".//include") is not None:
-        return "parts of it are in other files; 'ddenv world convert' writes them into one"
+        return "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
     return ""
 
 

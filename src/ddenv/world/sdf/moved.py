@@ -12,15 +12,12 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Reading
 from ddenv.world.sdf.frames import pose_of
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.xml import Element, name_of, parse, tag_end
+from ddenv.world.sdf.xml import Edit, Element, edited, name_of, parse, tag_end
 
 # Two poses nearer than this are the same, m and sine of half the angle.
 SAME = 1e-5
 _FORMAT = re.compile(rb"""\s+(?:rotation_format|degrees)\s*=\s*(?:"[^"]*"|'[^']*')""")
 _SPACE = re.compile(rb"\s*")
-
-# (start, end, text): the bytes from start to end are replaced.
-Edit = tuple[int, int, bytes]
 
 
 def with_places(world: World, places: Mapping[str, Sequence[Pose]], reading: Reading) -> tuple[bytes, list[str]]:
@@ -113,12 +110,3 @@ def _inserted(text: bytes, holder: Element, place: Pose) -> Edit:
 def _numbers(pose: Pose) -> bytes:
     # Adding zero turns -0 into 0.
     return " ".join(f"{round(value, 9) + 0.0:.10g}" for value in (*pose.position, *pose.rpy())).encode()
-
-
-def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
-    """`text` with some bytes replaced."""
-    parts, at = [], 0
-    for start, end, new in sorted(edits):
-        parts += [text[at:start], new]
-        at = end
-    return b"".join([*parts, text[at:]])

@@ -22,9 +22,9 @@ from ddenv.world.model import Box, Cylinder, Model, Sphere, World, is_ground
 from ddenv.world.placement import INSIDE, overlap_of, stands_inside
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario, Sensors
-from ddenv.world.sdf.moved import Edit, edited, with_places
+from ddenv.world.sdf.moved import with_places
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.xml import Element, floats, parse, tag_end
+from ddenv.world.sdf.xml import Edit, Element, edited, floats, parse, tag_end
 from ddenv.world.whole import whole_of
 
 # Less than this part of a number does not matter, unless it is a place or an angle.

@@ -8,21 +8,23 @@ line and XPath. It never guesses.
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import is_directives, read_bytes
 from ddenv.world.files.resources import Resources, on_disk
-from ddenv.world.model import Model, World
+from ddenv.world.model import Box, Collision, Mesh, Model, World
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
+from ddenv.world.sdf.copied import has_includes, with_copies
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.inside import opened
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
-from ddenv.world.sdf.xml import complain, name_of, numbers
+from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # Elements that add or join models in a way that is not supported, with the error message.
@@ -109,7 +111,36 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         anchors=frozenset(model.name for model in models if model.name in anchors),
         resources=context.resources.taken,
     )
-    return opened(whole, root) if context.reading.inside else whole
+    return _opened(whole, root, scope, context) if context.reading.inside else whole
+
+
+def _opened(world: World, root: Element, scope: Scope, context: Context) -> World:
+    """`world` with the parts of its models as models; models from other files are first copied into its text."""
+    parts = {
+        model.name: part
+        for model, part in zip(world.models, scope.parts, strict=True)
+        if has_includes(part) and model.static and model.name not in world.anchors and len(model.collisions) > 1
+    }
+    reading = context.reading.model_copy(update={"inside": False})
+    while parts:
+        text = with_copies(world.text, world.path, scope, list(parts.values()), context.resources)
+        try:
+            again = parse_world(text, world.path, reading, context.resources)
+        except UserError:
+            break
+        # What was written is read again: only that shows that each model is what it was.
+        wrong = {name for name in parts if _solid(again.model(name)) != _solid(world.model(name))}
+        if not wrong:
+            return opened(replace(again, notes=world.notes), parse(text, world.path))
+        parts = {name: part for name, part in parts.items() if name not in wrong}
+    return opened(world, root)
+
+
+def _solid(model: Model) -> list[Collision]:
+    """What can be touched of a model. A mesh and its copy differ in their origin alone."""
+    return [
+        replace(one, shape=Box((0.0, 0.0, 0.0))) if isinstance(one.shape, Mesh) else one for one in model.collisions
+    ]
 
 
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:

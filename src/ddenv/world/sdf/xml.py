@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 from xml.etree import ElementTree
@@ -16,6 +16,8 @@ from ddenv.errors import UserError
 
 # Maximum nesting depth, far above that of real worlds: the reader recurses once for each level.
 DEEPEST = 100
+# (start, end, text): the bytes from start to end are replaced.
+Edit = tuple[int, int, bytes]
 _TAG_END = re.compile(rb"""(?:[^'">]|"[^"]*"|'[^']*')*>""")
 
 
@@ -98,6 +100,15 @@ def tag_end(text: bytes, element: Element) -> int:
     """Where the start tag of `element` ends in `text`, the content of its file."""
     found = _TAG_END.match(text, element.start)
     return element.end if found is None else found.end()
+
+
+def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
+    """`text` with some bytes replaced."""
+    parts, at = [], 0
+    for start, end, new in sorted(edits):
+        parts += [text[at:start], new]
+        at = end
+    return b"".join([*parts, text[at:]])
 
 
 def xpath(element: Element) -> str:
