@@ -23,7 +23,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.reading import LARGEST, Invalid, Pose, Real, plain, read
 
-# The classes of events are loaded with the first one that is read: a screen comes before.
+# The classes of events are loaded with the first event that is read: a screen is shown before.
 if TYPE_CHECKING:
     from ddenv.runfile.events import Created, Event
 

@@ -38,7 +38,7 @@ class Happening(Widget):
         if urgent == self._urgent and trouble == self.trouble and moment - self._shown_at < PERIOD:
             # Tests follow each other faster than anybody reads: the next update shows the one that runs then.
             return
-        # It needs all the words there are: the screen comes before.
+        # With this most of `words` is loaded: the screen is shown before.
         from ddenv.words.explain import explain
 
         self._snapshot, self._urgent, self._shown_at = snapshot, urgent, moment
