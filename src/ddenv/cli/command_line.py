@@ -20,7 +20,7 @@ from click.shell_completion import CompletionItem
 
 from ddenv import __version__
 from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
-from ddenv.cli.terminal import announce
+from ddenv.cli.terminal import CANNOT_SAY, announce
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 
@@ -109,10 +109,7 @@ def main() -> None:
         code = 130
     except Exception as error:
         code = _told(error, answers)
-        if answers:
-            from ddenv.cli.share import CANNOT_SAY
-
-            code = CANNOT_SAY
+        code = CANNOT_SAY if answers else code
     sys.exit(code)
 
 

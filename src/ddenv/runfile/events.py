@@ -11,11 +11,10 @@ from typing import Annotated, Any, dataclass_transform
 
 from ddenv.environment import NOTHING
 from ddenv.runfile.deeds import named
-from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Positive, Real, Seconds, Share
+from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Pose, Positive, Real, Seconds, Share
 from ddenv.text import snake_case
 
 Pair = tuple[Natural, Natural]
-Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
 Place = tuple[Real, Real, Real]
 Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "isolate")]
 Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]

@@ -450,6 +450,11 @@ class Test:
         return self.phase == "round" and self.run > 0 and self.is_finished
 
 
+def spent(state: RunState, until: float) -> float:
+    """The time that engines have worked until Unix time `until`, s."""
+    return state.working_seconds + (0.0 if state.started_at is None else max(0.0, until - state.started_at))
+
+
 def partition_letter(index: int) -> str:
     """A, B, ... Z, AA, AB, ... for partition 0, 1, ..."""
     letters = ""

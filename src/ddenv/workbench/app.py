@@ -170,12 +170,9 @@ class Workbench(App[int]):
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
         if not self.is_headless:
-            self.screen.call_after_refresh(self._collect_garbage)
-
-    def _collect_garbage(self) -> None:
-        """From now on, but not in what there is already: that takes longer than to answer a key."""
-        gc.freeze()
-        gc.enable()
+            # Looking for garbage in what there is already takes longer than to answer a key.
+            self.screen.call_after_refresh(gc.freeze)
+            self.screen.call_after_refresh(gc.enable)
 
     def notify(self, message: str, **options: Any) -> None:
         """As every app, but at most one notice is shown, and none over a dialog: it waits until that is closed."""

@@ -84,7 +84,7 @@ class RunScreen(Screen[None]):
 
     @cached_property
     def opening(self) -> Opening:
-        # The dialogs are loaded with the first one: the screen comes before.
+        # All dialogs are loaded with the first one: the screen is shown before.
         from ddenv.workbench.run.opening import Opening
 
         return Opening(self)
@@ -123,7 +123,7 @@ class RunScreen(Screen[None]):
 
     def on_mount(self) -> None:
         self.query_one(Panes).mark(self._pane)
-        # Reading the run takes longer than the first picture, which would wait for it.
+        # The first picture does not wait for what reads a run to be loaded.
         self.call_after_refresh(self.following.begin)
         read_world(self, self.run, self._placed)
 
