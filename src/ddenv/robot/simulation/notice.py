@@ -13,8 +13,8 @@ from pydrake.systems.framework import Context, OutputPort
 from ddenv.arrays import Booleans, Floats, Objects
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.world.extent import bounds, filled_bounds, stacked
-from ddenv.world.model import Plane, World, still_links
+from ddenv.world.extent import Bounds, bounds, stacked
+from ddenv.world.model import World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
@@ -42,7 +42,7 @@ class Notice:
         self._names = np.array([*around.names, *(body.name for body in kept)], dtype=object)
         there = np.array([name in present for name in around.names], dtype=bool)
         solid = [any(body.bounds) for body in kept]
-        self._unseen: Booleans = np.array([*(there & around.visible), *solid], dtype=bool)
+        self._unseen: Booleans = np.array([*there, *solid], dtype=bool)
 
     def feel(self, now: float) -> None:
         """Notes what the robot touches at the time `now` (s).
@@ -138,10 +138,6 @@ def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
 
 
-# A model, the lowest and the highest corner (3,) m of a box around parts of it that never move, and whether these are visible.
-Still = tuple[str, Floats, Floats, bool]
-
-
 @dataclass(frozen=True)
 class Surroundings:
     """One robot in one world.
@@ -149,8 +145,8 @@ class Surroundings:
     `contacts` is the plant's port of contacts. `robot` are the ids of the robot's geometry; `owners` maps the ids of all other
     geometry to the names of its models.
 
-    `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts. A
-    ground model has a second, endless box around all that is below its plane, which is not `visible` (N,).
+    `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts,
+    without planes.
     """
 
     contacts: OutputPort
@@ -159,31 +155,27 @@ class Surroundings:
     names: Objects
     low: Floats
     high: Floats
-    visible: Booleans
 
     @classmethod
-    def of(cls, boxes: Sequence[Still], built: Built) -> Surroundings:
+    def of(cls, boxes: Mapping[str, Bounds], built: Built) -> Surroundings:
         """`boxes` are those of `still_boxes`."""
         geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
         geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
-        low, high = stacked((low, high) for _, low, high, _ in boxes)
+        low, high = stacked(boxes.values())
         return cls(
             contacts=built.plant.get_contact_results_output_port(),
             robot=frozenset(one.get_value() for one in built.robot.geometry),
             owners={one.get_value(): name for name, members in geometry for one in members},
-            names=np.array([name for name, *_ in boxes], dtype=object),
+            names=np.array([*boxes], dtype=object),
             low=low,
             high=high,
-            visible=np.array([visible for *_, visible in boxes], dtype=bool),
         )
 
 
-def still_boxes(world: World) -> list[Still]:
-    """The boxes around all parts of `world` that never move."""
-    found: list[Still] = []
-    for model in world.models:
-        collisions = [collision for link in still_links(model) for collision in link.collisions]
-        if (box := bounds(collisions)) is not None:
-            found.append((model.name, *box, True))
-        found += [(model.name, *filled_bounds(one), False) for one in collisions if isinstance(one.shape, Plane)]
-    return found
+def still_boxes(world: World) -> dict[str, Bounds]:
+    """The boxes around the parts of models that never move, without planes, by model."""
+    boxes = {
+        model.name: bounds(collision for link in still_links(model) for collision in link.collisions)
+        for model in world.models
+    }
+    return {name: box for name, box in boxes.items() if box is not None}

@@ -122,7 +122,7 @@ class Template:
         self._names = names
         near = tuple(model for model in self._solid.models if model.name in names - self._far)
         built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
-        boxes = [box for box in self._boxes if box[0] in names]
+        boxes = {name: box for name, box in self._boxes.items() if name in names}
         self._surroundings = Surroundings.of(boxes, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         self._context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
