@@ -38,9 +38,12 @@ class Resources:
         self._failed: dict[str, Missing | Unusable] = {}
         # A collision and its visual mostly use the same file, one after the other.
         self._last: tuple[Path, list[Part]] | None = None
+        # All requests so far: the URI, and its base.
+        self.asked: dict[tuple[str, Path], None] = {}
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         """Path and content of an SDF file, given by its own URI or by its model's folder."""
+        self.asked[uri, base] = None
         key = _key("sdf", uri, str(base))
         if key not in self._files:
             path, end, text = self._bytes(key, lambda folders: _sdf(uri, base, folders)).partition(b"\0")
@@ -51,6 +54,7 @@ class Resources:
 
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
         """A mesh file in m, or its part called `submesh`; `center` moves the middle of its bounding box to the origin."""
+        self.asked[uri, base] = None
         key = _key("mesh", uri, str(base), submesh, center, convex)
         if key not in self._meshes:
             packed = self._bytes(
