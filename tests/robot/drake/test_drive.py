@@ -186,7 +186,7 @@ def test_joints_that_are_not_named_turn_freely(husky, world_of, scenario_of):
         robot={"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}, "wheels": FRONT.model_dump()}
     )
     template = Template(world_of(), husky, scenario)
-    assert template._context.built.plant.num_actuators() == 2
+    assert template.context.built.plant.num_actuators() == 2
     assert template.run(frozenset(), seed=1).outcome == "pass"
 
 
