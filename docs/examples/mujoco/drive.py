@@ -102,7 +102,7 @@ class Simulation:
 
 
 def drive(parts: Parts, seed: int) -> Iterator[tuple[float, tuple[float, ...]]]:
-    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and ControllerFailed."""
+    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and BadCode."""
     scenario, world = parts.scenario, parts.world
     simulation, suite = Simulation(parts), SensorSuite(scenario.sensors, seed)
     setup = setup_of(parts.robot, parts.drive, parts.clock, scenario, seed)

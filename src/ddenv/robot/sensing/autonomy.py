@@ -252,7 +252,7 @@ class Autonomy:
             self._new["scan"] = scan
 
     def command(self, tick: Tick) -> Twist | WheelSpeeds:
-        """The controller's command, valid until the next one. Raises ControllerFailed."""
+        """The controller's command, valid until the next one. Raises BadCode."""
         new, self._new = self._new, {}
         reading = Reading(tick.time, self._filter.estimate, **new)
         command = self._controller.step(reading)
