@@ -66,12 +66,11 @@ class Resources:
             self._meshes[key] = unpack(origin(uri, submesh, center, convex), packed)
         return self._meshes[key]
 
-    def rename(self, uri: str, base: Path, new: str, new_base: Path) -> None:
-        """Makes the mesh `new` in a file of `new_base` the one that is called `uri` in files of `base`."""
-        for key, content in list(self.taken.items()):
-            kind, asked, folder, *how = json.loads(key)
-            if (kind, asked, folder) == ("mesh", uri, str(base)):
-                self.taken[_key(kind, new, str(new_base), *how)] = content
+    def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
+        """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
+        old = _key("mesh", uri, folder)[:-1]
+        taken = {key: content for key, content in self.taken.items() if key.startswith(f"{old},")}
+        self.taken |= {_key("mesh", new, new_folder)[:-1] + key[len(old) :]: taken[key] for key in taken}
 
     def _bytes(self, key: str, ask: Callable[[Sequence[Path]], bytes]) -> bytes:
         if key in self._failed:
