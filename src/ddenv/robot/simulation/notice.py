@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context, OutputPort
 
-from ddenv.arrays import Booleans, Floats, Objects
-from ddenv.robot.drake.plant import Body, Built
+from ddenv.arrays import Booleans, Floats
+from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import Bounds, bounds, stacked
 from ddenv.world.model import World, still_links
@@ -24,25 +23,33 @@ class Notice:
 
     def __init__(
         self,
-        around: Surroundings,
+        context: RunContext,
+        boxes: Mapping[str, Bounds],
         sensors: Sensors,
-        plant_context: Context,
         sleep: Sleep,
         kept: Sequence[Body],
         present: frozenset[str],
     ) -> None:
-        """`present` are the models that are kept; `kept` are the moving ones among them, in the order of `sleep`."""
+        """`boxes` are those of `still_boxes`. `present` are the models that are kept, `kept` the moving ones among them, in the
+        order of `sleep`.
+        """
         self.first_touched: dict[str, float] = {}
         self._first_seen: dict[str, float] = {}
-        self._around = around
         self._sensors = sensors
-        self._context = plant_context
+        self._context = context.plant_context
         self._sleep = sleep
+        built = context.built
+        self._contacts = built.plant.get_contact_results_output_port()
+        self._robot = frozenset(one.get_value() for one in built.robot.geometry)
+        # The owners of all other geometry.
+        geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
+        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
+        self._owners = {one.get_value(): name for name, members in geometry for one in members}
         # The owners of all boxes: those around what never moves, then one around each moving model.
-        self._names = np.array([*around.names, *(body.name for body in kept)], dtype=object)
-        there = np.array([name in present for name in around.names], dtype=bool)
-        solid = [any(body.bounds) for body in kept]
-        self._unseen: Booleans = np.array([*there, *solid], dtype=bool)
+        still = {name: box for name, box in boxes.items() if name in present}
+        self._names = np.array([*still, *(body.name for body in kept)], dtype=object)
+        self._low, self._high = stacked(still.values())
+        self._unseen: Booleans = np.array([True] * len(still) + [any(body.bounds) for body in kept], dtype=bool)
 
     def feel(self, now: float) -> None:
         """Notes what the robot touches at the time `now` (s).
@@ -76,13 +83,13 @@ class Notice:
     def _boxes(self) -> tuple[Floats, Floats]:
         """The lowest and the highest corners, (N, 3) m each, of all boxes now."""
         low, high = self._sleep.boxes()
-        return np.vstack([self._around.low, low]), np.vstack([self._around.high, high])
+        return np.vstack([self._low, low]), np.vstack([self._high, high])
 
     def _touched(self) -> Iterator[str]:
         """The models that the robot touches for the first time."""
-        robot, owners = self._around.robot, self._around.owners
+        robot, owners = self._robot, self._owners
         try:
-            results: Any = self._around.contacts.Eval(self._context)
+            results: Any = self._contacts.Eval(self._context)
         # If the contacts cannot be computed, the next step reports it.
         except (RuntimeError, ValueError, SystemExit):
             return
@@ -136,40 +143,6 @@ def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
 def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
     """The distances (...) of the points `eye` (..., 3) from the boxes between `low` and `high` (..., 3), m; 0 inside."""
     return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """One robot in one world.
-
-    `contacts` is the plant's port of contacts. `robot` are the ids of the robot's geometry; `owners` maps the ids of all other
-    geometry to the names of its models.
-
-    `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts,
-    without planes.
-    """
-
-    contacts: OutputPort
-    robot: frozenset[int]
-    owners: dict[int, str]
-    names: Objects
-    low: Floats
-    high: Floats
-
-    @classmethod
-    def of(cls, boxes: Mapping[str, Bounds], built: Built) -> Surroundings:
-        """`boxes` are those of `still_boxes`."""
-        geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
-        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
-        low, high = stacked(boxes.values())
-        return cls(
-            contacts=built.plant.get_contact_results_output_port(),
-            robot=frozenset(one.get_value() for one in built.robot.geometry),
-            owners={one.get_value(): name for name, members in geometry for one in members},
-            names=np.array([*boxes], dtype=object),
-            low=low,
-            high=high,
-        )
 
 
 def still_boxes(world: World) -> dict[str, Bounds]:

@@ -23,7 +23,7 @@ from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
 from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.settled import Settled
-from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
+from ddenv.robot.simulation.notice import Notice, still_boxes
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
 from ddenv.world.drive import Drive, find_drive
@@ -114,8 +114,6 @@ class Template:
         self.names = names
         near = tuple(model for model in self._solid.models if model.name in names - self._far)
         built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
-        boxes = {name: box for name, box in self._boxes.items() if name in names}
-        self._surroundings = Surroundings.of(boxes, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         self.context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
         self.rehearsals = Rehearsals(self.repertoire, self.context)
@@ -153,9 +151,7 @@ class Template:
                 scenario=self._scenario,
                 drive=self._drive,
                 sleep=sleep,
-                notice=Notice(
-                    self._surroundings, self._scenario.sensors, self.context.plant_context, sleep, kept, present
-                ),
+                notice=Notice(self.context, self._boxes, self._scenario.sensors, sleep, kept, present),
                 autonomy=self._autonomy(suite, seed, listener),
                 lidar=lidar,
                 reach=self._reach,
