@@ -25,7 +25,7 @@ from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.notice import Notice, still_boxes
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
-from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
+from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -68,7 +68,7 @@ class Template:
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
-        self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
+        self._solids, self._hull = solids(self._solid), Hull.of(robot)
         self._reach = self._hull.reach + YIELD
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
