@@ -183,11 +183,11 @@ class Template:
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
-        scenario, setup = self._scenario, replace(self._setup, seed=seed)
-        controller, skid = self._controllers(setup), scenario.controller.skid
+        setup = replace(self._setup, seed=seed)
+        controller = self._controllers(setup)
         if listener is not None:
             listener.begin(setup)
-        return Autonomy(scenario.sensors, suite, self._drive, skid, self._clock, setup.start, controller, listener)
+        return Autonomy(self._scenario, suite, self._drive, self._clock, controller, listener)
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
