@@ -26,7 +26,7 @@ pytestmark = pytest.mark.claims
 
 SIMULATED = int(os.environ.get("DDENV_CLAIMS", "150"))
 WHOLE, LEFT, REST = Environment.whole(6), Environment.whole(2), Environment.whole(1)
-TERMS = Terms(2 / 3, 0.8, error_of(1) / 2, 10)
+TERMS = Terms(2 / 3, 0.8, error_of(1), 10)
 
 
 @dataclass(frozen=True)
@@ -86,15 +86,36 @@ NEEDED = {
 
 @pytest.mark.parametrize("world", NEEDED.values(), ids=NEEDED)
 def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world):
-    claims = [settle(falls(REST, LEFT, TERMS), world.shown(salt)) for salt in range(SIMULATED)]
+    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)) for salt in range(SIMULATED)]
     check(sum((claim.bound or 1.0) < world.rest / world.left for claim in claims), TERMS.error)
+
+
+GOES_ON = replace(TERMS, certify_rate=0.8, first_rate=2 / 3)
+TOGETHER = {
+    "neither is true": (World(1.0, 0.665, 0.535), TERMS),
+    "neither is true, the same luck": (World(0.9, 0.599, 0.482, together=0.8), TERMS),
+    "only the rate is kept": (World(0.9, 0.9, 0.725, together=0.3), TERMS),
+    "the model is needed, the rate is not kept": (World(0.9, 0.599, 0.1, together=0.3), TERMS),
+    "more is asked for later": (World(1.0, 0.77, 0.62), GOES_ON),
+}
+
+
+@pytest.mark.parametrize(("world", "terms"), TOGETHER.values(), ids=TOGETHER)
+def test_what_is_said_of_the_rate_and_of_a_model_together_is_rarely_false(world, terms):
+    """One share of the error is enough for both, as the model has its turn only when the rate is shown to be kept."""
+    false = 0
+    for salt in range(SIMULATED):
+        kept = settle(keeps(LEFT, WHOLE, terms), world.shown(salt))
+        model = settle(falls(REST, LEFT, terms.error_of_models(kept.bound)), world.shown(salt))
+        false += (kept.bound or 0.0) > world.left / world.whole or (model.bound or 1.0) < world.rest / world.left
+    check(false, terms.error)
 
 
 @pytest.mark.parametrize("together", [0.0, 0.8])
 @pytest.mark.parametrize("rate", [0.4, 0.8, 1.0])
 def test_what_changes_nothing_rarely_helps(rate, together):
     world = World(rate, rate, rate, together)
-    claims = [settle(falls(REST, LEFT, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict for salt in range(SIMULATED)]
     check(claims.count("helps") + claims.count("needed"), 1.0 / REFUTED + TERMS.error)
 
 

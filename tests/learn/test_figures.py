@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import Pairs
+from ddenv.evidence.certificate import IN_TURN, Pairs
 from ddenv.learn.attempt import read_oracle
 from ddenv.learn.lesson_figures import OF_RUN, Figures
 from ddenv.learn.reading import Places
@@ -67,10 +67,10 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
         )
         mine = [run for node, run in ran if node == state.node and run >= first]
         # Where what is left showed f, the whole world is taken to show it, too.
-        pairs = Pairs()
+        pairs, shown = Pairs(), 0.0
         for run in mine:
             pairs = pairs.after(ran[state.node, run], ran.get((0, run), True))
-        shown = pairs.keeps_at_least(state.certificate.error / 2)
+            shown = pairs.keeps_at_least(state.certificate.error * IN_TURN, shown)
         figures = Figures(position.end, state)
         assert figures("here_left") == f"{sum(ran[state.node, run] for run in mine)} of {len(mine)} runs"
         assert figures("here_bound") == percent(shown) and before < shown < 2 / 3
@@ -79,14 +79,9 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
         figures("here_bound without gate")
     ended = Figures(position.end, position.state(places.event("claims 3")))
     assert (ended("here_aim"), ended("here_bound")) == ("80 %", "80 %")
-    # f never showed without the gate: the pairs are those in which it showed with it.
-    last = position.end
-    without = {test.run for test in last.confirm_tests if test.without == "gate"}
-    kept = (
-        test for test in last.confirm_tests if (test.node, test.without) == (last.node, None) and test.run in without
-    )
-    pairs = Pairs(second=sum(test.outcome == "similar" for test in kept))
-    assert ended("here_bound without gate") == percent(pairs.at_most(last.certificate.error / 2)) == "77 %"
+    # What the certificate said at its end.
+    gate = next(claim for claim in position.end.certificate.claims if claim.without == "gate")
+    assert (gate.shown, ended("here_bound without gate")) == (0, percent(gate.bound))
 
 
 def test_how_often_f_showed_in_the_whole_world_is_told_if_it_ran_with_all_seeds(events, position):

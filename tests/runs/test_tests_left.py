@@ -108,10 +108,10 @@ def runs_of(rate, of_end, certify_rate, left, at_least, random):
         (name,) = subject
         return shown.setdefault((name, number), random.random() < rates.get(name, 0.0))
 
-    terms = Terms(certify_rate, max(certify_rate, 0.8), error_of(1) / 2, at_least)
+    terms = Terms(certify_rate, max(certify_rate, 0.8), error_of(1), at_least)
     kept = settle(keeps(frozenset([end]), frozenset([whole]), terms), show).verdict == "kept"
     for model in range(left if kept else 0):
-        settle(falls(frozenset([str(model)]), frozenset([end]), terms), show)
+        settle(falls(frozenset([str(model)]), frozenset([end]), terms.error_of_models(1.0)), show)
     return shown
 
 

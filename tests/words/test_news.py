@@ -95,7 +95,7 @@ def test_a_certificate_is_told_with_what_follows_from_it():
     lost = {"claims": [claim(None, "lost", 3, 9)], "tests": []}
     _, before, after = states(started(1), ("certificate_started", STARTED))
     assert news("certificate_started", before, after).startswith("certificate 1: fresh runs of what is left (4 models)")
-    assert "certificate: 0 of about 90 to 350 runs · 4 of 4 models" in headline(after)
+    assert "certificate: 0 of about 60 to 200 runs · 4 of 4 models" in headline(after)
     both = (("certificate_started", STARTED), ("certificate_finished", lost))
     _, before, after = states(*both)
     assert news("certificate_finished", before, after) == (

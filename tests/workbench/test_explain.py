@@ -184,10 +184,10 @@ def test_a_certificate_comes_before_the_end(run):
 def test_minimal_is_said_with_what_it_means(run):
     words = told(fake_moments.finished(run), "absent")[1]
     assert (
-        "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 77 %"
+        "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 81 %"
         in words
     )
-    assert "Minimal means: what is left keeps at least 77 % of the whole world's rate" in words
+    assert "Minimal means: what is left keeps at least 81 % of the whole world's rate" in words
 
 
 def test_without_fresh_runs_nothing_is_called_minimal(run):
@@ -322,7 +322,7 @@ def test_what_was_pinned_is_not_called_needed(run):
     run.write("finished", minimal=True, reason="no other single model can be removed")
     assert "any one model that is not pinned (" in told(run, "absent")[1]
     assert (
-        "never left out) removed, f shows at most 70 % as often; the chance that this is wrong"
+        "never left out) removed, f shows at most 54 % as often; the chance that this is wrong"
         in told(run, "absent")[1]
     )
     assert "p unpins." in told(run, "absent")[1]

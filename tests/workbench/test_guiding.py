@@ -159,7 +159,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
 async def test_what_breaks_off_a_certificate_asks_before(run):
     fake_moments.certifying(run).hold()
     async with Attached(run, (80, 24)) as session:
-        assert "17 of about 40 to 450 runs" in str(session.screen.query_one("#round").border_subtitle)
+        assert "17 of about 30 to 400 runs" in str(session.screen.query_one("#round").border_subtitle)
         await session.press("p", "enter")
         assert isinstance(session.app.screen, Question)
         assert "aborts certificate 1 after 17 runs" in session.dialog()

@@ -17,8 +17,8 @@ from ddenv.engine.limits import limit_after, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import RUNS_BESIDE, Terms, error_of
-from ddenv.evidence.claims import current, is_minimal
+from ddenv.evidence.certificate import RUNS_BESIDE, error_of
+from ddenv.evidence.claims import current, is_minimal, terms_of
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
@@ -389,7 +389,7 @@ class Driver:
             )
             journal.record(started)
             last = journal.state.certificates[-1]
-        terms = Terms(last.certify_rate, last.keep_rate, last.error, last.at_least)
+        terms = terms_of(journal.state, last)
         return steps.Certificate(last.number, last.first_run, terms, self._leg.rule.exact if last.seeds else ())
 
     def _certified(self, step: steps.Certified) -> None:

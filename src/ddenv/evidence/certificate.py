@@ -26,15 +26,20 @@ Verdict = Literal[
     "", "kept", "lost", "exact", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"
 ]
 
-# The chance that any claim of a run is wrong, over all its certificates; half of it is for rates kept, half for removals. It is not
-# divided by the number of models: "each model is needed" is wrong only if a certain one is not, and its own bet won by chance.
+# The chance that any claim of a run is wrong, over all its certificates. It is not divided by the number of models: "each model is
+# needed" is wrong only if a certain one is not, and its own bet won by chance.
 ERROR = 0.05
+# Claims come in turn: that the rate is kept, up to what has to be shown, and then those about models. If too little is kept, a
+# claim about a model comes only after that was already wrong, so this share of a certificate's error is enough for both. The rest
+# is for claims out of turn: that more of the rate is kept, or about a model while the rate is not shown to be kept.
+IN_TURN = 0.9
 # Without a needed model f shows in at most this share of the runs with it.
 NEEDED_SHARE = 0.8
 # At this wealth a bet against a claim ends the search for evidence.
 REFUTED = 20.0
-# So many seeds run the whole world only where what is left missed f; then each does. Below this wealth sooner.
-MOST_ALONE, HOPELESS = 40, 0.1
+# In the first runs, and while what is left shows f in such a share of them, the whole world runs only where what is left missed f:
+# one more seed tells more than a run of the whole world.
+ALONE_SHARE, ALONE_FIRST = 0.7, 10
 # The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
 # many times as fast as they did.
 MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
@@ -48,24 +53,35 @@ RUNS_BESIDE = 20
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
 ENOUGH_RATIO, MOST_EARLIER = 3.0, 60
-# Each bet is a mixture of these stakes, as parts of the highest possible one.
-STAKES = (0.15, 0.3, 0.5, 0.7, 0.9)
+# Each bet is divided among these stakes, parts of the highest possible one: most of it is where f nearly always or never shows.
+STAKES = {0.3: 0.15, 0.65: 0.25, 0.95: 0.6}
 
 
 @dataclass(frozen=True)
 class Terms:
     """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
-    of a claim, and the minimum number of runs.
+    of all claims together, and the minimum number of runs of what is left.
 
-    `at_once`: the runs of a pair are made one right after the other, and none is part of two pairs: without seeds all rates may
-    change in the course of time.
+    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn. `at_once`: the runs of
+    a pair are made one right after the other, and none is part of two pairs: without seeds all rates may change in the course of
+    time.
     """
 
     certify_rate: float
     keep_rate: float
     error: float
     at_least: int = 1
+    first_rate: float | None = None
     at_once: bool = False
+
+    @property
+    def in_turn(self) -> float:
+        """The share up to which claims of the rate that is kept are in turn."""
+        return self.certify_rate if self.first_rate is None else self.first_rate
+
+    def error_of_models(self, kept: float | None) -> float:
+        """The chance of error of a claim about a model where so much of the rate is shown to be kept."""
+        return self.error * (IN_TURN if kept is not None and kept >= self.in_turn else 1.0 - IN_TURN)
 
 
 def error_of(number: int) -> float:
@@ -117,7 +133,8 @@ def _wealth(pairs: Pairs, both: float, first: float, second: float) -> float:
         + pairs.second * math.log1p(stake * second)
         for stake in STAKES
     )
-    return sum(math.exp(min(700.0, logarithm)) for logarithm in logarithms) / len(STAKES)
+    wealths = (math.exp(min(700.0, logarithm)) for logarithm in logarithms)
+    return sum(part * wealth for part, wealth in zip(STAKES.values(), wealths, strict=True))
 
 
 def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
@@ -208,13 +225,14 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     if left == whole:
         return (yield from _of_whole(left, max(1, terms.at_least)))
     # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
-    assumed, sound, bound, run, alone = Pairs(), Pairs(), 0.0, 0, not terms.at_once
+    assumed, sound, bound, run = Pairs(), Pairs(), 0.0, 0
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
     mine: Shown
     theirs: Shown
     while run < MOST_PAIRS or hits:
-        alone = alone and run < MOST_ALONE and (not run or assumed.above(terms.certify_rate) >= HOPELESS)
+        shows_often = run < ALONE_FIRST or assumed.both + assumed.first >= ALONE_SHARE * run
+        alone = shows_often and run < MOST_PAIRS and not terms.at_once
         if hits and not alone:
             mine = True
             (theirs,) = yield Wanted(((whole, hits.pop(0)),), (whole,), bound)
@@ -234,7 +252,8 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
         if theirs is not None:
             assumed = assumed.after(mine is True, theirs is not False)
             sound = sound.after(mine is not False, theirs is True)
-        bound = assumed.keeps_at_least(terms.error, bound)
+        in_turn = min(terms.in_turn, assumed.keeps_at_least(terms.error * IN_TURN, bound))
+        bound = max(in_turn, assumed.keeps_at_least(terms.error * (1.0 - IN_TURN), bound))
         if bound >= terms.certify_rate and run >= terms.at_least:
             return "kept", bound
         if sound.below(terms.keep_rate) >= REFUTED:
@@ -252,11 +271,11 @@ def _of_whole(whole: Environment, runs: int) -> Procedure:
 
 
 def falls(
-    without: Environment, left: Environment, terms: Terms, share: float = NEEDED_SHARE, first: int = 0
+    without: Environment, left: Environment, error: float, share: float = NEEDED_SHARE, first: int = 0
 ) -> Procedure:
     """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
-    "needed" is wrong with a probability of at most the terms' error. "helps": f is rarer, but not by so much; "not needed": it
+    "needed" is wrong with a probability of at most `error`. "helps": f is rarer, but not by so much; "not needed": it
     shows about as often, which the next certificate has to show.
     """
     assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
@@ -264,15 +283,15 @@ def falls(
         mine, theirs = yield Wanted(((without, first + run), (left, first + run)), (without, left), bound)
         assumed = assumed.after(mine is not False, theirs is True)
         sound = sound.after(mine is True, theirs is not False)
-        bound = assumed.at_most(terms.error, bound)
-        if bound <= share and run + 1 >= terms.at_least:
+        bound = assumed.at_most(error, bound)
+        if bound <= share:
             return "needed", bound
         rarer = rarer or assumed.below(1.0) >= REFUTED
         often = sound.above(share)
         if often >= REFUTED or (rarer and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE):
             return "helps" if rarer else "not needed", bound
-        likeliest = max(often * terms.error * REFUTED, assumed.below(share))
-        if run + 1 >= FEWEST_PAIRS and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / terms.error:
+        likeliest = max(often * error * REFUTED, assumed.below(share))
+        if run + 1 >= FEWEST_PAIRS and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / error:
             break
     about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
     return ("helps" if rarer else "not needed" if about_as_often else "not shown"), bound
@@ -304,9 +323,8 @@ def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: 
 SHORTER, LONGER = 0.55, 2.2
 # Of the pairs of runs with the same seed, so many end alike whatever their rates are.
 ALIKE = 0.4
-# The logarithm of the wealth that a bet of the first certificate needs, with what it costs to bet with several stakes at once; and
-# that of a bet against it.
-NEEDS, NEEDS_AGAINST = math.log(2.0 / error_of(1) * len(STAKES)), math.log(REFUTED * len(STAKES))
+# The wealth that a bet of the first certificate needs.
+NEEDS = 1.0 / (IN_TURN * error_of(1))
 # Eight of ten rates are in the interval of so many standard deviations.
 EIGHT_OF_TEN = 1.28
 
@@ -340,19 +358,21 @@ def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> flo
     """
     kept = (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0)
     both = ALIKE * rate + (1.0 - ALIKE) * rate * rate
-    alone = max(float(at_least), NEEDS / _growth((rate, 0.0, rate - both), kept))
-    if alone <= MOST_ALONE:
-        of_left, of_whole = alone, alone * (1.0 - rate)
+    pairs = (both, rate - both, rate - both)
+    if rate >= ALONE_SHARE:
+        of_left = max(float(at_least), _until(NEEDS, (rate, 0.0, rate - both), kept))
+        of_whole = of_left * (1.0 - rate)
     else:
-        of_left = of_whole = min(float(MOST_PAIRS), NEEDS / _growth((both, rate - both, rate - both), kept))
+        of_left = of_whole = min(float(MOST_PAIRS), max(float(at_least), _until(NEEDS, pairs, kept)))
     needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
-    removal = NEEDS / _growth((0.0, 0.0, rate), needed)
-    removal = max(at_least, removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER)
-    lost = 2.0 * NEEDS_AGAINST / _growth((both, rate - both, rate - both), needed)
+    removal = _until(NEEDS, (0.0, 0.0, rate), needed)
+    removal = removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER
+    lost = 2.0 * _until(REFUTED, pairs, needed)
     return min(lost, max(of_left, removal if left else 0.0) + of_whole + left * removal)
 
 
-def _growth(shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
-    """How fast the wealth of a bet grows in a pair, in nats; nearly 0 if it shrinks. `shares` of all pairs have these `gains`."""
+def _until(wealth: float, shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
+    """After how many pairs a bet has this wealth, on average. `shares` of all pairs have these `gains`."""
     pairs = tuple(zip(shares, gains, strict=True))
-    return max(1e-4, *(sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES))
+    growths = {stake: sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES}
+    return min(math.log(wealth / STAKES[stake]) / max(1e-4, growth) for stake, growth in growths.items())

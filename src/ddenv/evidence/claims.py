@@ -37,6 +37,14 @@ def helping(certificate: Certificate) -> tuple[str, ...]:
     return tuple(claim.without for claim in helps if claim.without is not None)
 
 
+def terms_of(state: RunState, certificate: Certificate) -> Terms:
+    """The terms of a certificate of a run, which may go on with the runs of an earlier one."""
+    first = next(one for one in state.certificates if one.first_run == certificate.first_run)
+    return Terms(
+        certificate.certify_rate, certificate.keep_rate, certificate.error, certificate.at_least, first.certify_rate
+    )
+
+
 def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settled]:
     """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left. Models that no run
     has left out yet are missing.
@@ -57,12 +65,12 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     def shown(environment: Environment, run: int) -> Shown:
         return outcomes.get((environment, run))
 
-    # Half of the errors is for rates kept, half for removals.
-    terms = Terms(certificate.certify_rate, certificate.keep_rate, certificate.error / 2, certificate.at_least)
+    terms = terms_of(state, certificate)
     if certificate.seeds:
         return {None: settle(often(left, terms.at_least), shown)}
-    claims: dict[str | None, Settled] = {None: settle(keeps(left, whole, terms), shown)}
-    return claims | {name: settle(falls(rest, left, terms), shown) for name, rest in rests.items()}
+    kept = settle(keeps(left, whole, terms), shown)
+    error = terms.error_of_models(kept.bound)
+    return {None: kept, **{name: settle(falls(rest, left, error), shown) for name, rest in rests.items()}}
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:

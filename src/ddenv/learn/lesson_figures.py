@@ -17,7 +17,7 @@ from ddenv.evidence.certificate import NEEDED_SHARE
 from ddenv.evidence.claims import so_far
 from ddenv.evidence.rates import anytime_interval, miss_chance
 from ddenv.learn.attempt import Oracle
-from ddenv.runfile.events import deed
+from ddenv.runfile.deeds import deed
 from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState
@@ -75,7 +75,9 @@ def _now(state: RunState) -> Certificate:
 
 def _bound(state: RunState, without: str | None = None) -> str:
     """What it has shown by now of what is left, or of that without a model. Raises UserError if it has not left that out."""
-    claim = so_far(state, _now(state)).get(without)
+    now = _now(state)
+    made = {claim.without: claim for claim in now.claims}
+    claim = made.get(without) if made else so_far(state, now).get(without)
     if claim is None:
         raise UserError(f"at this step, no fresh run has yet left '{without}' out")
     return percent(claim.bound or 0.0)

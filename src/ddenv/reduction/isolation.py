@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.evidence.certificate import Claim, Procedure, Terms, Wanted, error_of, falls, often
+from ddenv.evidence.certificate import Claim, Procedure, Wanted, error_of, falls, often
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import by_chunks
 from ddenv.reduction.guide import Search
@@ -162,12 +162,12 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Gen
         # The search has made these runs.
         named = (_exactly(driver, model, with_it, rule.exact) for model, with_it in backs.items())
         return Checked(removed, (replace(rate, claim=replace(rate.claim, verdict="passes")), *named))
-    terms, certain = Terms(rule.wanted, asked.keep_rate, error), replace(rule, error=error)
+    certain = replace(rule, error=error)
 
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, passing, passes(passing, certain, asked.at_least)
         for model, with_it in backs.items():
-            yield model, with_it, falls(with_it, passing, terms, asked.keep_rate)
+            yield model, with_it, falls(with_it, passing, error, asked.keep_rate)
 
     def ends(claim: NamedClaim) -> bool:
         return claim.claim.verdict != "passes" if claim.model is None else claim.claim.verdict == "not needed"

@@ -13,7 +13,7 @@ with a function. A resumed run drives it again through what is known.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice, zip_longest
 from typing import Any, Protocol
 
@@ -382,20 +382,23 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
     while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
         yield Wants(tuple(Test(left, run, "round") for run in missing))
     certificate: Certificate = yield CertificateDue()
-    terms = replace(certificate.terms, error=certificate.terms.error / 2)
+    terms = certificate.terms
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
 
-    def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
+    def claims(error: float) -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
         for number, (model, rest) in enumerate(() if certificate.exact else rests.items(), 1):
-            yield model, rest, falls(rest, left, terms, first=number * MOST_PAIRS if terms.at_once else 0)
+            yield model, rest, falls(rest, left, error, first=number * MOST_PAIRS if terms.at_once else 0)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
             return claim.claim.verdict == "lost"
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
-    made = yield from settled(driver, claims(), ends, certificate.first_run, "certify")
+    # Models are taken to be in turn, until the rate turns out not to be kept.
+    made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
+    if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
+        made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
     if certificate.exact:
         made += tuple(_exactly(driver, model, rest, certificate.exact) for model, rest in rests.items())
     certified = Certified(certificate, made)

@@ -27,7 +27,7 @@ from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import margins, what_is_left, why
-from ddenv.runfile.events import deed
+from ddenv.runfile.deeds import deed
 from ddenv.runfile.fold import spent
 from ddenv.runfile.state import RunState
 from ddenv.text import as_sentence, coordinates, count, plain

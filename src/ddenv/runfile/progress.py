@@ -6,17 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.events import (
-    EngineStarted,
-    IsolationStarted,
-    MarginImpossible,
-    MarginRan,
-    MarginsStarted,
-    NumberAsked,
-)
+
+if TYPE_CHECKING:
+    from ddenv.runfile.events import (
+        EngineStarted,
+        IsolationStarted,
+        MarginImpossible,
+        MarginRan,
+        MarginsStarted,
+        NumberAsked,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.events import BaselineFinished, Forecast, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import (
     Certificate,
@@ -23,6 +22,9 @@ from ddenv.runfile.progress import (
     Removal,
     path,
 )
+
+if TYPE_CHECKING:
+    from ddenv.runfile.events import BaselineFinished, Forecast, Place
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]

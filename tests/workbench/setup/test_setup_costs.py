@@ -40,11 +40,11 @@ def test_tests_and_time_are_told():
     known = Past(1, 3.0, 0.9)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
-    assert "tests (45 to 300): 4 for the baseline, 35 for the search, 70 for the certificate; " in words
+    assert "tests (35 to 250): 4 for the baseline, 35 for the search, 50 for the certificate; " in words
     assert words.endswith("with 2 jobs at 3.0 s a test, as before")
     unknown = whole_cost(scenario(), 43, 2, Past())
-    parts = "4 for the baseline, 35 for the search, 70 for the certificate"
-    assert unknown == f"about 100 tests (45 to 250): {parts}; more if the failure is rare"
+    parts = "4 for the baseline, 35 for the search, 50 for the certificate"
+    assert unknown == f"about 90 tests (35 to 200): {parts}; more if the failure is rare"
     assert whole_cost(scenario(budget=9), 43, 1, known) == (
         "9 tests at most: 4 for the baseline, then the search; 25 s with 1 job at 3.0 s a test, as before"
     )

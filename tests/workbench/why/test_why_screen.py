@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from textual.widgets import OptionList
 
 from ddenv.cli.command_line import app as command_line
-from ddenv.evidence.certificate import Pairs
+from ddenv.evidence.certificate import IN_TURN, Pairs
 from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import nearest, parting_sentence, reasons, sentence
@@ -74,7 +74,7 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
     async with Attached(run) as session:
         screen = await opened(session)
         assert "It is being made: 17 of about" in words(screen, "#why-empty")
-        kept = percent(Pairs(both=11, second=1).keeps_at_least(0.015))
+        kept = percent(Pairs(both=11, second=1).keeps_at_least(0.03 * IN_TURN))
         assert f"so far at least {kept} of the whole world's rate is kept" in words(screen, "#why-empty")
         run.certify_all(2, "crate_01", "ppp")
         run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "needed", "opp"), ("crate_01", "needed", "ppp"))
