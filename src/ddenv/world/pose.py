@@ -37,12 +37,6 @@ class Pose:
         )
         return cls((x, y, z), quaternion)
 
-    @classmethod
-    def about(cls, axis: Vector, angle: float) -> Pose:
-        """A turn by `angle` (rad) about a unit vector through the origin."""
-        x, y, z = (part * math.sin(angle / 2) for part in axis)
-        return cls((0.0, 0.0, 0.0), (math.cos(angle / 2), x, y, z))
-
     def rotation(self) -> np.ndarray:
         """Rotation matrix, shape (3, 3)."""
         # Loaded late: the first paint of the workbench does without it.

@@ -69,7 +69,7 @@ def test_gltf_buffer_beside_it_and_glb(tmp_path):
     assert bounds(mesh_of(tmp_path / "a.glb", scene.export(file_type="glb"), submesh="box10"))[0] == [10, 0, 0]
 
 
-@pytest.mark.parametrize("mode", [4, 5, 6])
+@pytest.mark.parametrize("mode", [4, 5])
 def test_gltf_modes_without_indices(tmp_path, mode):
     meshes_ = [
         {"primitives": [{"attributes": {"POSITION": 0}, "mode": mode}, {"attributes": {"POSITION": 0}, "mode": 1}]}
@@ -103,17 +103,16 @@ HOSTILE_GLTF = {
     "bomb": (gltf(nodes=[{"children": [1] * 9}, {"mesh": 0}]), "form a tree"),
     "negative node": (gltf(scenes=[{"nodes": [-1]}]), "form a tree"),
     "huge": (gltf(accessors=accessor(count=10**12)), "the maximum is 2 million: simplify it"),
-    "negative": (gltf(accessors=accessor(byteOffset=-8)), "not a valid GLTF"),
-    "negative view": (gltf(bufferViews=views(byteOffset=-48)), "have no place"),
-    "negative accessor": (gltf(meshes=[{"primitives": [{"attributes": {"POSITION": -2}}]}]), "negative numbers"),
+    "negative": (gltf(accessors=accessor(byteOffset=-8)), "negative numbers"),
     "stride": (gltf(bufferViews=views(byteStride=0)), "not a valid GLTF"),
     "sparse": (gltf(accessors=accessor(sparse={})), "not supported"),
-    "views": (gltf(bufferViews=[{"buffer": 0, "byteLength": 10**9}]), "not a valid GLTF"),
+    "fan": (gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6}]}]), "fans are not supported"),
+    "views": (gltf(bufferViews=[{"buffer": 0, "byteLength": 10**9}]), "larger than its buffers"),
     "beyond": (gltf(accessors=accessor(count=5)), "not a valid GLTF"),
     "indices": (gltf(bufferViews=[{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteLength": 24}]), "does not exist"),
     "kind": (gltf(accessors=accessor(componentType=5120)), "not supported"),
     "mesh": (gltf(nodes=[{"children": [1], "mesh": -1}, {"mesh": 0}]), "negative numbers"),
-    "infinite": (gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, float("inf")]}]), "not finite"),
+    "infinite": (gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, float("inf")]}]), "not a valid GLTF"),
     "draco": (gltf(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression is not supported"),
     "version": (gltf(asset={"version": "1.0"}), "only GLTF 2 is supported"),
     "no asset": (gltf(asset={}), "it has no .version."),

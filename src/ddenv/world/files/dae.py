@@ -1,56 +1,70 @@
-"""Reads COLLADA (.dae) files in the frame in which Gazebo shows them.
+"""Reads COLLADA (.dae) files with trimesh and pycollada, in the frame in which Gazebo shows them.
 
 As in Gazebo's loader, `<unit>` scales the mesh and `<up_axis>` is ignored: worlds pose their models for Gazebo's view, and
-exporters wrote any up axis. Only shapes and their places are read; skinned shapes keep their original pose.
+exporters wrote any up axis. trimesh applies neither and forgets the names of nodes, so each instance gets its own numbered
+geometry. Materials, lights, animations and skeletons are removed, so that errors in them do no harm.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from xml.etree.ElementTree import Element
+from io import BytesIO
+from xml.etree.ElementTree import Element, SubElement, tostring
 
-import numpy as np
+from ddenv.world.access import Unusable, xml_root
+from ddenv.world.files.triangles import Part, parts_of
 
-from ddenv.world.access import xml_root
-from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, fans, part, strip
-from ddenv.world.pose import Pose, vector
-
-INSTANCES = ("instance_visual_scene", "instance_node", "instance_geometry", "instance_controller")
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+TRANSFORMS = ("matrix", "translate", "scale")
+INSTANCES = ("instance_visual_scene", "instance_node", "instance_geometry", "instance_controller")
+# Maximum size of the expanded scene, bytes: a few lines can place one geometry a million times.
+MOST_WEIGHT = 400_000_000
 
 
 def read_dae(data: bytes) -> list[Part]:
     """Every instance of every geometry in the scene, in m, named by its node, its geometry and their ids.
 
-    Dangling references are skipped, as in Gazebo. Raises Unusable, ValueError, and other exceptions for malformed files.
+    Dangling references are skipped, as in Gazebo. Raises what pycollada raises, and ValueError.
     """
-    root = xml_root(data)
-    for element in root.iter():
-        element.tag = element.tag.rpartition("}")[2]
-    if root.tag != "COLLADA":
-        raise ValueError(f"its root is <{root.tag[:60]}>, not <COLLADA>")
+    import trimesh
+    from trimesh.exchange.dae import load_collada
+
+    root = _parse(data)
     known = {id: element for element in root.iter() if (id := element.get("id"))}
     instance = root.find("scene/instance_visual_scene")
     scene = None if instance is None else _target(instance, known)
     if scene is None:
         raise ValueError("has no scene")
-    shapes: dict[Element, list[tuple[np.ndarray, np.ndarray]]] = {}
-    found: list[Part] = []
-    nodes = _nodes(scene, "", np.diag([*[_metres(root)] * 3, 1.0]), known)
-    for number, (node, name, place) in enumerate(nodes):
-        for geometry in (target for each in node if (target := _target(each, known)) is not None):
-            if geometry.tag != "geometry":
-                continue
-            if geometry not in shapes:
-                shapes[geometry] = [shape for mesh in geometry.iterfind("mesh") for shape in _shapes(mesh, known)]
-            names = (name, geometry.get("name", ""), geometry.get("id", ""), node.get("id", ""))
-            found += [part(names, vertices, faces, place) for vertices, faces in shapes[geometry]]
-            check_count(sum(len(each.faces) for each in found))
-        # A few lines can place one geometry a million times.
-        if max(number, len(found)) > MOST_PARTS:
-            raise ValueError("places its geometries too often")
-    return found
+    if _weight(scene, known, {}) > MOST_WEIGHT:
+        raise ValueError("places its geometries too often")
+    for geometry in root.iter("geometry"):
+        _repair(geometry, known)
+    places: list[tuple[tuple[str, ...], Element]] = []
+    nodes = [_placed(node, "", known, places) for node in scene.iterfind("node")]
+    # With `ignore_broken`, unsupported geometry would be dropped silently.
+    loaded = load_collada(  # type: ignore[no-untyped-call]  # trimesh
+        BytesIO(_document(nodes, [geometry for _, geometry in places])), ignore_broken=False
+    )
+    metres, meshes = _metres(root), []
+    for place in loaded["graph"]:
+        shape = loaded["geometry"][place["geometry"]]
+        mesh = trimesh.Trimesh(shape["vertices"], shape["faces"], process=False)
+        mesh.apply_transform(place["matrix"])
+        mesh.apply_scale(metres)  # type: ignore[no-untyped-call]  # trimesh
+        meshes.append((places[int(place["geometry"].partition("_")[0])][0], mesh))
+    return parts_of(meshes)
+
+
+def _parse(data: bytes) -> Element:
+    try:
+        root = xml_root(data)
+    except Unusable as error:
+        raise ValueError(str(error)) from None
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "COLLADA":
+        raise ValueError(f"its root is <{root.tag[:60]}>, not <COLLADA>")
+    return root
 
 
 def _metres(root: Element) -> float:
@@ -63,94 +77,103 @@ def _metres(root: Element) -> float:
     return metres if math.isfinite(metres) and metres > 0 else 1.0
 
 
+def _repair(geometry: Element, known: dict[str, Element]) -> None:
+    """Removes everything without faces; repairs what pycollada would misread. Raises ValueError for what it cannot repair."""
+    for place in geometry.iterfind("mesh/vertices/input[@semantic='POSITION']"):
+        source = known.get(place.get("source", "")[1:], Element("source"))
+        # pycollada reads NaN as zero, and ignores gaps.
+        if "nan" in source.findtext("float_array", "").lower():
+            raise ValueError("has vertices that are not finite")
+        if any((each.get("stride", "3"), each.get("offset", "0")) != ("3", "0") for each in source.iter("accessor")):
+            raise ValueError("its positions are stored with gaps; save it without them")
+    for mesh in geometry.iterfind("mesh"):
+        for element in list(mesh):
+            if element.tag in PRIMITIVES:
+                _repair_faces(element)
+            empty = element.tag not in PRIMITIVES or element.find("p") is None
+            if empty and element.tag not in ("source", "vertices"):
+                mesh.remove(element)
+
+
+def _repair_faces(element: Element) -> None:
+    """The same for one primitive; holes of polygons are dropped. Raises ValueError."""
+    paths = [path for path in (*element.iterfind("p"), *element.iterfind("ph/p")) if (path.text or "").strip()]
+    texts = [path.text or "" for path in paths]
+    if any("-" in text for text in texts):
+        raise ValueError("a face has a negative index")
+    if element.tag == "triangles" and paths:
+        # pycollada reads only the first.
+        paths[0].text = " ".join(texts)
+        del paths[1:]
+    counts = [int(word) for word in element.findtext("vcount", "").split()]
+    # pycollada would allocate arrays of any size given here.
+    if counts and (min(counts) < 0 or sum(counts) > sum(map(len, texts))):
+        raise ValueError("<vcount> does not match <p>")
+    for each in element.findall("input"):
+        if each.get("semantic") != "VERTEX":
+            # Normals, textures and colours keep their place in the index list, as the one kind that pycollada does not check.
+            each.set("semantic", "TANGENT")
+        if int(each.get("offset", 0)) < 0:
+            raise ValueError(f"<{element.tag}> has no vertices")
+    element[:] = [each for each in element if each.tag in ("input", "vcount")] + paths
+
+
+def _placed(
+    node: Element, name: str, known: dict[str, Element], places: list[tuple[tuple[str, ...], Element]]
+) -> Element:
+    """A copy of `node` with its transforms and everything it places; appends names and geometries to `places`.
+
+    A node without a name takes its parent's. Raises RecursionError if a node contains itself.
+    """
+    name = node.get("name") or name
+    copy = Element("node")
+    for each in node:
+        target = each if each.tag == "node" else _target(each, known)
+        if each.tag == "rotate":
+            copy.append(_rotation(each))
+        elif each.tag in TRANSFORMS:
+            copy.append(each)
+        elif target is not None and target.tag == "node":
+            copy.append(_placed(target, name, known, places))
+        elif target is not None and target.tag == "geometry":
+            SubElement(copy, "instance_geometry", url=f"#{len(places)}")
+            places.append(((name, target.get("name", ""), target.get("id", ""), node.get("id", "")), target))
+    return copy
+
+
+def _rotation(element: Element) -> Element:
+    """A rotation about a unit axis, as pycollada needs it; an axis of length zero turns nothing."""
+    *axis, angle = (float(word) for word in (element.text or "").split())
+    length = math.hypot(*axis)
+    values = [*(value / length for value in axis), angle % 360] if length else [0.0] * 4
+    copy = Element("rotate")
+    copy.text = " ".join(map(repr, values))
+    return copy
+
+
 def _target(instance: Element, known: dict[str, Element]) -> Element | None:
-    """The element that an instance places; other files are not opened."""
+    """The element that an instance places; other files are not opened. Skinned shapes keep their original pose."""
     target = known.get(instance.get("url", "")[1:]) if instance.tag in INSTANCES else None
     if target is not None and target.tag == "controller":
         return known.get("".join(skin.get("source", "")[1:] for skin in target.iterfind("skin")))
     return target
 
 
-def _nodes(
-    node: Element, name: str, place: np.ndarray, known: dict[str, Element]
-) -> Iterator[tuple[Element, str, np.ndarray]]:
-    """`node` and all nodes below it, with their names and places (4, 4). One without a name takes its parent's.
-
-    Raises RecursionError if a node contains itself.
-    """
-    yield node, name, place
-    for each in node:
-        inner = each if each.tag == "node" else _target(each, known)
-        if inner is not None and inner.tag == "node":
-            yield from _nodes(inner, inner.get("name") or name, place @ _transform(inner), known)
+def _weight(element: Element, known: dict[str, Element], weights: dict[Element, int]) -> int:
+    """The approximate bytes of `element` with everything it places. Raises RecursionError if it contains itself."""
+    if element not in weights:
+        target = _target(element, known)
+        parts = [*element, *([] if target is None else [target])]
+        weights[element] = 1000 + len(element.text or "") + sum(_weight(each, known, weights) for each in parts)
+    return weights[element]
 
 
-def _transform(node: Element) -> np.ndarray:
-    """The place (4, 4) of a node in its parent."""
-    whole = np.eye(4)
-    for each in node:
-        own = np.eye(4)
-        match each.tag:
-            case "matrix":
-                own = _numbers(each).reshape(4, 4)
-            case "translate":
-                own[:3, 3] = _numbers(each).reshape(3)
-            case "scale":
-                own[:3, :3] = np.diag(_numbers(each).reshape(3))
-            case "rotate":
-                *axis, angle = _numbers(each).reshape(4).tolist()
-                # An axis of length zero turns nothing.
-                if length := math.hypot(*axis):
-                    own[:3, :3] = Pose.about(vector(one / length for one in axis), math.radians(angle)).rotation()
-        whole = whole @ own
-    return whole
-
-
-def _shapes(mesh: Element, known: dict[str, Element]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The vertices (N, 3) and the faces (M, 3) of each primitive with faces. Raises ValueError."""
-    for primitive in (each for each in mesh if each.tag in PRIMITIVES):
-        # Holes of polygons are dropped.
-        paths = [_numbers(path, int) for path in (*primitive.iterfind("p"), *primitive.iterfind("ph/p"))]
-        offsets = {each.get("semantic"): int(each.get("offset", 0)) for each in primitive.iterfind("input")}
-        source = primitive.find("input[@semantic='VERTEX']")
-        if not any(map(len, paths)):
-            continue
-        if source is None or min(offsets.values()) < 0:
-            raise ValueError(f"<{primitive.tag}> has no vertices")
-        corners = [path.reshape(-1, max(offsets.values()) + 1)[:, offsets["VERTEX"]] for path in paths]
-        if len(faces := _faces(primitive, corners)):
-            yield _vertices(source, known), faces
-
-
-def _faces(primitive: Element, corners: list[np.ndarray]) -> np.ndarray:
-    """The triangles (M, 3) of a primitive; `corners` are those of each `<p>`. Raises ValueError."""
-    joined = np.concatenate(corners)
-    check_count(len(joined) // 3)
-    match primitive.tag:
-        case "triangles":
-            return joined.reshape(-1, 3)
-        case "tristrips":
-            return np.vstack([strip(each) for each in corners])
-        case "polylist":
-            counts = _numbers(primitive.find("vcount"), int)
-            if len(counts) and (counts.min() < 0 or counts.max() > len(joined) or counts.sum() > len(joined)):
-                raise ValueError("<vcount> does not match <p>")
-            return fans(joined, counts)
-    return fans(joined, np.array([len(each) for each in corners]))
-
-
-def _vertices(source: Element, known: dict[str, Element]) -> np.ndarray:
-    """The vertices (N, 3) that a primitive refers to, in the file's unit."""
-    place = known[source.get("source", "")[1:]].find("input[@semantic='POSITION']")
-    positions = known["" if place is None else place.get("source", "")[1:]]
-    accessor = next(positions.iter("accessor"), positions)
-    stride = int(accessor.get("stride", 3))
-    values = _numbers(positions.find("float_array"))[int(accessor.get("offset", 0)) :]
-    rows = values[: len(values) // stride * stride].reshape(-1, stride)[:, :3].reshape(-1, 3)
-    # As in the other formats, which takes half the room in a run file.
-    return rows.astype("<f4")
-
-
-def _numbers(element: Element | None, kind: type = float) -> np.ndarray:
-    text = "" if element is None else element.text or ""
-    return np.array([kind(word) for word in text.split()], dtype=kind)
+def _document(nodes: list[Element], geometries: list[Element]) -> bytes:
+    """A file that places each geometry once; a geometry's id is its number."""
+    root = Element("COLLADA", xmlns="http://www.collada.org/2005/11/COLLADASchema", version="1.4.1")
+    library = SubElement(root, "library_geometries")
+    for number, geometry in enumerate(geometries):
+        SubElement(library, "geometry", id=str(number)).extend(geometry.findall("mesh"))
+    SubElement(SubElement(root, "library_visual_scenes"), "visual_scene", id="scene").extend(nodes)
+    SubElement(SubElement(root, "scene"), "instance_visual_scene", url="#scene")
+    return tostring(root)

@@ -1,70 +1,61 @@
-"""Reads glTF 2.0 files (.gltf, .glb), in the axes of the file.
+"""Reads glTF 2.0 files (.gltf, .glb) with trimesh, in the axes of the file.
 
 glTF is Y-up, but Gazebo uses the coordinates of every format as they are, and lets the `<pose>` in the SDF turn the mesh
-upright. So do we.
+upright. So do we. trimesh gets a header that holds only the shape: otherwise it would decode images, drop nodes below a
+camera, and misread what it does not support.
 """
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-import numpy as np
-
 from ddenv.world.access import Unusable, read
-from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, fans, part, strip
-from ddenv.world.pose import ONE, pose_of
+from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, parts_of
 
-# The accessors of positions and of vertex indices: their type, how many numbers a row has, and these in each format.
-_POSITIONS = ("VEC3", 3, {5126: "<f4"})
-_INDICES = ("SCALAR", 1, {5121: "<u1", 5123: "<u2", 5125: "<u4"})
+# Accepted accessors of positions (32-bit floats) and of vertex indices (8, 16 and 32 bits).
+_POSITIONS = ("VEC3", (5126,))
+_INDICES = ("SCALAR", (5121, 5123, 5125))
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_PLACE = ("children", "matrix", "translation", "rotation", "scale")
+# Replaces accessors that are not read.
+_NOTHING = {"componentType": 5126, "count": 0, "type": "SCALAR"}
 
 
 def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
     """Every mesh of every node in the scene, named by its node and its mesh.
 
-    Also reads buffers in `folder`, of at most `limit` bytes each. Raises ValueError or Unusable, and other exceptions for
-    malformed files.
+    Also reads buffers in `folder`, of at most `limit` bytes each. Raises ValueError or Unusable, and any exception of
+    trimesh for malformed files.
     """
-    # A .glb has a header and a buffer in chunks, after 12 bytes; each begins with its size and its type.
+    import trimesh
+
+    is_binary = data.startswith(b"glTF")
+    # The header of a .glb is its first chunk, after 12 bytes, the chunk's size and its type.
     end = 20 + int.from_bytes(data[12:16], "little")
-    header = json.loads(data[20:end] if data.startswith(b"glTF") else data)
-    if not str(header["asset"]["version"]).startswith("2."):
-        raise ValueError("only GLTF 2 is supported")
-    if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
-        raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
-    chunk = data[end + 8 :]
-    buffers = [_buffer(each["uri"], folder, limit) if "uri" in each else chunk for each in header["buffers"]]
-    found: list[Part] = []
-    for node, place in _placed(header):
-        mesh = _at(header["meshes"], node["mesh"]) if "mesh" in node else {"primitives": []}
-        for primitive in mesh["primitives"]:
-            position = primitive["attributes"].get("POSITION")
-            if position is None or primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
-                continue
-            vertices = _rows(position, _POSITIONS, header, buffers)
-            corners = np.arange(len(vertices))
-            if "indices" in primitive:
-                corners = _rows(primitive["indices"], _INDICES, header, buffers).ravel().astype(int)
-            names = str(node.get("name", "")), str(mesh.get("name", ""))
-            found.append(part(names, vertices, _faces(primitive, corners), place))
-        # Primitives may share accessors, so a small file can have any number of triangles.
-        check_count(sum(len(each.faces) for each in found))
-        if len(found) > MOST_PARTS:
-            raise ValueError(f"has more than {MOST_PARTS} parts")
-    return [each for each in found if len(each.faces)]
+    header = json.loads(data[20:end] if is_binary else data)
+    text = json.dumps(_shape(header, limit), allow_nan=False).encode()
+    if is_binary:
+        text = data[:12] + len(text).to_bytes(4, "little") + data[16:20] + text + data[end:]
+    uris = {each["uri"] for each in header["buffers"] if "base64," not in each.get("uri", "base64,")}
+    buffers = {uri: _buffer(uri, folder, limit) for uri in uris}
+    scene = trimesh.load_scene(BytesIO(text), "glb" if is_binary else "gltf", resolver=buffers, process=False)
+    # trimesh appends random letters to the names of nodes with several primitives.
+    placed = [(int(mesh.metadata["node"].partition("_")[0]), mesh) for mesh in scene.dump()]
+    nodes, meshes = header["nodes"], header["meshes"]
+    return parts_of(
+        ((str(nodes[number].get("name", "")), str(meshes[nodes[number]["mesh"]].get("name", ""))), mesh)
+        for number, mesh in sorted(placed, key=lambda pair: pair[0])
+    )
 
 
 def _buffer(uri: str, folder: Path, limit: int) -> bytes:
-    """The content of a buffer: in its URI, or a file in `folder`. Raises ValueError or Unusable."""
-    if "base64," in uri:
-        return base64.b64decode(uri.partition("base64,")[2], validate=True)
+    """The content of a buffer file in `folder`. Raises ValueError or Unusable."""
     name = os.path.normpath(unquote(uri, errors="surrogateescape"))
     if ":" in name or name.startswith(("/", "..")) or "\0" in name:
         raise ValueError(f"buffer '{uri[:60]}' is outside the file's folder")
@@ -74,62 +65,76 @@ def _buffer(uri: str, folder: Path, limit: int) -> bytes:
         raise Unusable(f"buffer '{uri[:60]}': {error}") from None
 
 
-def _placed(header: dict[str, Any]) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
-    """The nodes of the scene with their places (4, 4). Raises ValueError unless the nodes form trees."""
+def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
+    """The header reduced to triangles and their transforms; a node's name is its number. Raises ValueError."""
+    if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
+        raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
+    accessors, views, nodes = header["accessors"], header["bufferViews"], header["nodes"]
+    # numpy would count negative numbers from the end, and trimesh would drop such a mesh.
+    counts = ("byteOffset", "byteLength", "count", "mesh")
+    if any(each.get(key, 0) < 0 for each in (*accessors, *views, *nodes) for key in counts):
+        raise ValueError("has negative numbers")
+    # Each view is copied.
+    if sum(each["byteLength"] for each in views) > limit:
+        raise ValueError("its buffer views are larger than its buffers")
+    meshes = [list(_primitives(mesh, accessors)) for mesh in header["meshes"]]
+    # Primitives may share accessors, so a small file can have any number of triangles.
+    placed = [primitive for node in nodes if "mesh" in node for primitive in meshes[node["mesh"]]]
+    for primitives in (placed, [primitive for mesh in meshes for primitive in mesh]):
+        check_count(sum(_size(each, accessors) for each in primitives))
+        if len(primitives) > MOST_PARTS:
+            raise ValueError(f"has more than {MOST_PARTS} parts")
+    used = {
+        number for mesh in meshes for each in mesh for number in (*each["attributes"].values(), each.get("indices"))
+    }
+    return {
+        "asset": {"version": header["asset"]["version"]},
+        "scenes": [{"nodes": _roots(header)}],
+        "nodes": [_node(number, node, meshes) for number, node in enumerate(nodes)],
+        "meshes": [{"primitives": mesh} for mesh in meshes],
+        "accessors": [each if number in used else _NOTHING for number, each in enumerate(accessors)],
+        "bufferViews": views,
+        "buffers": header["buffers"],
+    }
+
+
+def _primitives(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The triangle primitives of a mesh, without normals, colours and materials. Raises ValueError."""
+    for primitive in mesh["primitives"]:
+        mode, position = primitive.get("mode", _TRIANGLES), primitive["attributes"].get("POSITION")
+        if mode == _FAN:
+            raise ValueError("triangle fans are not supported")
+        if mode not in (_TRIANGLES, _STRIP) or position is None:
+            continue
+        indices = {"indices": primitive["indices"]} if "indices" in primitive else {}
+        for number, (kind, codes) in ((position, _POSITIONS), *((number, _INDICES) for number in indices.values())):
+            accessor = accessors[number]
+            plain = "bufferView" in accessor and "sparse" not in accessor
+            if not plain or accessor["type"] != kind or accessor["componentType"] not in codes:
+                raise ValueError(f"the type of accessor {number} is not supported")
+        yield {"mode": mode, "attributes": {"POSITION": position}, **indices}
+
+
+def _size(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
+    """The larger of its number of vertices and its maximum number of triangles."""
+    corners: int = accessors[primitive["indices"]]["count"] if "indices" in primitive else 0
+    faces = corners // 3 if primitive["mode"] == _TRIANGLES else corners
+    vertices: int = accessors[primitive["attributes"]["POSITION"]]["count"]
+    return max(vertices, faces)
+
+
+def _roots(header: dict[str, Any]) -> list[int]:
+    """The root nodes of the scene. Raises ValueError unless the nodes form trees."""
     nodes = header["nodes"]
     roots: list[int] = header["scenes"][header.get("scene", 0)]["nodes"]
     listed = [*roots, *(child for node in nodes for child in node.get("children", []))]
+    # glTF requires trees; trimesh would keep one parent of a node with two.
     if len(set(listed)) < len(listed) or not set(listed) <= {*range(len(nodes))} or len(nodes) > MOST_PARTS:
         raise ValueError("its nodes do not form a tree")
-    left = [(root, np.eye(4)) for root in roots]
-    while left:
-        number, above = left.pop(0)
-        place = above @ _transform(nodes[number])
-        yield nodes[number], place
-        left += [(child, place) for child in nodes[number].get("children", [])]
+    return roots
 
 
-def _transform(node: dict[str, Any]) -> np.ndarray:
-    """The place (4, 4) of a node in its parent."""
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=float).reshape(4, 4).T
-    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-    place = np.eye(4)
-    place[:3, :3] = pose_of((0, 0, 0, w, x, y, z)).rotation() * np.array(node.get("scale", ONE), dtype=float).reshape(3)
-    place[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=float).reshape(3)
-    return place
-
-
-def _faces(primitive: dict[str, Any], corners: np.ndarray) -> np.ndarray:
-    match primitive.get("mode", _TRIANGLES):
-        case 5:
-            return strip(corners)
-        case 6:
-            return fans(corners, np.array([len(corners)]))
-    return corners.reshape(-1, 3)
-
-
-def _rows(
-    number: int, wanted: tuple[str, int, dict[int, str]], header: dict[str, Any], buffers: list[bytes]
-) -> np.ndarray:
-    """The rows (N, 1) or (N, 3) of an accessor, which is to be as `wanted`. Raises ValueError."""
-    accessor, (kind, width, formats) = _at(header["accessors"], number), wanted
-    plain = "bufferView" in accessor and "sparse" not in accessor
-    if not plain or accessor["type"] != kind or accessor["componentType"] not in formats:
-        raise ValueError(f"the type of accessor {number} is not supported")
-    # Three indices make a triangle.
-    check_count(accessor["count"] if width == 3 else accessor["count"] // 3)
-    view, each = _at(header["bufferViews"], accessor["bufferView"]), np.dtype(formats[accessor["componentType"]])
-    start, stride = view.get("byteOffset", 0), view.get("byteStride", width * each.itemsize)
-    if start < 0 or stride < width * each.itemsize:
-        raise ValueError(f"the values of accessor {number} overlap or have no place")
-    content = memoryview(_at(buffers, view["buffer"]))[start : start + view["byteLength"]]
-    strides = (stride, each.itemsize)
-    return np.ndarray((accessor["count"], width), each, content, accessor.get("byteOffset", 0), strides)
-
-
-def _at(items: list[Any], number: int) -> Any:
-    # Python would count negative numbers from the end.
-    if number < 0:
-        raise ValueError("has negative numbers")
-    return items[number]
+def _node(number: int, node: dict[str, Any], meshes: list[list[dict[str, Any]]]) -> dict[str, Any]:
+    """A node without the mesh if that has no triangles: trimesh would lose the transform for all nodes below."""
+    mesh = {"mesh": node["mesh"]} if "mesh" in node and meshes[node["mesh"]] else {}
+    return {"name": str(number), **{key: node[key] for key in _PLACE if key in node}, **mesh}

@@ -3,16 +3,21 @@
 Coordinates are as in Gazebo: the axes of the file whatever it says about "up", `<unit>` of a .dae applied, all instances of
 a scene placed and joined. Only the mesh file itself is opened, and the buffers of a .gltf.
 
-We read these ourselves: what there is of libraries silently misreads parts of such files, drops others, and can be made to
-fill the memory. A .dae or .gltf without a scene is refused, and a .gltf with compressed, sparse or quantized meshes.
+Limitations, mostly of trimesh: a .dae is read in 32-bit precision, and refused if it has no scene, if its positions have gaps
+or unnamed axes, or if texture or normal indices are missing. A .gltf is refused if it has no scene, or if it has triangle
+fans or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +46,7 @@ def read_parts(path: Path) -> list[Part]:
         raise Unusable(f"meshes of type '{suffix[:20]}' are not supported; use one of {', '.join(SUFFIXES)}")
     data = read(path, MESH_LIMIT)
     try:
-        with np.errstate(all="ignore"):
+        with _quiet():
             plain = {".obj": read_obj, ".stl": read_stl, ".dae": read_dae}.get(suffix)
             return read_gltf(data, path.parent, MESH_LIMIT) if plain is None else plain(data)
     except Unusable:
@@ -56,6 +61,16 @@ def read_parts(path: Path) -> list[Part]:
     except Exception as error:
         reason = str(error) or "its numbers are inconsistent"
     raise Unusable(f"is not a valid {suffix[1:].upper()} file: {_line(reason)}") from None
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Silences the libraries, and turns the warning of older numpy versions about half-read numbers into an error."""
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", message="string or file could not be read")
+        yield
 
 
 def _line(text: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
+from typing import Any
 
 import numpy as np
 
@@ -25,38 +26,21 @@ class Part:
     faces: np.ndarray
 
 
-def part(names: tuple[str, ...], vertices: np.ndarray, faces: np.ndarray, place: np.ndarray | None = None) -> Part:
-    """A part with only the vertices that its faces use, since many parts may share one long list.
+def parts_of(meshes: Iterable[tuple[tuple[str, ...], object]]) -> list[Part]:
+    """The parts among pairs of names and what trimesh loaded; point clouds and empty meshes are dropped. Raises ValueError."""
+    return [_part(names, mesh) for names, mesh in meshes if len(getattr(mesh, "faces", ()))]
 
-    `place` (4, 4) is the transform of the part into the frame of the file. Raises ValueError.
-    """
-    used, numbers = np.unique(faces, return_inverse=True)
-    # numpy counts negative numbers from the end.
-    if len(used) and not 0 <= used[0] <= used[-1] < len(vertices):
+
+def _part(names: tuple[str, ...], mesh: Any) -> Part:
+    """A part with only the vertices that its faces use, since many parts may share one long list. Raises ValueError."""
+    vertices = mesh.vertices.view(np.ndarray)
+    used, places = np.unique(mesh.faces, return_inverse=True)
+    # trimesh does not check this, and numpy counts negative numbers from the end.
+    if not 0 <= used[0] <= used[-1] < len(vertices):
         raise ValueError("a face refers to a vertex that does not exist")
-    points, numbers = vertices[used].astype(float), numbers.reshape(-1, 3)
-    if place is None:
-        return Part(names, points, numbers)
-    # Without BLAS, whose sums may differ between machines.
-    points = points[:, :1] * place[:3, 0] + points[:, 1:2] * place[:3, 1] + points[:, 2:] * place[:3, 2] + place[:3, 3]
-    # Mirroring turns a surface inside out: reverse its faces.
-    return Part(names, points, numbers[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else numbers)
-
-
-def fans(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The triangles (M, 3) of polygons whose corners stand one after the other; `counts` are the corners of each."""
-    faces = np.maximum(counts - 2, 0)
-    first = np.repeat(np.cumsum(counts) - counts, faces)
-    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(faces) - faces, faces)
-    triangles: np.ndarray = corners[np.column_stack([first, second, second + 1])]
-    return triangles
-
-
-def strip(corners: np.ndarray) -> np.ndarray:
-    """The triangles (M, 3) of a strip; every second one runs the other way round."""
-    triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
-    triangles[1::2] = triangles[1::2, ::-1]
-    return triangles
+    if vertices.shape[1] != 3:
+        raise ValueError("a vertex has fewer than three numbers")
+    return Part(names, vertices[used], places.reshape(-1, 3))
 
 
 def chosen(parts: Sequence[Part], name: str) -> list[Part]:
@@ -79,9 +63,10 @@ def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
     if not parts:
         raise ValueError("has no triangles")
     check_count(sum(len(part.faces) for part in parts))
-    firsts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
-    faces = [part.faces + first for part, first in zip(parts, firsts, strict=True)]
-    return np.vstack([part.vertices for part in parts]), np.vstack(faces)
+    from trimesh.util import append_faces
+
+    vertices, faces = append_faces([part.vertices for part in parts], [part.faces for part in parts])
+    return vertices, faces
 
 
 def check_count(faces: int) -> None:
@@ -93,55 +78,67 @@ def check_count(faces: int) -> None:
 
 
 def read_obj(data: bytes) -> list[Part]:
-    """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises ValueError."""
+    """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises ValueError, IndexError."""
+    import trimesh
+
     check_count(data.count(b"\nf "))
-    vertices: list[list[float]] = []
-    polygons: dict[tuple[str, ...], list[list[int]]] = {}
+    text, names = _plain(data.decode("utf-8", errors="replace"))
+    scene = trimesh.load_scene(BytesIO(text.encode()), "obj", process=False, skip_materials=True, split_objects=True)
+    if not names:
+        return []
+    return parts_of((names[number], scene.geometry[str(number)]) for number in range(len(names)))
+
+
+def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
+    """An OBJ file with only vertices and faces, in objects called 0, 1, ..., and the original names of these objects.
+
+    trimesh silently misreads negative indices, the index 0, white space other than single blanks, and corners with and
+    without `/` in one object; and it joins the names of object and group.
+    """
+    vertices: list[str] = []
+    objects: dict[tuple[str, ...], list[str]] = {}
     name, group = "", ""
-    text = data.decode("utf-8", errors="replace")
     for line in text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
         word, *rest = line.partition("#")[0].split() or [""]
         if word == "v":
-            if len(rest) < 3:
-                raise ValueError("a vertex has fewer than three numbers")
-            vertices.append([float(number) for number in rest[:3]])
+            vertices.append("v " + " ".join(rest[:3]))
         elif word == "f" and len(rest) > 2:
-            corners = [_counted(corner.partition("/")[0], len(vertices)) for corner in rest]
+            heads = [corner.partition("/")[0] for corner in rest]
+            # Plain positive numbers, as almost all are, need no look at each.
+            digits = "".join(heads)
+            if not (digits.isascii() and digits.isdecimal() and all(heads)) or any(head[0] == "0" for head in heads):
+                heads = [str(_counted(head, len(vertices))) for head in heads]
+            corners = " ".join(heads)
             # Without objects, groups serve as objects.
-            polygons.setdefault((name, group) if name else (group,), []).append(corners)
+            objects.setdefault((name, group) if name else (group,), []).append("f " + corners)
         elif word == "o":
             name, group = " ".join(rest), ""
         elif word == "g":
             group = " ".join(rest)
-    points = np.array(vertices).reshape(-1, 3)
-    return [part(names, points, _triangles(each)) for names, each in polygons.items()]
-
-
-def _triangles(polygons: list[list[int]]) -> np.ndarray:
-    corners = np.array([corner for polygon in polygons for corner in polygon])
-    return fans(corners, np.array([len(polygon) for polygon in polygons]))
+    faces = [line for number, lines in enumerate(objects.values()) for line in (f"o {number}", *lines)]
+    return "\n".join([*vertices, *faces]), list(objects)
 
 
 def _counted(corner: str, vertices: int) -> int:
-    """The number from 0 of a corner's vertex; negative ones count back from the last of the `vertices` before the face."""
+    """The 1-based index of a corner's vertex; negative ones count back from the last of the `vertices` before the face."""
     number = int(corner)
-    counted = number - 1 if number > 0 else vertices + number
-    if number == 0 or counted < 0:
+    counted = number if number > 0 else vertices + 1 + number
+    if number == 0 or counted < 1:
         raise ValueError(f"a face refers to the vertex {number}, which does not exist")
     return counted
 
 
-# One triangle of a binary file: its normal, its corners, and two bytes of anything.
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-_STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
-
-
 def read_stl(data: bytes) -> list[Part]:
     """The triangles of a binary or ASCII file; STL has no units, so metres are assumed. Raises ValueError."""
-    count = int.from_bytes(data[80:84], "little")
-    if data.lstrip()[:5].lower() != b"solid" or len(data) == 84 + _STL.itemsize * count:
-        check_count(count)
-        points = np.frombuffer(data, _STL, count, 84)["corners"].reshape(-1, 3)
-    else:
-        points = np.array([[float(number) for number in found] for found in _STL_VERTEX.findall(data)]).reshape(-1, 3)
-    return [part((), points, np.arange(len(points)).reshape(-1, 3))]
+    import trimesh
+
+    end = 84 + 50 * int.from_bytes(data[80:84], "little")
+    if data.lstrip()[:5].lower() != b"solid":
+        # trimesh takes a binary file for text if it has trailing bytes.
+        check_count((end - 84) // 50)
+        data = data[: max(end, 84)]
+    elif len(data) != end:
+        # For names in other encodings, trimesh would need a library that guesses them.
+        data = data.decode("utf-8", errors="replace").encode()
+    scene = trimesh.load_scene(BytesIO(data), "stl", process=False)
+    return parts_of(((), mesh) for mesh in scene.geometry.values())

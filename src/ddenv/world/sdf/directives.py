@@ -21,7 +21,7 @@ from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.text import printable
 from ddenv.world.access import Missing, Unusable, not_yaml
-from ddenv.world.pose import Pose, vector
+from ddenv.world.pose import Pose
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import FARTHEST
 
@@ -143,11 +143,12 @@ class Source:
             return Pose.from_rpy(0.0, 0.0, 0.0, *map(math.radians, angles))
         if node.tag == "!AngleAxis":
             keys = self.keys(node, "!AngleAxis", ("*angle_deg", "*axis"))
-            angle, axis = math.radians(self.number(keys["angle_deg"])), self.numbers(keys["axis"], 3)
+            half, axis = math.radians(self.number(keys["angle_deg"])) / 2, self.numbers(keys["axis"], 3)
             length = math.hypot(*axis)
             if not 1e-9 < length < 1e9:
                 raise self.complain(node, "the axis has no usable length")
-            return Pose.about(vector(part / length for part in axis), angle)
+            x, y, z = (part / length * math.sin(half) for part in axis)
+            return Pose((0.0, 0.0, 0.0), (math.cos(half), x, y, z))
         if node.tag in ("!Identity", "tag:yaml.org,2002:map") and not node.value:
             return Pose()
         raise self.complain(node, f"expected a rotation !Rpy or !AngleAxis, found {node.tag[:40]}")

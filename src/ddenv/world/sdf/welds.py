@@ -6,6 +6,7 @@ welded to one that can move is one body with that, and so a part of it.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +16,7 @@ from yaml.nodes import Node
 
 from ddenv.schemas import nearest
 from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
-from ddenv.world.pose import HERE, Pose, vector
+from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.assemble import assemble
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.directives import WORLD, WORLD_INSTANCE, Directive, Source, Span, opened, spans_of
@@ -423,11 +424,13 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
                 node, f"{why} '{name[:80]}'" + ("" if joint else nearest(name[:80], list(joints)[:500]))
             )
         (at,) = source.numbers(node, 1)
+        x, y, z = joint.axis
         if joint.kind == "prismatic":
-            turns[joint.child] = at, Pose(vector(part * at for part in joint.axis))
+            turns[joint.child] = at, Pose((x * at, y * at, z * at))
         else:
-            there = Pose(joint.pose.position)
-            turns[joint.child] = at, there @ Pose.about(joint.axis, at) @ there.inverse()
+            sine, there = math.sin(at / 2), Pose(joint.pose.position)
+            turn = Pose((0.0, 0.0, 0.0), (math.cos(at / 2), x * sine, y * sine, z * sine))
+            turns[joint.child] = at, there @ turn @ there.inverse()
     if not turns:
         return model, {}
     parents = {joint.child: joint.parent for joint in model.joints}
