@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import math
 import re
 import shutil
 import socket
@@ -196,6 +197,10 @@ async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced
         # A test that is not there is told in words.
         await page.value("load(77)")
         await shows(page, "document.getElementById('trouble').textContent.includes('test 77 has not ended')")
+        # Its wheels turn as far as its way makes them roll, and the ghost's as far as its own.
+        wheel = "Math.abs(viewer.scene_tree.find(['world', '{}', 'wheel 0']).object.quaternion.y)"
+        assert await page.value(wheel.format("robot")) == pytest.approx(abs(math.sin(robot / 0.1651 / 2)), abs=0.01)
+        assert await page.value(wheel.format("ghost")) == pytest.approx(abs(math.sin(ghost / 0.1651 / 2)), abs=0.01)
         assert await page.value("forbidden") == []
         unnamed = "[...document.querySelectorAll('#play button, #play input, #play select')]"
         unnamed += (

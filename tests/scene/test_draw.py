@@ -17,6 +17,7 @@ from ddenv.scene.mesh import box, outline, paint, sphere
 from ddenv.scene.player import Player
 from ddenv.scene.shot import Shot, shot
 from ddenv.scene.stage import Stage
+from ddenv.scene.wheels import Wheels
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual, World
 from ddenv.world.pose import Pose
@@ -63,7 +64,7 @@ def screen() -> Screen:
 
 @pytest.fixture
 def scenery(screen, small_world) -> Scenery:
-    return Scenery(Stage(screen.take), small_world, ROBOT, small_world.elements())
+    return Scenery(Stage(screen.take), small_world, Wheels(ROBOT), small_world.elements())
 
 
 @pytest.fixture
@@ -203,7 +204,7 @@ def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen, play
 def test_a_large_world_is_a_few_objects(screen):
     still = [Model(f"m{number}", Pose((number, 0, 0)), True, (_boxed(number),), (), (), 1) for number in range(400)]
     world = World(ROOT, "large", b"", (0, 0, -9.8), tuple(still))
-    scenery = Scenery(Stage(screen.take), world, ROBOT, world.elements())
+    scenery = Scenery(Stage(screen.take), world, Wheels(ROBOT), world.elements())
     half = frozenset(f"m{number}" for number in range(200))
     scenery.show(Shot("start", None, half, frozenset(), frozenset(world.elements()) - half, ""))
     assert len(screen.things) < 20
@@ -244,7 +245,7 @@ def test_trail_sends_only_its_last_piece_again(screen, scenery):
 
 
 def test_each_link_at_a_joint_goes_its_own_way(screen, stage):
-    scenery = Scenery(stage, read_world(ARM / "world.dmd.yaml"), ROBOT, [])
+    scenery = Scenery(stage, read_world(ARM / "world.dmd.yaml"), Wheels(ROBOT), [])
     forearm = scenery.movers["arm::forearm"]
     start = scenery._first["arm::forearm"]
     assert f"/world/models/{forearm}/0" in screen.things

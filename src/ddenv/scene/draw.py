@@ -13,6 +13,7 @@ from ddenv.scene.colors import Color
 from ddenv.scene.mesh import Surface, edges_of, lines, merge, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
+from ddenv.scene.wheels import Wheels
 from ddenv.world.model import Model, Plane, World, is_ground, jointed_links
 from ddenv.world.pose import Pose, Vector
 
@@ -55,7 +56,8 @@ class Scenery:
     A browser takes some 10 ms for each object of its own.
     """
 
-    def __init__(self, stage: Stage, world: World, robot: Model, elements: Iterable[str]) -> None:
+    def __init__(self, stage: Stage, world: World, wheels: Wheels, elements: Iterable[str]) -> None:
+        """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
         self.scale = 1.0  # of lines, see `scale_of`
         self._first = {model.name: model.links[0].pose for model in world.models}
@@ -74,7 +76,8 @@ class Scenery:
         self.surface = merge(surfaces)
         self.ground = _ground(world)
         self._draw_ground()
-        self._lowest = self._draw_robot(robot)
+        self.wheels = wheels
+        self._lowest = self._draw_robot()
         # The lowest and the highest corner of each model.
         self._boxes = {
             model.name: (surface.vertices.min(axis=0), surface.vertices.max(axis=0))
@@ -107,9 +110,11 @@ class Scenery:
             ends = [self._edges[name] for name in sorted(names) if name in self._edges]
             yield (*group, "all"), lines(np.concatenate(ends), color) if ends else None
 
-    def place_robot(self, pose: Pose) -> None:
-        """Puts the robot's first link at `pose`."""
+    def place_robot(self, pose: Pose, turned: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Puts the robot's first link at `pose`, its left and right wheels `turned`, rad."""
         self._stage.move(ROBOT, pose, newest_only=True)
+        for wheel in self.wheels.all:
+            self._stage.move((*ROBOT, wheel.key), wheel.pose(turned), newest_only=True)
 
     def place_models(self, poses: Mapping[str, Pose]) -> None:
         """Puts the first links of these elements, and links at joints, at their poses, and all others where they start."""
@@ -217,14 +222,23 @@ class Scenery:
         grid = Surface(np.concatenate([across, across[:, [1, 0, 2]]]), mesh.EMPTY.faces).at(pose)
         self._stage.draw((*WORLD, "grid"), lines(grid.vertices, colors.GRID), shadow=False)
 
-    def _draw_robot(self, robot: Model) -> float:
-        """Returns the height of its lowest point in the frame of its first link, m."""
-        painted = [item.at(robot.links[0].pose.inverse()) for item in paint(robot)]
-        for part, item in enumerate(painted):
-            self._stage.draw((*ROBOT, str(part)), item.thing())
-            self._stage.draw((*GHOST, str(part)), plain(item, colors.GHOST, glow=0.2), shadow=False)
+    def _draw_robot(self) -> float:
+        body = self.wheels.body
+        to_first = body.links[0].pose.inverse()
+        pieces: list[tuple[Path, Pose, list[Surface]]] = [((), Pose(), [item.at(to_first) for item in paint(body)])]
+        pieces += [((wheel.key,), Pose(wheel.position), [wheel.painted]) for wheel in self.wheels.all]
+        lowest = 0.0
+        for place, pose, painted in pieces:
+            for part, item in enumerate(painted):
+                lowest = min(lowest, float(item.at(pose).vertices[:, 2].min()))
+                self._stage.draw((*ROBOT, *place, str(part)), item.thing())
+                ghost = plain(item, colors.GHOST, glow=0.2)
+                self._stage.draw((*GHOST, *place, str(part)), ghost, shadow=False)
+            if place:
+                self._stage.move((*ROBOT, *place), pose)
+                self._stage.move((*GHOST, *place), pose)
         self._stage.show(GHOST, False)
-        return min((float(item.vertices[:, 2].min()) for item in painted), default=0.0)
+        return lowest
 
 
 def _ground(world: World) -> Pose | None:

@@ -38,14 +38,24 @@ function put(object, rows, at) {
   object.quaternion.set(mix(4, side), mix(5, side), mix(6, side), mix(7, side)).normalize();
 }
 
+// A robot, and its wheels, which turn as its way makes them roll.
+function drive(name, run, at) {
+  put(node(name), run.robot, at);
+  const [low, high, part] = between(run.robot, at);
+  for (const { key, axis: [x, y, z], side } of run.wheels) {
+    const angle = (1 - part) * run.turned[low][side] + part * run.turned[high][side];
+    node(name, key).quaternion.setFromAxisAngle({ x, y, z }, angle);
+  }
+}
+
 const end = (run) => (run ? run.robot[run.robot.length - 1][0] : 0);
 const length = () => Math.max(end(play), end(ghost));
 
 function draw() {
   if (play) {
-    put(node("robot"), play.robot, time);
+    drive("robot", play, time);
     for (const [key, rows] of Object.entries(play.moving)) put(node("models", ...key.split("/")), rows, time);
-    if (ghost) put(node("ghost"), ghost.robot, time);
+    if (ghost) drive("ghost", ghost, time);
     place("time").value = time;
     const words = `${time.toFixed(1)} s of ${length().toFixed(1)} s`;
     if (place("clock").value !== words) {

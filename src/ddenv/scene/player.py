@@ -25,6 +25,7 @@ from ddenv.scene.camera import scale_of, set_up, view
 from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
 from ddenv.scene.shot import Shot, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
+from ddenv.scene.wheels import Wheels
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
 from ddenv.world.sdf.numbers import changed
@@ -46,7 +47,8 @@ class Player:
         self._position = Position(run.events)
         self._wanted = Wanted()
         self._elements = world.elements(frozenset(scenario.protected))
-        self._scenery = Scenery(stage, world, robot, self._elements)
+        wheels = Wheels(robot, scenario.robot.wheels, scenario.controller.skid)
+        self._scenery = Scenery(stage, world, wheels, self._elements)
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
         self._epsilon, self._timeout = scenario.failure.epsilon, scenario.failure.timeout
         self._shot: Shot | None = None
@@ -82,7 +84,8 @@ class Player:
         """A finished test for a browser: what is there, how it moves, and what the run file `lacks` of it, in sentences.
 
         `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
-        started. Raises UserError where the robot's way is missing or damaged.
+        started. `turned` has how far left and right wheels have turned at each row of the robot, rad, as its way makes them roll.
+        Raises UserError where the robot's way is missing or damaged.
         """
         shot, scenery = self._shot_of(test), self._scenery
         one = played(self._run, self._position, test)
@@ -98,6 +101,8 @@ class Player:
             "title": shot.title,
             "models": len(shot.models),
             "robot": [_row(row[0], pose_of(row[1:])) for row in one.robot],
+            "wheels": scenery.wheels.data(),
+            "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
             "moving": moving,
             "there": [key for name in sorted(shot.models) if (key := scenery.keys.get(name))],
             "gone": [key for name in sorted(shot.left_out | shot.removed) if (key := scenery.keys.get(name))],
@@ -202,7 +207,8 @@ class Player:
         pose = pose_of(row.pose)
         self._trail.append((row.time, *pose.position, *pose.quaternion))
         trail = np.array(self._trail)
-        self._scenery.place_robot(pose)
+        left, right = self._scenery.wheels.turned(trail)[-1].tolist()
+        self._scenery.place_robot(pose, (left, right))
         self._scenery.place_models({name: pose_of(values) for name, values in row.models.items()})
         self._scenery.trail(trail)
         self._caption(shot, f"{row.time:.1f} s of {self._timeout:g} s")

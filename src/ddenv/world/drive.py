@@ -1,4 +1,4 @@
-"""The drive of a wheeled robot: which joints are wheels, and how fast each must turn for a command."""
+"""The drive of a wheeled robot: which joints are wheels, how fast each must turn for a command, and how far each rolls on a way."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ddenv.world.model import (
     held_with,
     is_fixed,
 )
-from ddenv.world.pose import Vector
+from ddenv.world.pose import Pose, Vector
 from ddenv.world.scenario import Wheels
 
 # How much of a wheel's axis must point sideways: a swivel or a turret is no wheel.
@@ -110,6 +110,27 @@ def wheel_links(robot: Model, joint: Joint) -> list[Link]:
     """The links that a wheel's `joint` turns: its child, and all links that are fixed to it."""
     names = held_with(robot, joint.child)
     return [link for link in robot.links if link.name in names]
+
+
+def rolled(robot: Model, drive: Drive, skid: float, rows: Floats) -> Floats:
+    """How far the left and the right wheels have turned at each of `rows`, shape (N, 2), rad, positive forward.
+
+    A run records where the robot was, not how its wheels turned. This is worked out from its way, by the kinematics of a
+    skid-steer: it moves along its x axis without slip, and turns by `skid` of what its wheels command. Wheels that spin or slide
+    turn otherwise.
+    `rows` are the motion of the robot's first link, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz.
+    """
+    if len(rows) < 2:
+        return np.zeros((len(rows), 2))
+    to_model = robot.links[0].pose.inverse() @ robot.pose
+    ahead = np.array(
+        [Pose((0.0, 0.0, 0.0), tuple(row[4:8])).rotate(to_model.rotate((1.0, 0.0, 0.0))) for row in rows.tolist()]
+    )
+    between = (ahead[:-1] + ahead[1:]) / 2
+    moved = (np.diff(rows[:, 1:4], axis=0) * between).sum(axis=1)
+    sideways = np.diff(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))) * drive.track / skid / 2
+    turns = np.column_stack([moved - sideways, moved + sideways]) / drive.radius
+    return np.vstack([np.zeros(2), turns.cumsum(axis=0)])
 
 
 def footprint(robot: Model) -> tuple[float, float, float, float]:

@@ -12,7 +12,7 @@ from ddenv.errors import UserError
 from ddenv.robot.navigation.navigate import Straight
 from ddenv.robot.protocol import STOP, Estimate, Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.simulation.template import Template
-from ddenv.world.drive import find_drive, footprint
+from ddenv.world.drive import find_drive, footprint, rolled
 from ddenv.world.model import Box, Capsule, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Controller, Wheels
@@ -43,6 +43,26 @@ def test_wheel_speeds_of_a_skid_steered_turn(husky):
     # To turn at 1 rad/s where half of it is lost, the rims must differ by 2 rad/s times the track.
     assert right - left == pytest.approx(2 * 0.5708)
     assert right > 0 > left
+
+
+def way_of(*poses: tuple[float, float, float, float, float]) -> np.ndarray:
+    """Rows of a robot at x, y, z (m), yaw and pitch (rad), one a second."""
+    places = [Pose.from_rpy(x, y, z, 0.0, pitch, yaw) for x, y, z, yaw, pitch in poses]
+    return np.array([(float(time), *each.position, *each.quaternion) for time, each in enumerate(places)])
+
+
+def test_wheels_roll_as_far_as_the_way_makes_them(husky):
+    drive = find_drive(husky)
+    rise = math.radians(30)
+    # Along y and up a slope, then back down.
+    low, high = (0.0, 0.0, 0.0, math.pi / 2, -rise), (0.0, math.cos(rise), math.sin(rise), math.pi / 2, -rise)
+    up = way_of(low, high, low)
+    assert rolled(husky, drive, 0.5, up) == pytest.approx(np.array([[0, 0], [1, 1], [0, 0]]) / drive.radius)
+    # A turn on the spot to the left, through south, of which half is lost: the wheels do what they were commanded.
+    around = way_of((1, 2, 0, 3.0, 0), (1, 2, 0, 3.0 + 1.0, 0))
+    speeds = drive.wheel_speeds(Twist(0.0, 1.0), 0.5)
+    assert rolled(husky, drive, 0.5, around)[-1] == pytest.approx(speeds[:2])
+    assert rolled(husky, drive, 0.5, around[:1]).tolist() == [[0.0, 0.0]]
 
 
 def test_wheel_speeds_by_name(husky):

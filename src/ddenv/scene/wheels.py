@@ -1,0 +1,94 @@
+"""The robot's wheels, which turn as far as its way makes them roll."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ddenv.errors import UserError
+from ddenv.scene import mesh
+from ddenv.scene.mesh import Surface, paint
+from ddenv.world.drive import Drive, find_drive, rolled, turned_links, wheel_links
+from ddenv.world.model import Model
+from ddenv.world.pose import Pose, Vector, pose_of
+from ddenv.world.scenario import Wheels as Named
+
+# Spokes, so that a plain wheel is seen to turn: their width, as part of its radius, and how far they stand out of it, m.
+SPOKE, OUT = 0.12, 0.003
+SPOKE_COLOR = (0.75, 0.76, 0.78, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Wheel:
+    """A wheel: its name in the browser, what is drawn around its centre, and in the first link's frame its place and `axis`.
+
+    `side` is 0 on the left, 1 on the right. It turns about `axis` as it rolls forward.
+    """
+
+    key: str
+    painted: Surface
+    position: Vector
+    axis: Vector
+    side: int
+
+    def pose(self, turned: tuple[float, float]) -> Pose:
+        """Its pose in the first link's frame, once left and right wheels have `turned`, rad."""
+        half = turned[self.side] / 2
+        x, y, z = (math.sin(half) * part for part in self.axis)
+        return Pose(self.position, (math.cos(half), x, y, z))
+
+
+class Wheels:
+    """The wheels of a robot; none if it has no wheels on two sides, as a robot of another simulator may."""
+
+    def __init__(self, robot: Model, named: Named | None = None, skid: float = 1.0) -> None:
+        """`named` and `skid` are the scenario's wheels and the skid of its controller."""
+        self._robot, self._skid = robot, skid
+        self._drive: Drive | None = None
+        with suppress(UserError):
+            self._drive = find_drive(robot, named)
+        self.all = () if self._drive is None else tuple(self._made(self._drive))
+
+    @property
+    def body(self) -> Model:
+        """The robot without its wheels."""
+        turned = frozenset[str]() if self._drive is None else turned_links(self._robot, self._drive.joints)
+        return replace(self._robot, links=tuple(link for link in self._robot.links if link.name not in turned))
+
+    def turned(self, rows: np.ndarray) -> np.ndarray:
+        """How far left and right wheels have turned at each row of a motion, shape (N, 2), rad; see `rolled`."""
+        return np.zeros((len(rows), 2)) if self._drive is None else rolled(self._robot, self._drive, self._skid, rows)
+
+    def data(self) -> list[dict[str, Any]]:
+        return [{"key": each.key, "axis": list(each.axis), "side": each.side} for each in self.all]
+
+    def _made(self, drive: Drive) -> Iterator[Wheel]:
+        joints = {joint.name: joint for joint in self._robot.joints}
+        to_first = self._robot.links[0].pose.inverse()
+        for number, (name, left, sign) in enumerate(zip(drive.joints, drive.left, drive.signs, strict=True)):
+            joint = joints[name]
+            links = replace(self._robot, links=tuple(wheel_links(self._robot, joint)))
+            x, y, z = (sign * part for part in to_first.rotate(joint.axis))
+            place = (to_first @ joint.pose).position
+            to_wheel = Pose(place).inverse() @ to_first
+            wheel = mesh.merge([item.at(to_wheel) for item in paint(links)])
+            spokes = _spokes(wheel, np.array((x, y, z)), drive.radius).painted(SPOKE_COLOR)
+            whole = replace(mesh.merge([wheel, spokes]), alpha=1.0)
+            yield Wheel(f"wheel {number}", whole, place, (x, y, z), 0 if left else 1)
+
+
+def _spokes(wheel: Surface, axis: np.ndarray, radius: float) -> Surface:
+    """Two bars that cross on the axis, on both faces of a wheel around the origin."""
+    along = wheel.vertices @ axis if len(wheel.vertices) else np.zeros(1)
+    width, middle = float(np.ptp(along)) + 2 * OUT, float(along.min() + along.max()) / 2
+    # The shortest turn from y, along which the bars are made, to the axis.
+    x, y, z = axis.tolist()
+    turn = (1 + y, z, 0.0, -x) if y > -1 + 1e-9 else (0.0, 1.0, 0.0, 0.0)
+    at = pose_of((*(middle * axis), *turn))
+    sizes = (1.7 * radius, width, SPOKE * radius), (SPOKE * radius, width, 1.7 * radius)
+    return mesh.merge([mesh.box(size).at(at) for size in sizes])
