@@ -85,13 +85,13 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
 
 def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:
     """CPU time (s) of simulating a run with these wheel speeds."""
-    shared, period = template._context, template._clock.command_period
+    shared, period = template.context, template._clock.command_period
     built, context = shared.built, shared.plant_context
     present = keep | template._always
     kept = [body for name, body in built.moving.items() if name in present]
     template._sleeping = False
     try:
-        shared.presence.remove(template._names - present)
+        shared.presence.remove(template.names - present)
         with template._asleep(kept, present):
             motors = built.plant.get_desired_state_input_port(built.robot.instance)
             simulator = Simulator(built.diagram, shared.diagram_context)

@@ -4,6 +4,7 @@ import json
 
 import pytest
 import yaml
+from click import Context
 from docs import settings_table
 from pydantic import ValidationError
 
@@ -19,6 +20,10 @@ from tests.conftest import DATA
 
 EVERY = pytest.mark.parametrize("one", SETTINGS.values(), ids=SETTINGS.keys())
 WALL = yaml.safe_load((DATA / "wall.yaml").read_text())
+
+
+def parameters(command):
+    return app.get_command(Context(app), command).params
 
 
 def scenario(**reduction):
@@ -69,12 +74,12 @@ def test_a_scenario_takes_what_is_in_its_range(one):
 
 @EVERY
 def test_it_is_where_it_shows_and_nowhere_else(one):
-    options = {name for command in ("run", "test") for each in app.commands[command].params for name in each.opts}
+    options = {name for command in ("run", "test") for each in parameters(command) for name in each.opts}
     fields = {field.id for field in form.ALL} | {"algorithm", "pair"}
     assert (one.option in options) == (one.shown != "scenario") or not one.option
     assert (one.name in fields) == (one.shown in ("method", "basic", "more"))
     assert f"--{one.name.replace('_', '-')}" not in options or one.option
-    shown = [each for each in app.commands["run"].params if one.option in each.opts]
+    shown = [each for each in parameters("run") if one.option in each.opts]
     assert not one.option or shown[0].help.startswith(f"{one.summary[:1].upper()}{one.summary[1:]}")
 
 

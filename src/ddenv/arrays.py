@@ -10,5 +10,3 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Integers = NDArray[np.integer[Any]]
 Booleans = NDArray[np.bool_]
-# Names.
-Objects = NDArray[np.object_]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddenv.cli.share import CANNOT_SAY
+from ddenv.cli.terminal import CANNOT_SAY
 from ddenv.engine import single_test
 from tests.command import in_process
 

@@ -5,6 +5,7 @@ import shlex
 
 import click
 import pytest
+from click import Context
 
 from ddenv.cli.command_line import app
 from ddenv.schemas import OURS, names
@@ -81,9 +82,8 @@ def test_the_reference_has_the_defaults(key: str, section: type[Section]):
 
 @pytest.mark.parametrize("command", ["run", "test", "study"])
 def test_the_reference_names_every_option(command):
-    options = {
-        option for parameter in app.commands[command].params for option in parameter.opts if option.startswith("--")
-    }
+    parameters = app.get_command(Context(app), command).params
+    options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
     assert {option for option in options if f"`{option}" not in REFERENCE} == set()
 
 
@@ -106,8 +106,9 @@ COMMANDS = sorted({line for page in PAGES for line in COMMAND.findall(page.read_
 @pytest.mark.parametrize("line", COMMANDS)
 def test_the_commands_of_the_pages_exist_with_their_options(line):
     command, words = app, shlex.split(re.split(r" {2,}", line.strip())[0], comments=True)
-    while isinstance(command, click.Group) and words and words[0] in command.commands:
-        command = command.commands[words.pop(0)]
+    while isinstance(command, click.Group) and words and (named := command.get_command(Context(command), words[0])):
+        command = named
+        words.pop(0)
     assert command is not app, line
     options = {option for each in command.params for option in each.opts + each.secondary_opts}
     assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} - options == set()

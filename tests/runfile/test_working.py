@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from ddenv.runfile.fold import apply, fold, spent
+from ddenv.runfile.fold import apply, fold
+from ddenv.runfile.state import spent
 from ddenv.runfile.store import Recorded
 from tests.shorthand import typed
 from tests.workbench import fake_moments, fake_run

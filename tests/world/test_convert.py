@@ -88,7 +88,7 @@ def test_what_drake_refuses_in_the_original_is_written_so_that_it_loads(tmp_path
 
 def test_reading_what_was_written_gives_the_same_world(tmp_path):
     world = of_text(f"<model name='m'><pose>1 2 3 0.1 0.2 0.3</pose>{LINKS}{JOINTS}</model>", tmp_path)
-    again = parse_world(convert(world, "meshes").text, tmp_path / "clean.sdf")
+    again = parse_world(convert(world, "meshes")[0], tmp_path / "clean.sdf")
     assert again.notes == ()
     for link, twin in zip(world.models[0].links, again.models[0].links, strict=True):
         assert twin.pose.position == pytest.approx(link.pose.position, abs=1e-9)

@@ -102,12 +102,12 @@ class Simulation:
 
 
 def drive(parts: Parts, seed: int) -> Iterator[tuple[float, tuple[float, ...]]]:
-    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and ControllerFailed."""
+    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and BadCode."""
     scenario, world = parts.scenario, parts.world
     simulation, suite = Simulation(parts), SensorSuite(scenario.sensors, seed)
     setup = setup_of(parts.robot, parts.drive, parts.clock, scenario, seed)
-    controller, skid = controllers(scenario.controller, scenario.folder)(setup), scenario.controller.skid
-    autonomy = Autonomy(scenario.sensors, suite, parts.drive, skid, parts.clock, setup.start, controller)
+    controller = controllers(scenario.controller, scenario.folder)(setup)
+    autonomy = Autonomy(scenario, suite, parts.drive, parts.clock, controller)
     lidar = None
     if scenario.sensors.lidar is not None:
         names = frozenset(model.name for model in world.models)
@@ -130,7 +130,7 @@ def drive(parts: Parts, seed: int) -> Iterator[tuple[float, tuple[float, ...]]]:
         scan = lidar.scan(tick.time, pose, *simulation.links()) if tick.lidar and lidar else None
         autonomy.sense(tick, simulation.truth(), scan)
         if tick.command:
-            speeds = parts.drive.wheel_speeds(autonomy.command(tick), skid)
+            speeds = parts.drive.wheel_speeds(autonomy.command(tick), scenario.controller.skid)
     raise AssertionError("the clock's last tick ends every run")
 
 

@@ -10,6 +10,7 @@ import os
 import sys
 import traceback
 from difflib import get_close_matches
+from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
@@ -18,30 +19,39 @@ import click
 from click.shell_completion import CompletionItem
 
 from ddenv import __version__
-from ddenv.cli.explain import isolate_command, why_command
-from ddenv.cli.learn import learn_command
-from ddenv.cli.lists import config_command, doctor_command, runs_command, schemas_command
-from ddenv.cli.margins import margins_command
 from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
-from ddenv.cli.run import certify_command, resume_command, run_command
-from ddenv.cli.share import CANNOT_SAY, export_command, report_command, reproduce_command
-from ddenv.cli.study import study_command
-from ddenv.cli.terminal import announce
-from ddenv.cli.test import test_command
-from ddenv.cli.workbench import open_command, serve_command
-from ddenv.cli.world import world_group
+from ddenv.cli.terminal import CANNOT_SAY, announce
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+
+# The commands, and the file of each. Only that of the command that is used is loaded: the workbench is on the screen sooner.
+COMMANDS = {
+    **dict.fromkeys(("run", "resume", "certify"), "run"),
+    **dict.fromkeys(("open", "serve"), "workbench"),
+    **dict.fromkeys(("runs", "schemas", "config", "doctor"), "lists"),
+    **dict.fromkeys(("export", "reproduce", "report"), "share"),
+    **dict.fromkeys(("why", "isolate"), "explain"),
+    **{name: name for name in ("test", "margins", "learn", "study", "world")},
+}
 
 
 class Commands(click.Group):
     """The commands by name; any other first word is what `ddenv open` opens."""
 
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(f"ddenv.cli.{COMMANDS[cmd_name]}"), f"{cmd_name}_command")
+        return command
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         word = args[0]
-        if self.get_command(ctx, word) is not None or word.startswith("-"):
+        if word in COMMANDS or word.startswith("-"):
             return super().resolve_command(ctx, args)
         # While a line is typed, the shell only asks what can follow.
         if not ctx.resilient_parsing and not _can_be_opened(word):
@@ -49,7 +59,7 @@ class Commands(click.Group):
 
             known = [*self.list_commands(ctx), *bundled_names()]
             raise UserError(f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'")
-        return open_command.name, open_command, args
+        return "open", self.get_command(ctx, "open"), args
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands and options, and what can be opened."""
@@ -86,36 +96,12 @@ def app(context: click.Context, /, **reading: Any) -> None:
         raise UserError(f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ...")
 
 
-for command in (
-    run_command,
-    resume_command,
-    certify_command,
-    open_command,
-    runs_command,
-    test_command,
-    export_command,
-    reproduce_command,
-    report_command,
-    why_command,
-    isolate_command,
-    margins_command,
-    learn_command,
-    study_command,
-    schemas_command,
-    serve_command,
-    config_command,
-    doctor_command,
-    world_group,
-):
-    app.add_command(command)
-
-
 def main() -> None:
     # A terminal without a letter of a model's name shows its code instead.
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    answers = sys.argv[1:2] == [reproduce_command.name]
+    answers = sys.argv[1:2] == ["reproduce"]
     try:
         code = app(standalone_mode=False, prog_name="ddenv")
         sys.stdout.flush()

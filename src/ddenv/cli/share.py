@@ -10,13 +10,13 @@ import click
 
 from ddenv.cli import options
 from ddenv.cli.run import announce_needs
-from ddenv.cli.terminal import announce, asking, say_written
+from ddenv.cli.terminal import CANNOT_SAY, announce, asking, say_written
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
 from ddenv.text import percent
 
 # How `git bisect run` reads exit codes.
-FAILS, PASSES, CANNOT_SAY = 1, 0, 125
+FAILS, PASSES = 1, 0
 
 
 @click.command("report")

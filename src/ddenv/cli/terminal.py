@@ -11,6 +11,8 @@ import click
 
 from ddenv.text import printable, width
 
+# How `git bisect run` reads an exit code.
+CANNOT_SAY = 125
 # The minimum width for readable text, columns.
 LEAST = 8
 

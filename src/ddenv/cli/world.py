@@ -41,7 +41,7 @@ world_argument = together(
 
 
 @click.group("world")
-def world_group() -> None:
+def world_command() -> None:
     """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
 
 
@@ -67,7 +67,7 @@ def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
 # How a world was read: a table for people, plain data for programs.
 
 
-@world_group.command()
+@world_command.command()
 @world_argument
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def check(file: Path, as_json: bool, **reading: Any) -> int:
@@ -233,7 +233,7 @@ def _totals(world: World) -> str:
 # Its map.
 
 
-@world_group.command()
+@world_command.command()
 @world_argument
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
@@ -306,7 +306,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
 # Other worlds made from it.
 
 
-@world_group.command()
+@world_command.command()
 @world_argument
 @click.option(
     "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
@@ -319,7 +319,7 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
     return 0
 
 
-@world_group.command()
+@world_command.command()
 @world_argument
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from ddenv.evidence.claims import current, helping
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, NO_MODELS, Asked, Situation, Words, label_of, named, new_search
-from ddenv.runfile.events import deed
+from ddenv.runfile.deeds import deed
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.text import coordinates, count, printable, shortened
 

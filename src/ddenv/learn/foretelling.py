@@ -10,7 +10,8 @@ from typing import Any
 import yaml
 
 from ddenv.learn.lesson import Answer, Foretold, Question
-from ddenv.runfile.events import RoundStarted, TestFinished, TestStarted, deed
+from ddenv.runfile.deeds import deed
+from ddenv.runfile.events import RoundStarted, TestFinished, TestStarted
 from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, Test

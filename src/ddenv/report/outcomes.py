@@ -19,7 +19,7 @@ from ddenv.page.blocks import (
     thousands,
 )
 from ddenv.report.run_data import Record
-from ddenv.runfile.events import DEEDS
+from ddenv.runfile.deeds import DEEDS
 from ddenv.runfile.failures import OtherFailure, atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState

@@ -27,9 +27,8 @@ from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import margins, what_is_left, why
-from ddenv.runfile.events import deed
-from ddenv.runfile.fold import spent
-from ddenv.runfile.state import RunState
+from ddenv.runfile.deeds import deed
+from ddenv.runfile.state import RunState, spent
 from ddenv.text import as_sentence, coordinates, count, plain
 from ddenv.words.claims import ended, for_everyone
 from ddenv.world.access import write_file

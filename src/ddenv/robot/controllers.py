@@ -42,7 +42,7 @@ _brought: set[str] = set()
 def controllers(settings: Controller, folder: Path) -> Callable[[Setup], Drives]:
     """A function that makes the controller of a run.
 
-    Raises UserError as `load` does. A user's controller is guarded: its `step` raises only ControllerFailed.
+    Raises UserError as `load` does. A user's controller is guarded: its `step` raises only BadCode.
     """
     make = load(settings.use, folder)
     if settings.use in BUILT_IN:
@@ -126,8 +126,8 @@ SEEDS = 2**32
 OURS = Path(__file__).parent
 
 
-class ControllerFailed(Exception):
-    """A controller did something wrong. The text is one line: which controller, and what happened."""
+class BadCode(UserError):
+    """The user's code did something wrong. The text is one line: which code, and what happened."""
 
     def __init__(self, reason: str) -> None:
         line = plain(reason)
@@ -152,7 +152,7 @@ class Guarded:
         self.arrived = False
 
     def step(self, reading: Reading) -> Twist | WheelSpeeds:
-        """The command for the next period. Raises ControllerFailed."""
+        """The command for the next period. Raises BadCode."""
         if self._controller is None:
             # So that random numbers from the global generators are the same in each repetition of the run.
             random.seed(self._setup.seed)
@@ -167,35 +167,31 @@ class Guarded:
         return _command(answer, self._setup.joints)
 
     def _guarded(self, what: str, call: Callable[[Any], Any], given: Any) -> Any:
-        late = f"took longer than {self._seconds:g} s (controller.answer_within)"
-        try:
-            with redirect_stdout(sys.stderr):
-                return guarded(lambda: call_within(self._seconds, call, given), self._folder, late)
-        except BadCode as error:
-            raise ControllerFailed(f"controller {self._name}: {what} {error}") from None
-
-
-class BadCode(Exception):
-    """What the user's code did wrong."""
+        who, limit = f"controller {self._name}: {what}", f"{self._seconds:g} s (controller.answer_within)"
+        with redirect_stdout(sys.stderr):
+            return guarded(who, lambda: call_within(self._seconds, call, given), self._folder, limit)
 
 
 class WrongAnswer(Exception):
     """What is wrong with an answer of the user's code."""
 
 
-def guarded(call: Callable[[], Answer], folder: Path, late: str) -> Answer:
-    """Returns `call()`, which runs the user's code, with modules searched in `folder` first. Raises BadCode, `late` for TooLate."""
+def guarded(who: str, call: Callable[[], Answer], folder: Path, limit: str) -> Answer:
+    """Returns `call()`, which runs the user's code, with modules searched in `folder` first.
+
+    Raises BadCode, which begins with `who`, and for TooLate names the `limit`.
+    """
     try:
         with first_on_path(folder):
             return call()
     except TooLate:
-        problem = late
+        problem = f"took longer than {limit}"
     except WrongAnswer as error:
         problem = str(error)
     # The code may also exit, or interrupt itself.
     except BaseException as error:
         problem = f"raised {described(error)}"
-    raise BadCode(problem)
+    raise BadCode(f"{who} {problem}")
 
 
 def _command(answer: Any, joints: tuple[str, ...]) -> Twist | WheelSpeeds:

@@ -17,8 +17,6 @@ Answer = TypeVar("Answer")
 ALARM = 0.1
 # The minimum number of alarms before a call is too late. A process that is stopped gets one alarm for all that it missed.
 FEWEST = 10
-# The rest of an earlier timer that is already due, s.
-AT_ONCE = 1e-6
 
 
 class Stopwatch:
@@ -50,7 +48,7 @@ def call_within(seconds: float, call: Callable[[Given], Answer], given: Given) -
     """Returns `call(given)`. Raises TooLate if that takes longer than `seconds` of real time.
 
     The call is interrupted only in the main thread, where time in which the process is stopped does not count; in other threads,
-    and in native code, it ends when it ends. A timer and a handler of SIGALRM that were set before are restored.
+    and in native code, it ends when it ends. It uses SIGALRM: a timer of the code's own ends with the call.
     """
     if threading.current_thread() is threading.main_thread():
         return _interrupted(seconds, call, given)
@@ -71,21 +69,14 @@ def _interrupted(seconds: float, call: Callable[[Given], Answer], given: Given) 
         if alarms >= most and frame is not None and frame.f_code is not _interrupted.__code__:
             raise TooLate
 
-    # In this order neither alarm ever reaches the other's handler.
-    left, interval = signal.setitimer(signal.ITIMER_REAL, 0.0)
-    handler = signal.signal(signal.SIGALRM, count)
-    # A repeating timer that rings right now has nothing left.
-    left, started = left or interval, time.perf_counter()
+    signal.signal(signal.SIGALRM, count)
     computed = time.thread_time()
     signal.setitimer(signal.ITIMER_REAL, seconds / most, seconds / most)
     try:
         answer = call(given)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, signal.SIG_DFL if handler is None else handler)
-        if left:
-            passed = time.perf_counter() - started
-            signal.setitimer(signal.ITIMER_REAL, max(left - passed, AT_ONCE), interval)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
     # Alarms that ring during native code come as one, when it ends.
     if alarms >= most or time.thread_time() - computed > seconds:
         raise TooLate

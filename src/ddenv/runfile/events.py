@@ -6,40 +6,19 @@ from 1. A field with a default may be missing in a file. Times are in s, places 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, dataclass_transform
 
 from ddenv.environment import NOTHING
-from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Positive, Real, Seconds, Share
-from ddenv.text import coordinates, snake_case
+from ddenv.runfile.deeds import named
+from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Pose, Positive, Real, Seconds, Share
+from ddenv.text import snake_case
 
 Pair = tuple[Natural, Natural]
-Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
 Place = tuple[Real, Real, Real]
 Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "isolate")]
 Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]
 Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
-
-# What the robot did, by the `failure` of a test. Any other `failure` says why the simulation broke.
-DEEDS = {
-    "stuck": "got stuck",
-    "tipped over": "tipped over",
-    "fell": "fell",
-    "lost": "was lost",
-    "out of time": "ran out of time",
-}
-
-
-def deed(failure: str) -> str:
-    """What the robot did, such as "tipped over"; "failed" if nothing more is known."""
-    return DEEDS.get(failure, "failed")
-
-
-def named(kinds: Sequence[str], position: Sequence[float]) -> str:
-    """A failure in words, such as "stuck at (5.42, -0.56)"."""
-    how = " or ".join(kind if kind in DEEDS else "failed" for kind in kinds) or "failed"
-    return f"{how} at ({coordinates(position[:2])})"
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))

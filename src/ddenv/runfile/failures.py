@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
-from ddenv.runfile.events import Place, named
+from ddenv.runfile.deeds import named
+from ddenv.runfile.events import Place
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 

@@ -19,7 +19,7 @@ from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_mo
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, PastRound, Point
-from ddenv.runfile.state import Candidate, Round, RunState, Split
+from ddenv.runfile.state import Candidate, Round, RunState, Split, spent
 from ddenv.runfile.store import Recorded
 from ddenv.text import count
 
@@ -150,11 +150,6 @@ def paused(state: RunState, _: e.Paused, __: float) -> Changes:
 def resumed(state: RunState, _: e.Resumed, __: float) -> Changes:
     working = "baseline" if state.baseline is None else "running"
     return {"paused": False, "status": working if state.status == "paused" else state.status}
-
-
-def spent(state: RunState, until: float) -> float:
-    """The time that engines have worked until Unix time `until`, s."""
-    return state.working_seconds + (0.0 if state.started_at is None else max(0.0, until - state.started_at))
 
 
 def _stopped(state: RunState, at: float) -> Changes:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ddenv.environment import Environment
-from ddenv.runfile import events as e
 from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.text import count, first_of, plain, truncated
+
+if TYPE_CHECKING:
+    from ddenv.runfile import events as e
 
 # Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40

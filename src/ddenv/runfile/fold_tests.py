@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ddenv.runfile import events as e
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, Point, Removal
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunState, Test, Trial
+
+if TYPE_CHECKING:
+    from ddenv.runfile import events as e
 
 # The fields of the state that an event changes, with their new values.
 Changes = dict[str, Any]
@@ -156,6 +158,8 @@ def counts(state: RunState, before: Test | None, after: Test) -> Changes:
 
 def rested_upon(before: RunState, event: e.Event) -> Changes:
     """After a verdict decisions rest on its tests, whatever the number of workers."""
+    from ddenv.runfile import events as e
+
     if not isinstance(event, e.CandidateJudged | e.TrialJudged | e.CertificateFinished | e.RateLost):
         return {}
     new = [test for test in dict.fromkeys(event.tests) if not before.rests_on >> test & 1]

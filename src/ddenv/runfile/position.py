@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Literal, get_args
 
-from ddenv.runfile.fold import steps
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded
 
@@ -99,6 +98,8 @@ class Position:
 
     def catch_up(self) -> None:
         """Reads and notes all new events. Raises UserError for an invalid one."""
+        from ddenv.runfile.fold import steps
+
         for event, before, after in steps(self._read(self.end.revision, -1), self.end):
             self.note(event.kind, before, after)
 
@@ -143,6 +144,8 @@ class Position:
 
     def moment(self, id: int) -> Moment | None:
         """The last event up to `id`; None if there is none."""
+        from ddenv.runfile.fold import steps
+
         place = bisect_right(self._ids, id) - 1
         if place <= 0:
             return None

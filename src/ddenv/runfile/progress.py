@@ -6,17 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.events import (
-    EngineStarted,
-    IsolationStarted,
-    MarginImpossible,
-    MarginRan,
-    MarginsStarted,
-    NumberAsked,
-)
+
+if TYPE_CHECKING:
+    from ddenv.runfile import events as e
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +220,7 @@ class Isolation:
     gave it up, or ended it by another decision.
     """
 
-    asked: IsolationStarted
+    asked: e.IsolationStarted
     checks: tuple[Check, ...] = ()
     ended: bool = False
     found: int | None = None
@@ -236,7 +231,7 @@ class Isolation:
 class NumberTried:
     """A number whose values are tried where f shows at `rate`; each verdict is wrong with a probability of at most `error`."""
 
-    asked: NumberAsked
+    asked: e.NumberAsked
     rate: float
     error: float
 
@@ -249,12 +244,12 @@ class Margins:
     search is over; `broken_off`: a decision of the user ended it.
     """
 
-    asked: MarginsStarted
+    asked: e.MarginsStarted
     numbers: tuple[NumberTried, ...]
     before_call: int = 0
     earlier: int = 0
-    runs: tuple[MarginRan, ...] = ()
-    impossible: tuple[MarginImpossible, ...] = ()
+    runs: tuple[e.MarginRan, ...] = ()
+    impossible: tuple[e.MarginImpossible, ...] = ()
     ended: bool = False
     broken_off: bool = False
 
@@ -283,7 +278,7 @@ class Physics:
     proven: str = ""
     mixed: tuple[str, ...] = ()
 
-    def started(self, engine: EngineStarted, tests: int) -> Physics:
+    def started(self, engine: e.EngineStarted, tests: int) -> Physics:
         """After the start of an engine, when `tests` tests were finished."""
         words = (f"ddenv {engine.version}", engine.simulator, engine.machine)
         now = ", ".join(each for each in words if each)

@@ -22,6 +22,7 @@ Seconds = Annotated[float, Interval(ge=0, le=LARGEST)]
 Share = Annotated[float, Interval(ge=0, le=1)]
 Positive = Annotated[float, Interval(ge=1e-12, le=LARGEST)]
 Part = Annotated[float, Interval(ge=1e-9, le=1)]
+Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
 
 
 class Invalid(ValueError):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ddenv.runfile.state import Candidate, RunState, Test
-from ddenv.runfile.store import Live
+
+if TYPE_CHECKING:
+    from ddenv.runfile.store import Live
 
 EngineIs = Literal["alive", "starting", "absent"]
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.events import BaselineFinished, Forecast, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import (
     Certificate,
@@ -23,6 +22,9 @@ from ddenv.runfile.progress import (
     Removal,
     path,
 )
+
+if TYPE_CHECKING:
+    from ddenv.runfile.events import BaselineFinished, Forecast, Place
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]
@@ -446,6 +448,11 @@ class Test:
     def is_deflake_run(self) -> bool:
         """Whether it is a finished re-run of a candidate."""
         return self.phase == "round" and self.run > 0 and self.is_finished
+
+
+def spent(state: RunState, until: float) -> float:
+    """The time that engines have worked until Unix time `until`, s."""
+    return state.working_seconds + (0.0 if state.started_at is None else max(0.0, until - state.started_at))
 
 
 def partition_letter(index: int) -> str:

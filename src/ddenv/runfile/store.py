@@ -17,12 +17,15 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import KINDS, NAMES, Created, Event, Implied, Pose, TestFinished
 from ddenv.runfile.lock import engine_lock
-from ddenv.runfile.reading import LARGEST, Invalid, Real, plain, read
+from ddenv.runfile.reading import LARGEST, Invalid, Pose, Real, plain, read
+
+# The classes of events are loaded with the first event that is read: a screen is shown before.
+if TYPE_CHECKING:
+    from ddenv.runfile.events import Created, Event
 
 APPLICATION_ID = 0x64644531
 # The format of the file. Those before the oldest one are refused; 8 has the bounds of certificates.
@@ -64,6 +67,8 @@ class Recorded:
     @property
     def kind(self) -> str:
         """The name of its kind in the file."""
+        from ddenv.runfile.events import NAMES
+
         return NAMES[type(self.event)]
 
     @property
@@ -310,6 +315,8 @@ class RunFile:
                     raise
 
     def _append(self, event: Event, motions: Motions | None, command: int | None, number: int | None) -> Recorded:
+        from ddenv.runfile.events import Implied, TestFinished
+
         new = Recorded(0, time.time(), event, command)
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
@@ -376,6 +383,8 @@ class RunFile:
 
 def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
     """A row of the event table. Raises UserError, with what is wrong where."""
+    from ddenv.runfile.events import KINDS
+
     try:
         content = _object(id, data)
         command = content.pop("command", None)

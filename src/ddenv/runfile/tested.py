@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ddenv.runfile.events import CandidateJudged, Implied, OfCandidate, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import CERTIFY, Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import stack_with
@@ -66,6 +65,8 @@ def adoptable(state: RunState) -> Trial | None:
 
 def told(moment: Moment) -> Test | None:
     """The test whose end a moment tells: the one that ended in it, or the last one of a candidate that was judged."""
+    from ddenv.runfile.events import CandidateJudged, Implied, TestFinished
+
     state, event = moment.after, moment.recorded.event
     if isinstance(event, TestFinished | Implied):
         return state.tests[event.test - 1]
@@ -75,6 +76,8 @@ def told(moment: Moment) -> Test | None:
 
 def pointed(moment: Moment) -> Candidate | None:
     """The candidate that a moment is about; None if it is about none."""
+    from ddenv.runfile.events import Implied, OfCandidate, TestFinished, TestLost, TestStarted
+
     state, event = moment.after, moment.recorded.event
     if state.round is None:
         return None

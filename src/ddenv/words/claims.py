@@ -17,7 +17,7 @@ from ddenv.evidence.claims import (
     never_left_out,
     so_far,
 )
-from ddenv.runfile.events import deed
+from ddenv.runfile.deeds import deed
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState, Trial

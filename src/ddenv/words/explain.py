@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, failing_instead, helping
-from ddenv.runfile.events import DEEDS, deed
+from ddenv.runfile.deeds import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot

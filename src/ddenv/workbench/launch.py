@@ -27,8 +27,9 @@ def run_workbench(
     first: ShowLessons | ShowLesson | ShowRace | None = None,
 ) -> int:
     """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
-    # With the usual ones the slowest keys take twice as long.
+    # With the usual ones the slowest keys take twice as long. There is no garbage yet: the app begins to look for it.
     gc.set_threshold(20_000, 20, 20)
+    gc.disable()
     from ddenv.workbench.app import Workbench
     from ddenv.workbench.config import read_config
     from ddenv.workbench.terminal.themes import fitting

@@ -65,12 +65,9 @@ class Drive:
     def wheel_speeds(self, command: Twist | WheelSpeeds, skid: float) -> Floats:
         """The joint velocities (N,) of all wheels, rad/s.
 
-        `skid` is the ratio of the robot's turn rate to the one its wheels command. Raises ValueError for an unknown wheel.
+        `skid` is the ratio of the robot's turn rate to the one its wheels command.
         """
         if isinstance(command, WheelSpeeds):
-            unknown = set(command.speeds) - set(self.joints)
-            if unknown:
-                raise ValueError(f"'{min(unknown)}' is not a wheel; wheels are {', '.join(self.joints)}")
             return np.asarray(np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs)
         difference = command.turn_rate / skid * self.track / 2
         left, right = (command.speed - difference) / self.radius, (command.speed + difference) / self.radius
@@ -107,11 +104,6 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
         track=track,
         signs=tuple(1.0 if part > 0 else -1.0 for part in across),
     )
-
-
-def turned_links(robot: Model, joints: tuple[str, ...]) -> frozenset[str]:
-    """The names of the links that `joints` turn: their child links, and all links that are fixed to those."""
-    return frozenset(link.name for joint in robot.joints if joint.name in joints for link in wheel_links(robot, joint))
 
 
 def wheel_links(robot: Model, joint: Joint) -> list[Link]:

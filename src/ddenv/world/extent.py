@@ -23,7 +23,7 @@ from ddenv.world.model import (
     Sphere,
     World,
 )
-from ddenv.world.pose import HERE, Pose, Vector
+from ddenv.world.pose import HERE, Pose, Vector, vector
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -129,8 +129,7 @@ def center(model: Model) -> Vector:
     box = model_bounds(model)
     if box is None:
         return model.pose.position
-    x, y, z = ((box[0] + box[1]) / 2).tolist()
-    return x, y, z
+    return vector((box[0] + box[1]) / 2)
 
 
 def model_bounds(model: Model) -> Bounds | None:
@@ -174,11 +173,8 @@ BEYOND = 20.0  # minimum width of ground beyond all models, m
 
 def corners(world: World) -> tuple[Vector, Vector] | None:
     """The lowest and the highest corner of the box around all models, m; None if there are none."""
-    box = around(each for model in world.models if (each := model_bounds(model)) is not None)
-    if box is None:
-        return None
-    (x, y, z), (right, back, top) = box[0].tolist(), box[1].tolist()
-    return (x, y, z), (right, back, top)
+    box = bounds(one for model in world.models for one in model.collisions)
+    return None if box is None else (vector(box[0]), vector(box[1]))
 
 
 def with_ground_boxes(world: World, box: tuple[Vector, Vector] | None, places: Iterable[Vector] = ()) -> World:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -63,31 +62,27 @@ def without(world: World, removed: frozenset[str]) -> bytes:
     return b"".join(kept)
 
 
-@dataclass
-class Converted:
-    """`text` is the world's SDF; `meshes` are the meshes it refers to, with the relative paths of their OBJ files in `folder`."""
-
-    folder: str
-    text: bytes = b""
-    meshes: dict[Mesh, str] = field(default_factory=dict)
-
-    def file(self, mesh: Mesh) -> str:
-        return self.meshes.setdefault(mesh, f"{self.folder}/mesh_{len(self.meshes) + 1}.obj")
+# Gives a mesh the relative path of its file.
+Files = Callable[[Mesh], str]
 
 
-def convert(world: World, mesh_folder: str) -> Converted:
-    """`world` as SDF 1.9, its meshes in the folder `mesh_folder` beside it."""
-    out = Converted(mesh_folder)
+def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
+    """`world` as SDF 1.9, and its meshes by the relative paths of their OBJ files, which lie in the folder `mesh_folder`."""
+    names: dict[Mesh, str] = {}
+
+    def file(mesh: Mesh) -> str:
+        return names.setdefault(mesh, f"{mesh_folder}/mesh_{len(names) + 1}.obj")
+
     ElementTree.register_namespace("drake", DRAKE)
     root = Element("sdf", version="1.9")
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
-    names = _unique(model.name for model in world.models)
-    for name, model in zip(names, with_ground_boxes(world, corners(world)).models, strict=True):
-        _model(inside, name, model, out)
+    unique = _unique(model.name for model in world.models)
+    for name, model in zip(unique, with_ground_boxes(world, corners(world)).models, strict=True):
+        _model(inside, name, model, file)
     ElementTree.indent(root)
-    out.text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    return out
+    text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    return text, {name: mesh for mesh, name in names.items()}
 
 
 def write_converted(world: World, path: Path) -> list[Path]:
@@ -95,19 +90,19 @@ def write_converted(world: World, path: Path) -> list[Path]:
     if path.resolve() == world.path.resolve():
         raise UserError(f"{path}: is the world itself; choose another file")
     folder = path.with_name(f"{path.stem}_meshes")
-    converted = convert(world, folder.name)
-    if converted.meshes:
+    text, meshes = convert(world, folder.name)
+    if meshes:
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:
             raise UserError(f"{folder}: cannot be created: {error.strerror}") from None
-    files = {path.parent / name: obj(mesh) for mesh, name in converted.meshes.items()} | {path: converted.text}
+    files = {path.parent / name: obj(mesh) for name, mesh in meshes.items()} | {path: text}
     for file, content in files.items():
         write_file(file, content)
     return list(files)
 
 
-def _model(parent: Element, name: str, model: Model, out: Converted) -> None:
+def _model(parent: Element, name: str, model: Model, file: Files) -> None:
     element = SubElement(parent, "model", name=name)
     if model.static:
         SubElement(element, "static").text = "true"
@@ -116,14 +111,14 @@ def _model(parent: Element, name: str, model: Model, out: Converted) -> None:
     _pose(element, model.pose)
     names = dict(zip((link.name for link in model.links), _unique(link.name for link in model.links), strict=True))
     for link in model.links:
-        _link(element, names[link.name], link, model, out)
+        _link(element, names[link.name], link, model, file)
     joint_names = _unique((joint.name for joint in model.joints), taken=names.values())
     poses = {link.name: link.pose for link in model.links}
     for joint_name, joint in zip(joint_names, model.joints, strict=True):
         _joint(element, joint_name, joint, model, poses[joint.child], names)
 
 
-def _link(parent: Element, name: str, link: Link, model: Model, out: Converted) -> None:
+def _link(parent: Element, name: str, link: Link, model: Model, file: Files) -> None:
     element = SubElement(parent, "link", name=name)
     _pose(element, model.pose.inverse() @ link.pose)
     if not model.gravity:
@@ -133,13 +128,13 @@ def _link(parent: Element, name: str, link: Link, model: Model, out: Converted) 
     back = link.pose.inverse()
     shown: tuple[Collision | Visual, ...] = (*link.collisions, *link.visuals)
     for one, own in zip(shown, _unique(one.name for one in shown), strict=True):
-        _shown(element, own, one, back, out)
+        _shown(element, own, one, back, file)
 
 
-def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, out: Converted) -> None:
+def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file: Files) -> None:
     element = SubElement(parent, "collision" if isinstance(one, Collision) else "visual", name=name)
     _pose(element, back @ one.pose)
-    _geometry(element, one.shape, out)
+    _geometry(element, one.shape, file)
     if isinstance(one, Collision):
         friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
         for tag in ("mu", "mu2"):
@@ -150,7 +145,7 @@ def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, out:
             SubElement(material, tag).text = _numbers(one.color)
 
 
-def _geometry(parent: Element, shape: Shape, out: Converted) -> None:
+def _geometry(parent: Element, shape: Shape, file: Files) -> None:
     geometry = SubElement(parent, "geometry")
     if not isinstance(shape, Mesh):
         kind, sizes = primitive(shape)
@@ -159,7 +154,7 @@ def _geometry(parent: Element, shape: Shape, out: Converted) -> None:
             SubElement(element, name).text = _numbers(values)
         return
     element = SubElement(geometry, "mesh")
-    SubElement(element, "uri").text = out.file(shape)
+    SubElement(element, "uri").text = file(shape)
     if parent.tag == "collision":
         SubElement(element, f"{{{DRAKE}}}declare_convex")
 

@@ -47,7 +47,7 @@ def variants(world, husky, scenario, monkeypatch) -> Callable[[float], Variants]
 
 def still(variants: Variants) -> int:
     """How many models that never move are in the plant."""
-    return len(variants._whole._context.built.static)
+    return len(variants._whole.context.built.static)
 
 
 def test_every_bit_is_the_same_in_a_small_region_in_a_large_one_and_with_everything(variants, world):
@@ -88,9 +88,9 @@ def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
     for width, results in ((EVERYTHING, expected), (4.0, found)):
         variants(width)
         one = Variants(world, husky, scenario)
-        assert ("stop" in one._whole._context.built.static) is (width == EVERYTHING)
+        assert ("stop" in one._whole.context.built.static) is (width == EVERYTHING)
         results += [all_bits(one.run(frozenset(keep), 1)) for keep in (["ramp", "slides", "stop"], ["ramp", "slides"])]
-        assert "stop" in one._whole._context.built.static
+        assert "stop" in one._whole.context.built.static
     assert found == expected
     assert expected[0][3] != expected[1][3]
 
@@ -105,13 +105,13 @@ def test_what_rests_on_what_is_found_where_a_pile_leaves_the_region(variants, wo
 
 def test_a_small_world_is_in_the_plant_as_a_whole(world, husky, scenario):
     template = Template(world, husky, scenario)
-    assert template._context.region is None
-    assert len(template._context.built.static) == len(world.models)
+    assert template.context.region is None
+    assert len(template.context.built.static) == len(world.models)
 
 
 def test_a_region_has_what_its_edge_cuts_and_all_that_has_no_end(variants, world, add, husky, scenario):
     variants(2.0)
     edge = cube("edge", 5.0, 2.1, mass=None), cube("outside", 5.0, 2.3, mass=None)
-    static = Variants(add(world, *edge), husky, scenario)._whole._context.built.static
+    static = Variants(add(world, *edge), husky, scenario)._whole.context.built.static
     assert {"ground", "edge", "wall", "shelf"} <= static.keys()
     assert "outside" not in static

@@ -32,7 +32,7 @@ class Pressed(Loads):
 @pytest.fixture
 def loads(world_of, add, husky, scenario_of):
     board = model_of("board", link_of("link", Box((0.9, 0.1, 0.04)), Pose((3.0, 0.0, 0.02)), MASS))
-    context = Template(add(world_of(), board), husky, scenario_of())._context
+    context = Template(add(world_of(), board), husky, scenario_of()).context
     loads = Pressed(context, list(context.built.moving.values()))
     loads.lie_down()
     return loads

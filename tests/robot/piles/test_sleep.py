@@ -193,8 +193,8 @@ def test_what_is_asleep_or_removed_stands_on_its_joint_like_a_pencil_on_its_tip(
         model_of("pencil", pole, head, joints=(hinge, ball)), failure={"timeout": 12.0}, goal={"x": 90, "y": 0}
     )
     assert run(pencil).outcome == "failed"
-    entries = pencil._context.hold.entries(pencil._context.built.moving.values())
-    assert (pencil._context.hold.state() == pencil._context.hold.start)[entries].all()
+    entries = pencil.context.hold.entries(pencil.context.built.moving.values())
+    assert (pencil.context.hold.state() == pencil.context.hold.start)[entries].all()
 
 
 def test_a_door_at_rest_opens_when_the_robot_runs_into_it(template):

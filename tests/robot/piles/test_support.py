@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ddenv.robot.piles import rehearsal
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.template import Variants
 from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
 from tests.conftest import ROOT
@@ -27,18 +27,18 @@ def plank(name: str, x: float, y: float, z: float, length: float) -> Model:
 
 
 @pytest.fixture
-def template(husky, scenario_of):
-    def make(world: World, **sections: object) -> Template:
-        return Template(world, husky, scenario_of(**SECTIONS | sections))
+def simulator(husky, scenario_of):
+    def make(world: World, **sections: object) -> Variants:
+        return Variants(world, husky, scenario_of(**SECTIONS | sections))
 
     return make
 
 
-def pairs(template: Template, world: World, *protected: str) -> list[tuple[str, str]]:
-    return template(world, protected=protected).supports(frozenset(world.elements(frozenset(protected))))
+def pairs(simulator: Variants, world: World, *protected: str) -> list[tuple[str, str]]:
+    return simulator(world, protected=protected).supports(frozenset(world.elements(frozenset(protected))))
 
 
-def test_each_model_rests_on_what_carries_it_after_it_has_fallen(template, world_of, add):
+def test_each_model_rests_on_what_carries_it_after_it_has_fallen(simulator, world_of, add):
     world = add(
         world_of(SHELF),
         # It falls onto the shelf, and a second one onto the first; the third lands on the ground beside them.
@@ -54,48 +54,48 @@ def test_each_model_rests_on_what_carries_it_after_it_has_fallen(template, world
         plank("plank", 4.0, 3.5, 0.33, 1.3),
     )
     expected = [("cup", "shelf"), ("lid", "cup"), ("over", "under"), ("plank", "left"), ("plank", "right")]
-    assert pairs(template, world) == expected
+    assert pairs(simulator, world) == expected
     # What always stays is skipped: what lies on it rests on what carries it.
-    assert pairs(template, world, "cup")[0] == ("lid", "shelf")
+    assert pairs(simulator, world, "cup")[0] == ("lid", "shelf")
 
 
-def test_what_stands_beside_something_does_not_rest_on_it(template, world_of, add):
+def test_what_stands_beside_something_does_not_rest_on_it(simulator, world_of, add):
     world = add(world_of(box_model("wall", "1 3.35 0.5 0 0 0", "1 0.4 1")), ball("ball", 1.0, 2.95, 0.2))
-    assert pairs(template, world) == []
+    assert pairs(simulator, world) == []
 
 
 @pytest.mark.rates
-def test_what_rolls_onto_another_pile_rests_on_it(template, world_of, add):
+def test_what_rolls_onto_another_pile_rests_on_it(simulator, world_of, add):
     ramp = model_of("ramp", link_of("link", wedge(1.0, 1.0, 0.3), Pose((2.0, 6.0, 0.45)), mass=None))
     tray = [cube(f"tray_{side}", 0.6, 6.0 + side, 0.15) for side in (-1, 1)]
     bottom = model_of("bottom", link_of("link", Box((1.2, 2.5, 0.05)), Pose((0.75, 6.0, 0.33)), mass=20.0))
     stop = model_of("stop", link_of("link", Box((0.1, 2.5, 1.0)), Pose((0.2, 6.0, 0.9)), mass=None))
     world = add(world_of(), ball("ball", 2.3, 6.0, 0.85), ramp, *tray, bottom, stop)
-    assert ("ball", "bottom") in pairs(template, world)
+    assert ("ball", "bottom") in pairs(simulator, world)
 
 
 @pytest.mark.rates
-def test_finding_it_leaves_no_trace_in_the_next_run(template, world_of, add):
+def test_finding_it_leaves_no_trace_in_the_next_run(simulator, world_of, add):
     world = add(world_of(SHELF), cube("cup", 1.0, 3.0, 1.2), cube("near", 1.2, 0.0, 0.15), cube("over", 1.2, 0.0, 0.5))
     names = world.elements()
-    fresh, used = template(world), template(world)
+    fresh, used = simulator(world), simulator(world)
     for keep in (names, names[1:]):
         expected = bits(run(fresh, *keep))
         assert used.supports(frozenset(names)) == [("cup", "shelf"), ("over", "near")]
         assert bits(run(used, *keep)) == expected
 
 
-def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(template, world_of, add, monkeypatch):
+def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(simulator, world_of, add, monkeypatch):
     def broken(*_: object) -> None:
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(rehearsal.Simulator, "AdvanceTo", broken)
-    assert pairs(template, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [("cup", "shelf")]
+    assert pairs(simulator, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [("cup", "shelf")]
 
 
 @pytest.mark.rates
 @pytest.mark.skipif(not REAL.exists(), reason="the real worlds are not here")
-def test_a_block_of_a_real_world_lies_on_its_asphalt(template):
+def test_a_block_of_a_real_world_lies_on_its_asphalt(simulator):
     from ddenv.world.sdf.read import read_world
 
-    assert pairs(template, read_world(Path(REAL))) == [("cinder_block", "asphalt_plane_clone")]
+    assert pairs(simulator, read_world(Path(REAL))) == [("cinder_block", "asphalt_plane_clone")]

@@ -209,7 +209,7 @@ def test_contacts_that_cannot_be_worked_out_are_the_next_steps_to_report(world_o
     before = run(template, "wall")
 
     def poison(_time: float, pose: tuple[float, ...], _models: object) -> None:
-        state = template._context.plant_context.get_mutable_discrete_state_vector()
+        state = template.context.plant_context.get_mutable_discrete_state_vector()
         if pose[0] > 0.75:
             state.SetFromVector(np.full(state.size(), np.nan))
 

@@ -117,7 +117,7 @@ def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, h
 
     def poison(time_s: float, *_: object) -> None:
         if time_s > 0.45:
-            state = template._context.plant_context.get_mutable_discrete_state_vector()
+            state = template.context.plant_context.get_mutable_discrete_state_vector()
             state.SetFromVector(np.full(state.size(), np.nan))
 
     broken = template.run(NOTHING, 1, poison)

@@ -158,5 +158,3 @@ def test_the_floor_is_that_of_the_whole_world(world_of, husky, scenario_of, box)
 def test_unknown_models_are_refused(cubes, husky, scenario):
     with pytest.raises(ValueError, match="no such model: e"):
         Variants(cubes, husky, scenario).run(frozenset({"e"}), 1)
-    with pytest.raises(ValueError, match="cannot be left out: ground"):
-        Template(cubes, husky, scenario).without(frozenset({"ground"}))

@@ -290,7 +290,7 @@ def test_only_files_that_changed_are_read_again(several, runs, monkeypatch):
     folder = RunsFolder(runs)
     first = folder.look()
     opened = []
-    monkeypatch.setattr("ddenv.workbench.runs.recent_runs.Observed", lambda path: opened.append(path))
+    monkeypatch.setattr("ddenv.workbench.shared.observed.Observed", lambda path: opened.append(path))
     assert folder.look() == first and opened == []
     # A look without time tells the names.
     assert {run.status for run in RunsFolder(runs).look(patience=-1.0)} == {""}

@@ -88,7 +88,7 @@ def test_what_the_official_checker_refuses_is_noted(tmp_path):
     )
     (line,) = (line for line in world_lines(world) if "refuses a <link>" in line)
     assert "w.sdf:2: " in line and line.endswith(", and 1 more")
-    assert refused(parse_world(convert(world, "m").text, tmp_path / "clean.sdf")) == []
+    assert refused(parse_world(convert(world, "m")[0], tmp_path / "clean.sdf")) == []
     old = world.text.replace(b"1.9", b"1.6")
     assert not any("::" in why for why, _ in refused(parse_world(old, tmp_path / "old.sdf")))
 
@@ -176,5 +176,5 @@ def test_generated_worlds_are_judged_as_foretold(official, tmp_path):
         valid += not refused(world)
         # The checker names only the first mistakes, so those of the smaller world are counted by what we foretell.
         assert Counter(why for why, _ in refused(smaller)) <= Counter(why for why, _ in refused(world)), seed
-        assert official(convert(world, "meshes").text) == Counter(), seed
+        assert official(convert(world, "meshes")[0]) == Counter(), seed
     assert 5 <= valid <= 15

@@ -21,7 +21,7 @@ from pydrake.multibody.plant import CoulombFriction
 from scipy.spatial import ConvexHull, QhullError
 
 from ddenv.arrays import Floats
-from ddenv.world.drive import Drive, turned_links
+from ddenv.world.drive import Drive, wheel_links
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 
@@ -43,8 +43,8 @@ def transform(pose: Pose) -> RigidTransform:
 
 def wheel_friction(robot: Model, drive: Drive) -> float:
     """The friction coefficient of the robot's driven wheels; the largest if they differ."""
-    wheels = turned_links(robot, drive.joints)
-    return max((one.mu for link in robot.links if link.name in wheels for one in link.collisions), default=0.0)
+    links = [link for joint in robot.joints if joint.name in drive.joints for link in wheel_links(robot, joint)]
+    return max((one.mu for link in links for one in link.collisions), default=0.0)
 
 
 def world_friction(mu: float, wheels: float) -> float:

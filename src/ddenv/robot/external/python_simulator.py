@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ddenv.errors import UserError
-from ddenv.robot.controllers import LONGEST_REASON, SEEDS, Answer, BadCode, guarded, load
+from ddenv.robot.controllers import SEEDS, Answer, guarded, load
 from ddenv.robot.deadline import call_within
 from ddenv.robot.external.process import running
 from ddenv.robot.external.protocol import Ended, Row, SimulatorSetup, SubWorld
@@ -124,10 +123,7 @@ class PythonSimulator:
 
     def _guarded(self, what: str, call: Callable[[], Answer]) -> Answer:
         """Returns `call()`. Raises UserError, in one line, for whatever that raises."""
-        try:
-            return guarded(call, self._folder, f"took longer than {LONGEST_START:g} s")
-        except BadCode as error:
-            raise UserError(plain(f"simulator {self._name}: {what} {error}")[:LONGEST_REASON]) from None
+        return guarded(f"simulator {self._name}: {what}", call, self._folder, f"{LONGEST_START:g} s")
 
 
 def _drained(rows: Generator[Row, None, Ended], poses: Poses) -> Ended:

@@ -168,11 +168,7 @@ class Rehearsals:
 
     def _known(self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]) -> list[Known]:
         """What is known of `piles`, rehearsed where nothing is known yet."""
-        found = [self._repertoire.find(_names(pile), present) for pile in piles]
-        if None not in found:
-            return [known for known in found if known is not None]
-        # What was found is held here: a rehearsal may push it out of the repertoire.
-        return [known or self._rehearse(pile, present) for pile, known in zip(piles, found, strict=True)]
+        return [self._repertoire.find(_names(pile), present) or self._rehearse(pile, present) for pile in piles]
 
     def _start_gaps(self) -> tuple[Floats, Floats]:
         """The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m."""

@@ -212,24 +212,23 @@ class Autonomy:
 
     def __init__(
         self,
-        settings: Sensors,
+        scenario: Scenario,
         suite: SensorSuite,
         drive: Drive,
-        skid: float,
         clock: Clock,
-        start: tuple[float, float, float],
         controller: Drives,
         listener: Listener | None = None,
     ) -> None:
-        """`start` (x, y in m, heading in rad, world frame) is the pose estimate at the start; `listener` hears the controller."""
+        """`listener` hears the controller."""
         self.arrived: float | None = None
         self._suite = suite
         self._left = [number for number, left in enumerate(drive.left) if left]
         self._right = [number for number, left in enumerate(drive.left) if not left]
-        self._drive, self._skid = drive, skid
+        self._drive, self._skid = drive, scenario.controller.skid
         self._step = clock.step
         self._controller, self._listener = controller, listener
-        self._filter = Filter(*start, settings)
+        spawn = scenario.robot.spawn
+        self._filter = Filter(spawn.x, spawn.y, spawn.yaw, scenario.sensors)
         self._advanced = 0
         self._wheels = (0.0,) * len(drive.joints)
         self._imu = Imu(0.0, 0.0, 0.0)
@@ -252,7 +251,7 @@ class Autonomy:
             self._new["scan"] = scan
 
     def command(self, tick: Tick) -> Twist | WheelSpeeds:
-        """The controller's command, valid until the next one. Raises ControllerFailed."""
+        """The controller's command, valid until the next one. Raises BadCode."""
         new, self._new = self._new, {}
         reading = Reading(tick.time, self._filter.estimate, **new)
         command = self._controller.step(reading)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context, OutputPort
 
-from ddenv.arrays import Booleans, Floats, Objects
-from ddenv.robot.drake.plant import Body, Built
+from ddenv.arrays import Booleans, Floats
+from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.world.extent import bounds, filled_bounds, stacked
-from ddenv.world.model import Plane, World, still_links
+from ddenv.world.extent import Bounds, bounds, stacked
+from ddenv.world.model import World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
@@ -24,25 +23,33 @@ class Notice:
 
     def __init__(
         self,
-        around: Surroundings,
+        context: RunContext,
+        boxes: Mapping[str, Bounds],
         sensors: Sensors,
-        plant_context: Context,
         sleep: Sleep,
         kept: Sequence[Body],
         present: frozenset[str],
     ) -> None:
-        """`present` are the models that are kept; `kept` are the moving ones among them, in the order of `sleep`."""
+        """`boxes` are those of `still_boxes`. `present` are the models that are kept, `kept` the moving ones among them, in the
+        order of `sleep`.
+        """
         self.first_touched: dict[str, float] = {}
         self._first_seen: dict[str, float] = {}
-        self._around = around
         self._sensors = sensors
-        self._context = plant_context
+        self._context = context.plant_context
         self._sleep = sleep
+        built = context.built
+        self._contacts = built.plant.get_contact_results_output_port()
+        self._robot = frozenset(one.get_value() for one in built.robot.geometry)
+        # The owners of all other geometry.
+        geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
+        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
+        self._owners = {one.get_value(): name for name, members in geometry for one in members}
         # The owners of all boxes: those around what never moves, then one around each moving model.
-        self._names = np.array([*around.names, *(body.name for body in kept)], dtype=object)
-        there = np.array([name in present for name in around.names], dtype=bool)
-        solid = [any(body.bounds) for body in kept]
-        self._unseen: Booleans = np.array([*(there & around.visible), *solid], dtype=bool)
+        still = {name: box for name, box in boxes.items() if name in present}
+        self._names = np.array([*still, *(body.name for body in kept)], dtype=object)
+        self._low, self._high = stacked(still.values())
+        self._unseen: Booleans = np.array([True] * len(still) + [any(body.bounds) for body in kept], dtype=bool)
 
     def feel(self, now: float) -> None:
         """Notes what the robot touches at the time `now` (s).
@@ -76,13 +83,13 @@ class Notice:
     def _boxes(self) -> tuple[Floats, Floats]:
         """The lowest and the highest corners, (N, 3) m each, of all boxes now."""
         low, high = self._sleep.boxes()
-        return np.vstack([self._around.low, low]), np.vstack([self._around.high, high])
+        return np.vstack([self._low, low]), np.vstack([self._high, high])
 
     def _touched(self) -> Iterator[str]:
         """The models that the robot touches for the first time."""
-        robot, owners = self._around.robot, self._around.owners
+        robot, owners = self._robot, self._owners
         try:
-            results: Any = self._around.contacts.Eval(self._context)
+            results: Any = self._contacts.Eval(self._context)
         # If the contacts cannot be computed, the next step reports it.
         except (RuntimeError, ValueError, SystemExit):
             return
@@ -138,52 +145,10 @@ def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
 
 
-# A model, the lowest and the highest corner (3,) m of a box around parts of it that never move, and whether these are visible.
-Still = tuple[str, Floats, Floats, bool]
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """One robot in one world.
-
-    `contacts` is the plant's port of contacts. `robot` are the ids of the robot's geometry; `owners` maps the ids of all other
-    geometry to the names of its models.
-
-    `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts. A
-    ground model has a second, endless box around all that is below its plane, which is not `visible` (N,).
-    """
-
-    contacts: OutputPort
-    robot: frozenset[int]
-    owners: dict[int, str]
-    names: Objects
-    low: Floats
-    high: Floats
-    visible: Booleans
-
-    @classmethod
-    def of(cls, boxes: Sequence[Still], built: Built) -> Surroundings:
-        """`boxes` are those of `still_boxes`."""
-        geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
-        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
-        low, high = stacked((low, high) for _, low, high, _ in boxes)
-        return cls(
-            contacts=built.plant.get_contact_results_output_port(),
-            robot=frozenset(one.get_value() for one in built.robot.geometry),
-            owners={one.get_value(): name for name, members in geometry for one in members},
-            names=np.array([name for name, *_ in boxes], dtype=object),
-            low=low,
-            high=high,
-            visible=np.array([visible for *_, visible in boxes], dtype=bool),
-        )
-
-
-def still_boxes(world: World) -> list[Still]:
-    """The boxes around all parts of `world` that never move."""
-    found: list[Still] = []
-    for model in world.models:
-        collisions = [collision for link in still_links(model) for collision in link.collisions]
-        if (box := bounds(collisions)) is not None:
-            found.append((model.name, *box, True))
-        found += [(model.name, *filled_bounds(one), False) for one in collisions if isinstance(one.shape, Plane)]
-    return found
+def still_boxes(world: World) -> dict[str, Bounds]:
+    """The boxes around the parts of models that never move, without planes, by model."""
+    boxes = {
+        model.name: bounds(collision for link in still_links(model) for collision in link.collisions)
+        for model in world.models
+    }
+    return {name: box for name, box in boxes.items() if box is not None}

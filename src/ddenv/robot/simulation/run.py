@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from ddenv.robot.clock import Tick
-from ddenv.robot.controllers import ControllerFailed
+from ddenv.robot.controllers import BadCode
 from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
@@ -163,7 +163,7 @@ class Run:
         """Sets the wheel speeds that the controller wants. Returns how the run ends if the controller fails."""
         try:
             speeds = self.drive.wheel_speeds(self.autonomy.command(tick), self.scenario.controller.skid)
-        except ControllerFailed as failed:
+        except BadCode as failed:
             return "error", str(failed), False
         # Setting the same speeds again would only make Drake compute everything anew.
         if (self._commanded[len(speeds) :] != speeds).any():

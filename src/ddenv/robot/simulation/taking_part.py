@@ -8,12 +8,12 @@ that does not move as in the whole world. That is more than what touched, and ne
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.arrays import Booleans, Floats, Integers, Objects
+from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow
 from ddenv.world.extent import Bounds, bounds, shape_bounds, stacked
@@ -24,40 +24,34 @@ from ddenv.world.pose import Pose, Vector, angle_between
 SLACK = 0.05
 
 
-@dataclass(frozen=True)
-class Solids:
-    """The boxes around all S shapes of a world that never move: corners `low` and `high` (S, 3) m, and the number of each owner.
-
-    `names` (N,) are the models that have such shapes. There are no planes.
-    """
-
-    names: Objects
-    owners: Integers
-    low: Floats
-    high: Floats
-
-    @classmethod
-    def of(cls, world: World) -> Solids:
-        shapes = [(model.name, one) for model in world.models for link in still_links(model) for one in link.collisions]
-        number_of = {name: number for number, name in enumerate(dict.fromkeys(name for name, _ in shapes))}
-        owners = np.array([number_of[name] for name, _ in shapes], dtype=int)
-        low, high = stacked(shape_bounds(one.shape, one.pose) for _, one in shapes)
-        return cls(np.array([*number_of], dtype=object), owners, low, high)
+def solids(world: World) -> dict[str, Bounds]:
+    """The boxes around the S shapes of each model that never move: corners (S, 3) m and (S, 3) m. There are no planes."""
+    shapes = {model.name: [one for link in still_links(model) for one in link.collisions] for model in world.models}
+    return {
+        name: stacked(shape_bounds(one.shape, one.pose) for one in found) for name, found in shapes.items() if found
+    }
 
 
 class Reached:
     """The models that never move which the robot, or a model that is simulated, may have touched in one run.
 
-    `hull` is the robot's; `present` are the models that are kept. No two ticks are more than `period` (s) apart.
+    `boxes` are `solids`, `hull` is the robot's; `present` are the models that are kept. No two ticks are more than `period` (s)
+    apart.
     """
 
-    def __init__(self, solids: Solids, hull: Hull, sleep: Sleep, present: frozenset[str], period: float) -> None:
+    def __init__(
+        self, boxes: Mapping[str, Bounds], hull: Hull, sleep: Sleep, present: frozenset[str], period: float
+    ) -> None:
         self._hull, self._sleep, self._period = hull, sleep, period
-        self._names = solids.names
-        there = np.array([name in present for name in solids.names], dtype=bool)[solids.owners]
+        there = {name: box for name, box in boxes.items() if name in present}
+        self._names = np.array([*there], dtype=object)
         # The shapes of models that were not reached yet.
-        self._owners, self._low, self._high = solids.owners[there], solids.low[there], solids.high[there]
-        self._found: Booleans = np.zeros(len(solids.names), dtype=bool)
+        self._owners: Integers = np.repeat(
+            np.arange(len(there)), np.array([len(low) for low, _ in there.values()], dtype=int)
+        )
+        self._low = np.vstack([np.empty((0, 3)), *(low for low, _ in there.values())])
+        self._high = np.vstack([np.empty((0, 3)), *(high for _, high in there.values())])
+        self._found: Booleans = np.zeros(len(there), dtype=bool)
         # From `_place` on the robot may move by `_free` (m) and reach nothing new.
         self._place: PoseRow | None = None
         self._free = 0.0

@@ -23,9 +23,9 @@ from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
 from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.settled import Settled
-from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
+from ddenv.robot.simulation.notice import Notice, still_boxes
 from ddenv.robot.simulation.run import Run, Stuck, seconds_for
-from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, Solids
+from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -41,7 +41,7 @@ class Template:
     """One plant of a scenario's world. Building it takes seconds; switching models off for a run takes milliseconds.
 
     All runs share one context. Equal `keep` and `seed` give the same result bit for bit, whatever ran before, and the same as a
-    world that never had the removed models.
+    world that never had the removed models. `names` are the models in the plant; without `slices` it stays unknown who took part.
     """
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
@@ -64,15 +64,15 @@ class Template:
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
         self._models = {model.name: model for model in world.models}
-        self._repertoire = Repertoire(world, self._whole.moving)
+        self.repertoire = Repertoire(world, self._whole.moving)
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
-        self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
+        self._solids, self._hull = solids(self._solid), Hull.of(robot)
         self._reach = self._hull.reach + YIELD
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
-        self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
+        self.slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
         moving = [model for model in world.models if not model.static]
         self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
         self._build(names)
@@ -80,35 +80,27 @@ class Template:
     def without(self, names: frozenset[str]) -> Template:
         """A template of the same world without the moving models `names`: cheaper, and with the same bits.
 
-        The two share what they know about the world. Raises ValueError for a model that never moves or is always kept.
+        `names` are `removable`. The two share what they know about the world.
         """
-        wrong = names - self.removable
-        if wrong:
-            raise ValueError(f"cannot be left out: {min(wrong)}")
         smaller = copy(self)
-        smaller._build(self._names - names)
+        smaller._build(self.names - names)
         return smaller
 
     def wider(self, place: Place, times: int) -> Template:
         """A template of the same models with a larger region, see `Region.with_place`."""
         wider = copy(self)
         wider._surround(self._region.with_place(place, times))
-        wider._build(self._names)
+        wider._build(self.names)
         return wider
-
-    @property
-    def names(self) -> frozenset[str]:
-        """The models in its plant."""
-        return self._names
 
     @property
     def removable(self) -> frozenset[str]:
         """The moving models that can be left out of the plant."""
-        return frozenset(self._context.built.moving) - self._always
+        return frozenset(self.context.built.moving) - self._always
 
     def shapes_without(self, names: frozenset[str]) -> int:
         """The number of collision shapes in the plant, without those of the models `names`."""
-        built = self._context.built
+        built = self.context.built
         shapes = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
         return len(built.robot.geometry) + sum(len(geometry) for name, geometry in shapes if name not in names)
 
@@ -119,14 +111,12 @@ class Template:
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
-        self._names = names
+        self.names = names
         near = tuple(model for model in self._solid.models if model.name in names - self._far)
         built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
-        boxes = [box for box in self._boxes if box[0] in names]
-        self._surroundings = Surroundings.of(boxes, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
-        self._context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
-        self._rehearsals = Rehearsals(self._repertoire, self._context)
+        self.context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
+        self.rehearsals = Rehearsals(self.repertoire, self.context)
 
     def run(
         self,
@@ -140,13 +130,13 @@ class Template:
 
         Raises LeftRegion if something comes near what is not in the plant.
         """
-        unknown = keep - self._names
+        unknown = keep - self.names
         if unknown:
             raise ValueError(f"no such model: {min(unknown)}")
-        removed = self._names - keep - self._always
-        kept = [body for name, body in self._context.built.moving.items() if name not in removed]
-        present = self._names - removed
-        self._context.presence.remove(removed)
+        removed = self.names - keep - self._always
+        kept = [body for name, body in self.context.built.moving.items() if name not in removed]
+        present = self.names - removed
+        self.context.presence.remove(removed)
         with self._asleep(kept, present) as (sleep, unusual):
             suite = SensorSuite(self._scenario.sensors, seed)
             lidar = None
@@ -154,16 +144,14 @@ class Template:
                 movers = [self._models[body.name] for body in kept]
                 lidar = Lidar(self._scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
             reached = None
-            if self._slices and self._sleeping and self._repertoire.usual is not None:
+            if self.slices and self._sleeping and self.repertoire.usual is not None:
                 reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
             run = Run(
-                context=self._context,
+                context=self.context,
                 scenario=self._scenario,
                 drive=self._drive,
                 sleep=sleep,
-                notice=Notice(
-                    self._surroundings, self._scenario.sensors, self._context.plant_context, sleep, kept, present
-                ),
+                notice=Notice(self.context, self._boxes, self._scenario.sensors, sleep, kept, present),
                 autonomy=self._autonomy(suite, seed, listener),
                 lidar=lidar,
                 reach=self._reach,
@@ -175,37 +163,15 @@ class Template:
             )
             return run.execute(progress)
 
-    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
-        """What rests on what in the whole world, as `piles.support.supports` has it. Raises LeftRegion."""
-        return supports(self._context, self._rehearsals, self._names, elements)
-
-    def settled(self) -> Settled:
-        """How the whole world settles. Raises LeftRegion."""
-        return settled(self._context, self._rehearsals, self._names)
-
-    def learn_piles(self) -> None:
-        """Finds out how the piles of the whole world move, if that is unknown. Raises LeftRegion."""
-        self._rehearsals.learn(self._names)
-
-    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
-        """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
-
-        Call it after `learn_piles`. None: unknown.
-        """
-        if not self._slices:
-            return None
-        ties = self._repertoire.ties
-        return sorted((name, other) for name in elements & set(ties) for other in elements & ties[name])
-
     @contextmanager
     def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[tuple[Sleep, frozenset[str]]]:
         """The moving models `kept` at their start, in a world that keeps the models `present`, and what moves otherwise there."""
-        piles = self._rehearsals.piles(kept, present) if self._sleeping else []
-        held = frozenset(self._context.built.moving) - set(self._context.built.twins)
-        unusual = self._repertoire.unusual(piles, present, held)
+        piles = self.rehearsals.piles(kept, present) if self._sleeping else []
+        held = frozenset(self.context.built.moving) - set(self.context.built.twins)
+        unusual = self.repertoire.unusual(piles, present, held)
         scripts = [known.script for known in piles if known.script is not None]
-        self._context.diagram_context.SetTime(0.0)
-        sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)
+        self.context.diagram_context.SetTime(0.0)
+        sleep = Sleep(self.context, kept, scripts, never=not self._sleeping)
         try:
             yield sleep, unusual | self._carriers(present)
         finally:
@@ -213,15 +179,15 @@ class Template:
 
     def _carriers(self, present: frozenset[str]) -> frozenset[str]:
         """What those models are tied to that are always kept, among the models `present`."""
-        ties = self._repertoire.ties
+        ties = self.repertoire.ties
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
-        scenario, setup = self._scenario, replace(self._setup, seed=seed)
-        controller, skid = self._controllers(setup), scenario.controller.skid
+        setup = replace(self._setup, seed=seed)
+        controller = self._controllers(setup)
         if listener is not None:
             listener.begin(setup)
-        return Autonomy(scenario.sensors, suite, self._drive, skid, self._clock, setup.start, controller, listener)
+        return Autonomy(self._scenario, suite, self._drive, self._clock, controller, listener)
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
@@ -270,28 +236,38 @@ class Variants:
         listener: Listener | None = None,
     ) -> RunResult:
         """As `Template.run`, in a plant that has all that comes near."""
-        self._within(lambda: self._whole.learn_piles())
-        return self._within(lambda: self._template(keep).run(keep, seed, progress, full, listener))
+        self._learn_piles()
+        return self._within(lambda _: self._template(keep).run(keep, seed, progress, full, listener))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
-        """As `Template.supports`."""
-        return self._within(lambda: self._whole.supports(elements))
+        """What rests on what in the whole world, as `piles.settling.supports` has it."""
+        return self._within(lambda whole: supports(whole.context, whole.rehearsals, whole.names, elements))
 
     def settled(self) -> Settled:
-        """As `Template.settled`."""
-        return self._within(lambda: self._whole.settled())
+        """How the whole world settles."""
+        return self._within(lambda whole: settled(whole.context, whole.rehearsals, whole.names))
 
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
-        """As `Template.ties`."""
-        self._within(lambda: self._whole.learn_piles())
-        return self._whole.ties(elements)
+        """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
 
-    def _within(self, work: Callable[[], Result]) -> Result:
+        None: unknown.
+        """
+        if not self._whole.slices:
+            return None
+        self._learn_piles()
+        ties = self._whole.repertoire.ties
+        return sorted((name, other) for name in elements & set(ties) for other in elements & ties[name])
+
+    def _learn_piles(self) -> None:
+        """Finds out how the piles of the whole world move, if that is unknown."""
+        self._within(lambda whole: whole.rehearsals.learn(whole.names))
+
+    def _within(self, work: Callable[[Template], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
         times = 1
         while True:
             try:
-                return work()
+                return work(self._whole)
             except LeftRegion as left:
                 place = left.place
             times *= 2

@@ -49,16 +49,20 @@ class KeyFooter(Keys):
         """Other words for a key, and maybe another way to write it; with "" it is not shown."""
         if self._words.get(id) != (words, shown):
             self._words[id] = words, shown
-            self.renew()
+            self._renew_soon()
 
     def on_mount(self) -> None:
         self.screen.bindings_updated_signal.subscribe(self, self._bindings_changed)
 
     def _bindings_changed(self, screen: Screen[Any]) -> None:
-        # One move of the focus sends several of these signals.
-        if screen.app.app_focus and screen is self.screen and not self._due:
+        if screen.app.app_focus and screen is self.screen:
+            self._renew_soon()
+
+    def _renew_soon(self) -> None:
+        # To list what all keys do takes a while: one key changes several words, and the focus sends several signals.
+        if not self._due:
             self._due = True
-            self.call_after_refresh(self.renew)
+            self.call_later(self.renew)
 
     def on_resize(self) -> None:
         self.renew()

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.observed import Busy, Observed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -141,6 +140,7 @@ def place_of_run(path: Path) -> Place:
     """The world and the scenario of a run file. Raises UserError."""
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
     from ddenv.runs.subject import read_parts
+    from ddenv.workbench.shared.observed import Busy, Observed
 
     until = time.monotonic() + PATIENCE
     while True:

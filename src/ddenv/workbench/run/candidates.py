@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 from rich.cells import cell_len, set_cell_size
@@ -9,7 +10,6 @@ from rich.segment import Segment
 from rich.style import Style
 from textual import events
 from textual.geometry import Region, Size
-from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
@@ -42,11 +42,10 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         ("choose", "enter", "move(0)", "", "stay on this candidate"),
     )
 
-    class Chosen(Message):
-        """The cursor was moved by hand, or given back to the run."""
-
-    def __init__(self, *, id: str | None = None) -> None:
+    def __init__(self, chosen: Callable[[], object] = lambda: None, *, id: str | None = None) -> None:
+        """`chosen` is called when the cursor was moved by hand, or given back to the run: a message would be a frame later."""
         super().__init__(id=id)
+        self._chosen = chosen
         self.following = True
         self.cursor_row = 0
         self.columns: tuple[Column, ...] = fitting(Listed(), 0)
@@ -88,7 +87,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     def follow(self) -> None:
         self.following = True
-        self.post_message(self.Chosen())
+        self._chosen()
 
     def action_move(self, rows: int) -> None:
         self._by_hand(self.cursor_row + rows)
@@ -111,7 +110,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _by_hand(self, row: int) -> None:
         self.following = False
         self._put(min(max(row, 0), max(0, len(self._listed) - 1)), reveal=True)
-        self.post_message(self.Chosen())
+        self._chosen()
 
     # From rows to lines: the first one is the header, and does not scroll.
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import time
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.words.explain import Explanation, explain
+
+if TYPE_CHECKING:
+    from ddenv.words.explain import Explanation
 
 # Minimum time between two updates within a round, s.
 PERIOD = 1.0
@@ -20,7 +23,7 @@ class Happening(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._explanation = Explanation(None, ())
+        self._explanation: Explanation | None = None
         self._snapshot: Snapshot | None = None
         self.trouble = ""
         self._urgent: tuple[object, ...] = ()
@@ -35,6 +38,9 @@ class Happening(Widget):
         if urgent == self._urgent and trouble == self.trouble and moment - self._shown_at < PERIOD:
             # Tests follow each other faster than anybody reads: the next update shows the one that runs then.
             return
+        # With this most of `words` is loaded: the screen is shown before.
+        from ddenv.words.explain import explain
+
         self._snapshot, self._urgent, self._shown_at = snapshot, urgent, moment
         explanation = explain(snapshot)
         if (explanation, trouble) != (self._explanation, self.trouble):
@@ -42,6 +48,8 @@ class Happening(Widget):
             self.refresh()
 
     def render(self) -> Text:
+        if self._explanation is None:
+            return Text()
         sentences = [Text(sentence) for sentence in self._explanation.sentences]
         if self.trouble:
             sentences.insert(0, Text(self.trouble, self.app.theme_variables["text-error"]))

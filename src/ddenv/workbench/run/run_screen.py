@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual import events, on
 from textual.app import ComposeResult
@@ -31,7 +32,6 @@ from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
-from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, KeyOffers
 from ddenv.workbench.run.snapshot import Browsing, Following
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
@@ -41,6 +41,9 @@ from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
+
+if TYPE_CHECKING:
+    from ddenv.workbench.run.opening import Opening
 
 SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
@@ -71,12 +74,20 @@ class RunScreen(Screen[None]):
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
-        self.table, self.world, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
+        self.table, self.world = Candidates(self._row_chosen, id="candidates"), WorldMap(id="map")
+        self._legend = MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
-        self.opening, self.keys = Opening(self), KeyOffers(self)
+        self.keys = KeyOffers(self)
         self._pane = "map"
+
+    @cached_property
+    def opening(self) -> Opening:
+        # All dialogs are loaded with the first one: the screen is shown before.
+        from ddenv.workbench.run.opening import Opening
+
+        return Opening(self)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -112,7 +123,8 @@ class RunScreen(Screen[None]):
 
     def on_mount(self) -> None:
         self.query_one(Panes).mark(self._pane)
-        self.following.begin()
+        # The first picture does not wait for what reads a run to be loaded.
+        self.call_after_refresh(self.following.begin)
         read_world(self, self.run, self._placed)
 
     def on_unmount(self) -> None:
@@ -155,9 +167,10 @@ class RunScreen(Screen[None]):
         self.query_one(Header).show(snapshot)
         self._show_map()
         self._show_models()
-        # Its rows are wider than those of candidates.
-        self.set_class(snapshot.state.certificate is not None, "-certificate")
         panel = self.query_one("#round")
+        for each in (panel, self.query_one("#now")):
+            # Its rows are wider than those of candidates. As a class of the screen it would compute all styles again.
+            each.set_class(snapshot.state.certificate is not None, "-certificate")
         panel.border_title, panel.border_subtitle = round_title(snapshot.state)
         log, entries = self.query_one("#log", Lines), self._log.until(self.browsing.position.at)
         if len(entries) != len(log.items):
@@ -261,7 +274,6 @@ class RunScreen(Screen[None]):
 
     # Panes and the map.
 
-    @on(Candidates.Chosen)
     def _row_chosen(self) -> None:
         self._show_map()
         self._show_keys()

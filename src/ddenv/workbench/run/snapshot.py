@@ -11,13 +11,11 @@ from typing import Any
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.runfile.fold import spent
 from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Candidate
+from ddenv.runfile.state import Candidate, spent
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import pointed
-from ddenv.words.news import happened
 from ddenv.workbench.shared.poll import Poll
 
 # Why no key guides the run at an earlier moment.
@@ -58,6 +56,8 @@ class Browsing:
         if at is None:
             return self._poll.snapshot
         if self._shown[0] != at:
+            from ddenv.words.news import happened
+
             moment = self.position.moment(at)
             self._shown = at, Snapshot() if moment is None else self._moments.of(moment, happened(moment))
         return self._shown[1]

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.words.signs import STATUS
-from ddenv.workbench.shared.observed import Busy, Observed
 
 # The maximum number of runs in the list of the setup screen.
 SHOWN = 40
@@ -135,6 +133,10 @@ def _stamp(path: Path) -> tuple[int, ...]:
 
 
 def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
+    # The setup screen is on the terminal before runs are read.
+    from ddenv.runfile.fold import fold
+    from ddenv.workbench.shared.observed import Busy, Observed
+
     age = stamp[0] / 1e9
     try:
         with Observed(path) as file:

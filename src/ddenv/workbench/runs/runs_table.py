@@ -15,7 +15,6 @@ from textual.widgets.option_list import Option
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.signs import brief
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
-from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import keys
 
@@ -100,6 +99,8 @@ def moment(time: float) -> str:
     """A Unix time, s: the time of day if it is today, else the date."""
     if not time:
         return ""
+    from ddenv.workbench.shared import poll
+
     try:
         then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
     except (ValueError, OverflowError, OSError):

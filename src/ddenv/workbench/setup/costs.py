@@ -10,9 +10,6 @@ from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import BaselineFinished, TestFinished
-from ddenv.runfile.store import RunFile
-from ddenv.runs.tests_left import rough_run
 from ddenv.text import about, between, count, rounded
 
 if TYPE_CHECKING:
@@ -45,6 +42,9 @@ def past_of(scenario: Scenario, folder: Path) -> Past:
 
 def _costs(path: Path, scenario: Scenario) -> tuple[list[float], list[float]] | None:
     """The real times of a run's tests, s, and the rate in its baseline; None for another scenario's run or a damaged one."""
+    from ddenv.runfile.events import BaselineFinished, TestFinished
+    from ddenv.runfile.store import RunFile
+
     try:
         with RunFile(path) as run:
             if not _alike(json.loads(run.document("scenario")), scenario):
@@ -68,6 +68,8 @@ def _alike(data: Any, scenario: Scenario) -> bool:
 
 
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
+    from ddenv.runs.tests_left import rough_run
+
     reduction = scenario.reduction
     # Another simulator does not say what took part.
     rough = rough_run(models, reduction, past.rate, slices=scenario.oracle is None)

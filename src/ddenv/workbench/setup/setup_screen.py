@@ -33,11 +33,11 @@ from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, r
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.messages import ShowRun
-from ddenv.workbench.shared.processes import Engine
 from ddenv.workbench.widgets.panes import Panes
 from ddenv.workbench.widgets.question import once_trusted
 
 if TYPE_CHECKING:
+    from ddenv.workbench.shared.processes import Engine
     from ddenv.world.scenario import Scenario
 
 SMALLEST = (64, 18)
@@ -138,7 +138,9 @@ class SetupScreen(Screen[None]):
         self.call_after_refresh(self._list_files)
         self.query_one(FileList).focus()
 
-    def on_screen_resume(self) -> None:
+    def on_screen_resume(self, event: events.ScreenResume) -> None:
+        # Styles of new widgets need not be computed again.
+        event.refresh_styles = self.stack_updates > 0
         self.call_after_refresh(self.query_one(RunList).read)
 
     def on_resize(self, event: events.Resize) -> None:

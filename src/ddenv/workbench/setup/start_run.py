@@ -13,9 +13,9 @@ from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.form import read_key
-from ddenv.workbench.shared.processes import Engine
 
 if TYPE_CHECKING:
+    from ddenv.workbench.shared.processes import Engine
     from ddenv.world.scenario import Scenario
 
 NO_COMMAND = "there is no command for the scenario of a run; save it as a file first (f7)"
@@ -68,6 +68,7 @@ def create(
     """Writes the run file `path` and starts its engine, with `jobs` tests at a time. Raises UserError."""
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like, create_run
+    from ddenv.workbench.shared.processes import Engine
 
     engine = Engine(path)
     if choice.run:

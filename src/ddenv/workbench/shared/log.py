@@ -12,7 +12,6 @@ from rich.text import Text
 from ddenv.runfile.progress import Decision
 from ddenv.runfile.state import RunState
 from ddenv.text import plain
-from ddenv.words.news import news
 
 # Where the words begin, after the time.
 BEGIN = " " * 10
@@ -41,6 +40,8 @@ class Log:
         return self._entries[: bisect_right(self._entries, event, key=lambda entry: entry.event)]
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
+        from ddenv.words.news import news
+
         try:
             words = news(kind, before, after, attached=True)
         except (KeyError, IndexError, TypeError, ValueError, AttributeError):

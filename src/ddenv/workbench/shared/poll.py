@@ -12,10 +12,9 @@ from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.runfile.fold import spent, steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.snapshot import EngineIs, Snapshot
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import RunState, spent
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.workbench.shared.observed import Busy, Gone, Observed
 
@@ -125,6 +124,8 @@ class Poll:
 
     def _follow(self) -> tuple[str, bool]:
         """Reads new events up to the first invalid one; what is wrong with that, and whether there are more. Raises Busy."""
+        from ddenv.runfile.fold import steps
+
         begun, more = time.monotonic(), True
         try:
             while more:

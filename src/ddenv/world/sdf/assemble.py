@@ -10,7 +10,7 @@ from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
 from ddenv.world.sdf.includes import Part
-from ddenv.world.sdf.joints import JointSite, LinkPose, check_tree, read_joints
+from ddenv.world.sdf.joints import LinkPose, Spot, check_tree, read_joints
 from ddenv.world.sdf.links import read_link
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, text_of, truth
 
@@ -20,20 +20,6 @@ STILL = 0.01
 MOVED = 0.001
 # Maximum number of models: a few files that include each other could ask for more than any machine can hold.
 MOST_MODELS = 50_000
-
-
-@dataclass(frozen=True)
-class Spot:
-    """The place of a model or nested model: its frame in the world, `nominal` as in its file and `actual` after `<state>`.
-
-    `prefix` begins the names of its links, `saved` is its entry in `<state>`, `scale` multiplies its sizes.
-    """
-
-    nominal: Pose
-    actual: Pose
-    prefix: str = ""
-    saved: Saved | None = None
-    scale: Vector = ONE
 
 
 @dataclass(frozen=True)
@@ -54,7 +40,7 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
     actual = nominal if saved is None or saved.pose is None else saved.pose
     static = _is_static(part)
     builder = _Builder(static, context)
-    builder.add(outer.inside(part), Spot(nominal, actual, saved=saved))
+    builder.add(Spot(outer.inside(part), nominal, actual), saved)
     if not builder.links:
         builder.links.append(_nothing(part.element, actual, static, context))
     if saved is not None:
@@ -93,53 +79,54 @@ class _Builder:
         self.self_collide: list[bool] = []
         self.poses: dict[str, LinkPose] = {}
 
-    def add(self, scope: Scope, spot: Spot) -> None:
-        """Adds everything in `scope`, whose frame is at `spot`. Raises UserError."""
+    def add(self, spot: Spot, saved: Saved | None) -> None:
+        """Adds everything in the model at `spot`, whose entry in `<state>` is `saved`. Raises UserError."""
+        scope = spot.scope
         self.context.assembled += 1
         if self.context.assembled > MOST_MODELS:
             why = f"there are more than {MOST_MODELS} models, including nested and included ones"
             raise complain(scope.element, why)
         note_unread(scope.element, self.context)
-        if spot.saved is not None and spot.saved.scale != ONE:
-            spot = replace(spot, scale=spot.saved.scale)
+        if saved is not None and saved.scale != ONE:
+            spot = replace(spot, scale=saved.scale)
         collide = truth(scope.element, "self_collide", False)
         for element in scope.element.findall("link"):
-            self._add_link(element, scope, spot)
+            self._add_link(element, spot, saved)
             self.self_collide.append(truth(element, "self_collide", collide))
         for part in scope.parts:
-            self._add_part(part, scope, spot)
+            self._add_part(part, spot, saved)
         if not self.static:
-            self.joints += read_joints(JointSite(scope, spot.nominal, spot.prefix, self.poses), self.context)
-        if spot.saved is not None:
+            self.joints += read_joints(spot, self.poses, self.context)
+        if saved is not None:
             known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
-            for name in (*spot.saved.links, *spot.saved.models):
+            for name in (*saved.links, *saved.models):
                 if name not in known:
-                    self.context.note("ignored", spot.saved.element, f"the model has no '{name[:80]}'")
+                    self.context.note("ignored", saved.element, f"the model has no '{name[:80]}'")
 
-    def _add_link(self, element: Element, scope: Scope, spot: Spot) -> None:
+    def _add_link(self, element: Element, spot: Spot, saved: Saved | None) -> None:
         own = name_of(element)
         name = spot.prefix + own
         if own == WORLD:
             raise complain(element, "the name 'world' is reserved by SDF; choose another")
         if name in self.poses:
             raise complain(element, "this link name is used twice; give each link of the model its own name")
-        local = scope.place(element)
+        local = spot.scope.place(element)
         pose = LinkPose(spot.nominal @ local, spot.actual @ local)
-        if spot.saved is not None and own in spot.saved.links:
-            pose = LinkPose(pose.nominal, spot.saved.links[own])
+        if saved is not None and own in saved.links:
+            pose = LinkPose(pose.nominal, saved.links[own])
         self.poses[name] = pose
         self.elements.append(element)
         at, scale, moving = pose.actual, spot.scale, not self.static
-        link = read_link(element, scope, self.context, name=name, pose=at, local=local, scale=scale, moving=moving)
+        link = read_link(element, spot.scope, self.context, name=name, pose=at, local=local, scale=scale, moving=moving)
         self.links.append(link)
 
-    def _add_part(self, part: Part, scope: Scope, spot: Spot) -> None:
-        local = scope.placed(part)
-        saved = None if spot.saved is None else spot.saved.models.get(part.name)
+    def _add_part(self, part: Part, spot: Spot, outer: Saved | None) -> None:
+        local = spot.scope.placed(part)
+        saved = None if outer is None else outer.models.get(part.name)
         there = spot.actual @ local if saved is None or saved.pose is None else saved.pose
         before = len(self.links)
         prefix = f"{spot.prefix}{part.name}::"
-        self.add(scope.inside(part), Spot(spot.nominal @ local, there, prefix, saved, spot.scale))
+        self.add(Spot(spot.scope.inside(part), spot.nominal @ local, there, prefix, spot.scale), saved)
         if _is_static(part) and not self.static:
             # A static model nested in a moving one: its links are welded to the world.
             links = self.links[before:]

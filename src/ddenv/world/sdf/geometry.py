@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ddenv.world.access import Missing, Unusable
-from ddenv.world.extent import convex_hull, polygon_area
+from ddenv.world.extent import circle, convex_hull, polygon_area
+from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
 from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
@@ -227,28 +227,16 @@ def read_polyline(geometry: Element, context: Context) -> Mesh:
     filled = abs(polygon_area(outlines[0]))
     if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
         context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
-    return prism(corners, height)
-
-
-def prism(corners: np.ndarray, height: float) -> Mesh:
-    """The convex outline `corners` (N, 2), anticlockwise, extruded from z = 0 to `height`, m."""
-    count = len(corners)
-    low = np.column_stack([corners, np.zeros(count)])
-    here, after = np.arange(count), np.roll(np.arange(count), -1)
-    walls = [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
-    fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
-    faces = np.vstack([*walls, fan[:, ::-1], fan + count])
+    low = np.column_stack([corners, np.zeros(len(corners))])
     # Meshes of equal outlines compare equal.
     origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
-    return Mesh(origin, np.vstack([low, low + np.array([0, 0, height])]), faces.astype(np.uint32))
+    try:
+        return Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
+    except ValueError as error:
+        raise complain(elements[0], str(error)) from None
 
 
 def cone(radius: float, length: float) -> Mesh:
     """A cone centred on its frame's origin, its tip up, m."""
-    angles = np.arange(SIDES) * 2 * math.pi / SIDES
-    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, -length / 2)])
-    here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
-    walls = np.column_stack([here, after, np.full(SIDES, SIDES)])
-    fan = np.column_stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)])
-    vertices = np.vstack([rim, [0.0, 0.0, length / 2]])
-    return Mesh(f"cone {radius!r} {length!r}", vertices, np.vstack([walls, fan[:, ::-1]]).astype(np.uint32))
+    rim = np.column_stack([radius * circle(SIDES), np.full(SIDES, -length / 2)])
+    return Mesh(f"cone {radius!r} {length!r}", *hull(np.vstack([rim, [0.0, 0.0, length / 2]])))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from ddenv.world.model import Joint
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import ONE, Pose, Vector
 from ddenv.world.sdf.context import Context, note_unread, refuse, version
 from ddenv.world.sdf.frames import OWN, WORLD, Scope, shown
 from ddenv.world.sdf.includes import Part
@@ -27,29 +27,33 @@ class LinkPose:
 
 
 @dataclass(frozen=True)
-class JointSite:
-    """The model that directly contains joints: its frames, its nominal `pose` and the `prefix` of its names in the world.
+class Spot:
+    """The place of a model or nested model with the frames `scope`: its own frame in the world, as in `LinkPose`.
 
-    `links` are the poses of all links of the outermost model, by full name.
+    `prefix` begins the names of its links in the world, `scale` multiplies its sizes.
     """
 
     scope: Scope
-    pose: Pose
-    prefix: str
-    links: dict[str, LinkPose]
+    nominal: Pose
+    actual: Pose
+    prefix: str = ""
+    scale: Vector = ONE
 
 
-def read_joints(site: JointSite, context: Context) -> list[Joint]:
-    """The joints directly inside the model at `site`. Raises UserError."""
+def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> list[Joint]:
+    """The joints directly inside the model at `spot`; `links` are all those of the outermost one, by full name.
+
+    Raises UserError.
+    """
     joints, names = [], set()
-    for element in site.scope.element.findall("joint"):
+    for element in spot.scope.element.findall("joint"):
         note_unread(element, context)
         if name_of(element) in names:
             raise complain(element, "this joint name is used twice; give each joint of the model its own name")
         names.add(name_of(element))
         kind = element.get("type", "")
         if kind in KINDS:
-            joints.append(_joint(element, kind, site, context))
+            joints.append(_joint(element, kind, spot, links, context))
         elif context.ignores("joint"):
             context.note("ignored", element, f"a '{kind}' joint is left out by --ignore: its links move freely")
         else:
@@ -57,23 +61,23 @@ def read_joints(site: JointSite, context: Context) -> list[Joint]:
     return joints
 
 
-def _joint(element: Element, kind: str, site: JointSite, context: Context) -> Joint:
-    parent, child = (_end(element, tag, site, context) for tag in ("parent", "child"))
+def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], context: Context) -> Joint:
+    parent, child = (_end(element, tag, spot, links, context) for tag in ("parent", "child"))
     if parent == child:
         raise complain(element, f"joins '{child}' to itself")
     # By element, not by name: something else in the model may have the same name.
-    nominal = site.pose @ site.scope.place(element, text_of(element.find("child")))
-    moved = site.links[child].actual @ site.links[child].nominal.inverse()
+    nominal = spot.nominal @ spot.scope.place(element, text_of(element.find("child")))
+    moved = links[child].actual @ links[child].nominal.inverse()
     axis = element.find("axis")
     if kind in ("revolute", "prismatic", "universal") and axis is None:
         raise complain(element, f"a {kind} joint needs an <axis>")
-    first = _axis(axis, site, nominal)
-    second = _second_axis(element, first, site, nominal) if kind == "universal" else None
+    first = _axis(axis, spot, nominal)
+    second = _second_axis(element, first, spot, nominal) if kind == "universal" else None
     limit = None if axis is None or kind not in LIMITED else axis.find("limit")
     dynamics = None if axis is None else axis.find("dynamics")
     _note_unlimited(element, kind, context)
     joint = Joint(
-        name=site.prefix + name_of(element),
+        name=spot.prefix + name_of(element),
         kind=kind,
         parent=parent,
         child=child,
@@ -90,31 +94,31 @@ def _joint(element: Element, kind: str, site: JointSite, context: Context) -> Jo
         raise complain(limit, f"the lower limit {joint.lower:g} is above the upper limit {joint.upper:g}")
     if dynamics is not None and joint.damping < 0:
         raise complain(dynamics, f"damping must not be negative, found {joint.damping:g}")
-    return _relative_to_start(joint, first, site.links)
+    return _relative_to_start(joint, first, links)
 
 
-def _end(element: Element, tag: str, site: JointSite, context: Context) -> str:
+def _end(element: Element, tag: str, spot: Spot, links: dict[str, LinkPose], context: Context) -> str:
     """The full name of the link at one end of a joint, or `world`."""
     child = element.find(tag)
     name = text_of(child)
     if tag == "parent" and name == WORLD:
         return WORLD
-    link = link_of(site.scope, name, element, context) if name else None
-    if link is None or site.prefix + link not in site.links:
+    link = link_of(spot.scope, name, element, context) if name else None
+    if link is None or spot.prefix + link not in links:
         raise complain(element if child is None else child, f"<{tag}> is not a link of this model: '{name[:80]}'")
-    return site.prefix + link
+    return spot.prefix + link
 
 
-def _axis(axis: Element | None, site: JointSite, joint_pose: Pose) -> Vector:
+def _axis(axis: Element | None, spot: Spot, joint_pose: Pose) -> Vector:
     """The unit vector of an `<axis>` in the world frame, at the nominal poses."""
     element = None if axis is None else axis.find("xyz")
     unit = (0.0, 0.0, 1.0) if element is None else _unit(element)
     if element is not None and element.get("expressed_in"):
-        return (site.pose @ site.scope.pose(element.get("expressed_in", ""), element)).rotate(unit)
+        return (spot.nominal @ spot.scope.pose(element.get("expressed_in", ""), element)).rotate(unit)
     in_model = (
         axis is not None and version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5))
     )
-    return (site.pose if in_model else joint_pose).rotate(unit)
+    return (spot.nominal if in_model else joint_pose).rotate(unit)
 
 
 def _unit(element: Element) -> Vector:
@@ -125,11 +129,11 @@ def _unit(element: Element) -> Vector:
     return x / length, y / length, z / length
 
 
-def _second_axis(element: Element, first: Vector, site: JointSite, joint_pose: Pose) -> Vector:
+def _second_axis(element: Element, first: Vector, spot: Spot, joint_pose: Pose) -> Vector:
     axis2 = element.find("axis2")
     if axis2 is None:
         raise complain(element, "a universal joint needs an <axis2>")
-    second = _axis(axis2, site, joint_pose)
+    second = _axis(axis2, spot, joint_pose)
     along = sum(a * b for a, b in zip(first, second, strict=True))
     if abs(along) > 1e-3:
         raise complain(axis2, "the two axes of a universal joint must be perpendicular")

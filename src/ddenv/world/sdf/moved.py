@@ -12,7 +12,7 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Reading
 from ddenv.world.sdf.frames import pose_of
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.xml import Edit, Element, edited, name_of, parse, tag_end
+from ddenv.world.sdf.xml import Edit, Element, edited, name_of, parse, tag_end, with_child, with_words
 
 # Two poses nearer than this are the same, m and sine of half the angle.
 SAME = 1e-5
@@ -95,18 +95,17 @@ def _placed(text: bytes, at: Element, model: Model, turn: Pose) -> Edit:
 
 
 def _replaced(text: bytes, pose: Element, place: Pose) -> Edit:
-    start = text[pose.start : tag_end(text, pose)].rstrip(b">").rstrip(b"/").rstrip()
-    return pose.start, pose.end, _FORMAT.sub(b"", start) + b">" + _numbers(place) + b"</pose>"
+    start, end, new = with_words(text, pose, _numbers(place))
+    return start, end, _FORMAT.sub(b"", new)
 
 
 def _inserted(text: bytes, holder: Element, place: Pose) -> Edit:
     """A new first child, indented like the one that was the first."""
-    end = tag_end(text, holder)
-    space = _SPACE.match(text, end)
+    space = _SPACE.match(text, tag_end(text, holder))
     assert space is not None
-    return end, end, space.group() + b"<pose>" + _numbers(place) + b"</pose>"
+    return with_child(text, holder, f"{space.group().decode()}<pose>{_numbers(place)}</pose>")
 
 
-def _numbers(pose: Pose) -> bytes:
+def _numbers(pose: Pose) -> str:
     # Adding zero turns -0 into 0.
-    return " ".join(f"{round(value, 9) + 0.0:.10g}" for value in (*pose.position, *pose.rpy())).encode()
+    return " ".join(f"{round(value, 9) + 0.0:.10g}" for value in (*pose.position, *pose.rpy()))

@@ -24,7 +24,7 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario, Sensors
 from ddenv.world.sdf.moved import with_places
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.xml import Edit, Element, edited, floats, parse, tag_end
+from ddenv.world.sdf.xml import Edit, Element, edited, floats, parse, with_child, with_words
 from ddenv.world.whole import whole_of
 
 # Less than this part of a number does not matter, unless it is a place or an angle.
@@ -259,7 +259,7 @@ def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: st
         turned = float(words[5]) + value - model.pose.yaw()
         place, now = (5, turned) if what == "yaw" else ("xyz".index(what), value)
         words[place] = f"{now:.9g}"
-        return edited(world.text, [_said(world.text, pose, " ".join(words))])
+        return edited(world.text, [with_words(world.text, pose, " ".join(words))])
     move = move_of(model, what, value)
     return with_places(world, {model.name: [move @ link.pose for link in model.links]}, scenario.reading)[0]
 
@@ -277,7 +277,7 @@ def _edits(world: World, model: Model, at: Element, what: str, number: str) -> I
         of_shape = element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
         # What is drawn of the same size changes with it.
         if len(values) > place and values[place] == now and (of_shape or what == "mass"):
-            yield _said(text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
+            yield with_words(text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
 
 
 def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
@@ -285,9 +285,9 @@ def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
     for engine, tags in (("ode", ("mu", "mu2")), ("bullet", ("friction", "friction2"))):
         if (holder := collision.find(f"surface/friction/{engine}")) is not None:
             said = {tag: holder.find(tag) for tag in tags}
-            yield from (_said(text, each, number) for each in said.values() if each is not None)
+            yield from (with_words(text, each, number) for each in said.values() if each is not None)
             if lacks := "".join(f"<{tag}>{number}</{tag}>" for tag, each in said.items() if each is None):
-                yield _inside(text, holder, lacks)
+                yield with_child(text, holder, lacks)
             return
     holder, new = collision, f"<ode><mu>{number}</mu><mu2>{number}</mu2></ode>"
     for path, tag in (("surface/friction", "friction"), ("surface", "surface")):
@@ -295,16 +295,4 @@ def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
             holder = found
             break
         new = f"<{tag}>{new}</{tag}>"
-    yield _inside(text, holder, new)
-
-
-def _said(text: bytes, element: Element, words: str) -> Edit:
-    """`element` with other words in it."""
-    start = text[element.start : tag_end(text, element)].removesuffix(b">").removesuffix(b"/").rstrip()
-    return element.start, element.end, start + f">{words}</{element.tag}>".encode()
-
-
-def _inside(text: bytes, holder: Element, new: str) -> Edit:
-    """`holder` with new elements as its first ones."""
-    end = tag_end(text, holder)
-    return _said(text, holder, new) if end == holder.end else (end, end, new.encode())
+    yield with_child(text, holder, new)

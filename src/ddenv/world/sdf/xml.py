@@ -102,6 +102,18 @@ def tag_end(text: bytes, element: Element) -> int:
     return element.end if found is None else found.end()
 
 
+def with_words(text: bytes, element: Element, words: str) -> Edit:
+    """`element` with other words in it."""
+    start = text[element.start : tag_end(text, element)].removesuffix(b">").removesuffix(b"/").rstrip()
+    return element.start, element.end, start + f">{words}</{element.tag}>".encode()
+
+
+def with_child(text: bytes, holder: Element, new: str) -> Edit:
+    """`holder` with new elements as its first ones."""
+    end = tag_end(text, holder)
+    return with_words(text, holder, new) if end == holder.end else (end, end, new.encode())
+
+
 def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
     """`text` with some bytes replaced."""
     parts, at = [], 0
