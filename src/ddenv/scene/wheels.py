@@ -13,7 +13,7 @@ import numpy as np
 from ddenv.errors import UserError
 from ddenv.scene import mesh
 from ddenv.scene.mesh import Surface, paint
-from ddenv.world.drive import Drive, find_drive, rolled, turned_links, wheel_links
+from ddenv.world.drive import Drive, find_drive, rolled, wheel_links
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector, pose_of
 from ddenv.world.scenario import Wheels as Named
@@ -57,7 +57,9 @@ class Wheels:
     @property
     def body(self) -> Model:
         """The robot without its wheels."""
-        turned = frozenset[str]() if self._drive is None else turned_links(self._robot, self._drive.joints)
+        joints = () if self._drive is None else self._drive.joints
+        driven = (joint for joint in self._robot.joints if joint.name in joints)
+        turned = {link.name for joint in driven for link in wheel_links(self._robot, joint)}
         return replace(self._robot, links=tuple(link for link in self._robot.links if link.name not in turned))
 
     def turned(self, rows: np.ndarray) -> np.ndarray:
