@@ -118,7 +118,7 @@ def test_a_run_that_was_made_small_is_well(run):
     change(run, "DELETE FROM motion WHERE test = 4")
     found = run_health(run)
     assert is_well(found)
-    assert [finding.says[:6] for finding in found if finding.what == "trajectories"] == ["1 of 4"]
+    assert [finding.says[:6] for finding in found if finding.what == "trajectories"] == ["1 of 3"]
 
 
 def test_a_log_of_another_run_does_not_hide_what_is_whole(run):

@@ -68,7 +68,7 @@ def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, 
 def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(tmp_path, monkeypatch, share, simulated):
     """One of the fresh runs of this simulator follows from another one."""
     monkeypatch.setattr("ddenv.engine.slicing.CHEAP", share)
-    made_by = Participation(salt=2, needed=(MODELS[0], MODELS[3]), tenths=8)
+    made_by = Participation(salt=8, needed=(MODELS[0], MODELS[3]), tenths=8)
     state = drive(sliced_run(tmp_path, accept_rate="kept", audit=1_000_000), made_by.pool())
     fresh = [test for test in state.finished_tests if test.phase == CERTIFY]
     audits, implied = (sum(getattr(test, kind) is not None for test in fresh) for kind in ("audits", "implied_by"))

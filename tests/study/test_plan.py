@@ -6,7 +6,7 @@ import pytest
 
 from ddenv import schemas
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import MOST_ALONE, MOST_BROKEN, MOST_PAIRS
+from ddenv.evidence.certificate import MOST_BROKEN, MOST_PAIRS
 from ddenv.reduction.procedure import MOST_STEPS_BACK
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS
 from ddenv.runfile.state import FIRST_FRESH_RUN
@@ -102,7 +102,7 @@ def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterati
     one = max(baseline_runs, 1 + iterations, LONGEST_BASELINE, MOST_RUNS)
     assert one < FIRST_FRESH_RUN
     steps = 1 + MOST_STEPS_BACK
-    last = FIRST_FRESH_RUN + steps * (MOST_ALONE + MOST_PAIRS + MOST_BROKEN + 1)
+    last = FIRST_FRESH_RUN + steps * (MOST_PAIRS + MOST_BROKEN + 1)
     seeds = [cell.seed for cell in plan.cells]
     assert seeds[0] == 7
     assert all(after - before > last for before, after in pairwise(seeds))

@@ -1,5 +1,6 @@
 """What the run screen shows and its keys that change nothing, on runs whose engine is a fake."""
 
+import asyncio
 import subprocess
 import sys
 from collections import Counter
@@ -365,6 +366,21 @@ async def test_names_are_text_and_never_markup(runs):
         await session.press("w", *"[bo", "tab", "enter")
         assert "without [bold]x[/]" in session.said()
     run.close()
+
+
+async def test_all_that_a_key_changes_is_drawn_at_once(run):
+    fake_moments.uncertified(run)
+    async with Attached(run) as session:
+        drawn, display = [], session.app._display
+        session.app._display = lambda screen, update: drawn.append(update) or display(screen, update)
+        for key in ("down", "up", "tab", "shift+tab"):
+            await asyncio.sleep(0.1)
+            await session.pilot.pause()
+            drawn.clear()
+            await session.press(key)
+            await asyncio.sleep(0.1)
+            await session.pilot.pause()
+            assert len([each for each in drawn if each is not None]) == 1, key
 
 
 @pytest.mark.screens

@@ -91,8 +91,8 @@ def _depth(body: Hull, obstacle: Collision) -> float:
     """How deep a body is inside an obstacle, m."""
     if not isinstance(obstacle.shape, Plane):
         return overlap(body, hull(obstacle))
-    up = np.array(obstacle.pose.rotate((0.0, 0.0, 1.0)))
-    return float(up @ obstacle.pose.position - (body.vertices @ up).min()) + body.radius
+    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
+    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
 
 
 # Models at rest in a saved world overlap by millimetres; this is more, m.
@@ -151,6 +151,9 @@ def inside(world: World) -> list[Inside]:
     deepest: dict[tuple[str, str], float] = {}
     for first, second in islice(_near(shapes), MOST_PAIRS):
         (model, shape), (other, obstacle) = shapes[first], shapes[second]
+        # What cannot move, or has no end, is the obstacle.
+        if model.static or isinstance(shape.shape, Plane):
+            (model, shape), (other, obstacle) = (other, obstacle), (model, shape)
         depth = _depth(hull(shape), obstacle)
         if depth > INSIDE:
             pair = model.name, other.name
@@ -159,15 +162,20 @@ def inside(world: World) -> list[Inside]:
 
 
 def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
-    """The shapes of two models that may overlap by the boxes around them, each pair once; the first can move."""
+    """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
     low, high = stacked(filled_bounds(one) for _, one in shapes)
     free = np.array([not model.static for model, _ in shapes], dtype=bool)
-    owners = np.array([id(model) for model, _ in shapes])
-    for number in np.flatnonzero(free).tolist():
-        deep = (np.minimum(high[number], high) - np.maximum(low[number], low) > INSIDE).all(axis=1)
-        # Of two that can move the one that comes first.
-        deep[:number] &= ~free[:number]
-        yield from ((number, other) for other in np.flatnonzero(deep & (owners != owners[number])).tolist())
+    names = {id(model): number for number, (model, _) in enumerate(shapes)}
+    owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
+    if not free.any():
+        return
+    order = np.argsort(low[:, 0], kind="stable")
+    ends = np.searchsorted(low[order, 0], high[:, 0])
+    for place, number in enumerate(order.tolist()):
+        others = order[place + 1 : ends[number]]
+        deep = (np.minimum(high[number], high[others]) - np.maximum(low[number], low[others]) > INSIDE).all(axis=1)
+        able = (free[number] | free[others]) & (owners[number] != owners[others])
+        yield from ((min(number, other), max(number, other)) for other in others[deep & able].tolist())
 
 
 def overlap_of(model: Model, other: Model) -> float:
@@ -199,6 +207,11 @@ class Hull:
 
     vertices: np.ndarray
     radius: float = 0.0
+
+    def span(self, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest coordinate along each unit vector of `axes`, shape (M, 3)."""
+        along = axes @ self.vertices.T
+        return along.min(axis=1) - self.radius, along.max(axis=1) + self.radius
 
 
 def hull(collision: Collision, place: Pose | None = None) -> Hull:

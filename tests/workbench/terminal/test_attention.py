@@ -34,7 +34,7 @@ async def test_the_end_of_a_run_is_noticed_once_and_only_if_it_is_seen(run, sent
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         assert sent() == []
-        assert session.app.title == "▶ 0 % crates: 6 of 11 models"
+        assert session.app.title == "▶ 5 % crates: 6 of 11 models"
         run.finish(11, "pass")
         await session.look()
         assert sent() == []
