@@ -4,6 +4,7 @@ import json
 import sqlite3
 import zipfile
 from array import array
+from contextlib import closing
 
 import pytest
 from hypothesis import given
@@ -161,6 +162,15 @@ def test_damage_is_told_and_not_thrown(path):
         for read in (file.events, lambda: file.motion(1), lambda: file.document("world")):
             with pytest.raises(UserError, match="damaged run file"):
                 read()
+
+
+def test_a_file_that_another_program_locks_is_not_called_damaged(path):
+    with RunFile(path, wait=0.05) as file, closing(sqlite3.connect(path, isolation_level=None)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(UserError, match="cannot be read now: database is locked by another program; try again"):
+            file.events()
+        other.execute("ROLLBACK")
+        assert file.events()
 
 
 def test_a_full_disk_is_one_line_and_loses_nothing(path):

@@ -18,7 +18,7 @@ from ddenv.cli.terminal import announce, say, wrapped
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold, steps
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import RunFile
+from ddenv.runfile.store import ENGINE_WAIT, RunFile
 from ddenv.runs.folder import attach_name
 from ddenv.runs.programs import last_words, stop_engines
 from ddenv.text import printable
@@ -62,7 +62,8 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
     signal.signal(signal.SIGTERM, _interrupt)
     out = sys.stderr if as_json else sys.stdout
     interrupted = False
-    with RunFile(path) as file:
+    # Where a busy disk keeps the engine from writing, this waits, too.
+    with RunFile(path, wait=ENGINE_WAIT) as file:
         state = fold(file.events())
         before = state.revision
         try:

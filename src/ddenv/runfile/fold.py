@@ -135,11 +135,13 @@ def engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
 
 def finished(state: RunState, event: e.Finished, at: float) -> Changes:
     size, here = len(state.environment), state.nodes[state.node]
+    point = Point(state.tests_done, size, min(size, state.lower_bound))
     return {
         **_ended(state, "finished", event.reason, at),
         "minimal": event.minimal,
         "nodes": with_node(state.nodes, replace(here, minimal=event.minimal)),
-        "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
+        # A run that is resumed at its end finishes again.
+        "history": state.history if state.history[-1] == point else (*state.history, point),
     }
 
 

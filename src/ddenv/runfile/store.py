@@ -152,10 +152,10 @@ class NoRoom(UserError):
 class RunFile:
     """An open run file. Raises UserError for a file that is missing, not a run file, or of another format.
 
-    `untouched` reads the file alone: not its log, and nothing is made beside it.
+    `untouched` reads the file alone: not its log, and nothing is made beside it. `wait` is how long another process may write, s.
     """
 
-    def __init__(self, path: Path, untouched: bool = False) -> None:
+    def __init__(self, path: Path, untouched: bool = False, wait: float = VIEWER_WAIT) -> None:
         self.path = path
         self.address = _address(path, untouched)
         self._owned: tuple[int, int] | None = None
@@ -164,7 +164,7 @@ class RunFile:
         if not path.is_file():
             raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
         try:
-            self._db = sqlite3.connect(self.address, uri=True, isolation_level=None, timeout=VIEWER_WAIT)
+            self._db = sqlite3.connect(self.address, uri=True, isolation_level=None, timeout=wait)
             self._db.execute("PRAGMA trusted_schema = OFF")
         except sqlite3.Error as error:
             raise UserError(f"{path}: cannot be read: {error}") from None
@@ -227,7 +227,7 @@ class RunFile:
             for row in self._db.execute(_ROWS.format("event"), (after, most)):
                 yield recorded(*row)
         except (sqlite3.Error, OverflowError) as error:
-            raise UserError(f"{self.path}: damaged run file: {error}") from None
+            raise _unreadable(self.path, error) from None
 
     def commands(self, after: int = 0) -> list[Request]:
         """The requests of viewers with an id above `after`, in order. Raises UserError."""
@@ -362,7 +362,7 @@ class RunFile:
         try:
             return self._db.execute(query, values).fetchall()
         except (sqlite3.Error, OverflowError) as error:
-            raise UserError(f"{self.path}: damaged run file: {error}") from None
+            raise _unreadable(self.path, error) from None
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
@@ -379,6 +379,12 @@ class RunFile:
                 self._db.execute("ROLLBACK")
             kind = NoRoom if error.sqlite_errorcode in _FULL else UserError
             raise kind(f"{self.path}: cannot be written: {error}; its content is intact") from None
+
+
+def _unreadable(path: Path, error: Exception) -> UserError:
+    if "locked" in str(error):
+        return UserError(f"{path}: cannot be read now: {error} by another program; try again")
+    return UserError(f"{path}: damaged run file: {error}")
 
 
 def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
