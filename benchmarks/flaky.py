@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import nan
 from multiprocessing import get_context
 from statistics import fmean
 
@@ -135,9 +136,8 @@ def reduction(task: Task) -> list[float]:
         seed=task.seed,
     )
     claims = found.claims
-    minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
     left = frozenset(found.kept)
-    least = KEEP_RATE * oracle.rate(whole)
+    most = NEEDED_SHARE * oracle.rate(left) + ROUNDING
 
     def true_rate(without: str | None) -> float:
         return oracle.rate(left - {without})
@@ -145,20 +145,16 @@ def reduction(task: Task) -> list[float]:
     said = {claim.verdict: claim for claim in claims}
     needed = [claim for claim in claims if claim.verdict == "needed"]
     return [
-        100.0 * (oracle.rate(left) >= least - ROUNDING),
+        100.0 * (oracle.rate(left) >= KEEP_RATE * oracle.rate(whole) - ROUNDING),
         100.0 * (not left >= oracle.needed),
         len(left - oracle.needed - oracle.useful),
-        100.0 * minimal if claims else float("nan"),
+        100.0 * all(claim.verdict in ("kept", "needed") for claim in claims) if claims else nan,
         found.baseline_tests,
         found.search_tests,
         found.certificate_tests,
-        100.0 * (true_rate(None) < CERTIFY_RATE * oracle.rate(whole) - ROUNDING) if "kept" in said else float("nan"),
-        100.0 * any(true_rate(claim.without) > NEEDED_SHARE * oracle.rate(left) + ROUNDING for claim in needed)
-        if needed
-        else float("nan"),
-        100.0 * fmean(claim.low <= true_rate(claim.without) <= claim.high for claim in claims)
-        if claims
-        else float("nan"),
+        100.0 * (true_rate(None) < CERTIFY_RATE * oracle.rate(whole) - ROUNDING) if "kept" in said else nan,
+        100.0 * any(true_rate(claim.without) > most for claim in needed) if needed else nan,
+        100.0 * fmean(claim.low <= true_rate(claim.without) <= claim.high for claim in claims) if claims else nan,
     ]
 
 
