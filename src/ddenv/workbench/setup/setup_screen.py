@@ -138,9 +138,7 @@ class SetupScreen(Screen[None]):
         self.call_after_refresh(self._list_files)
         self.query_one(FileList).focus()
 
-    def on_screen_resume(self, event: events.ScreenResume) -> None:
-        # Styles of new widgets need not be computed again.
-        event.refresh_styles = self.stack_updates > 0
+    def on_screen_resume(self) -> None:
         self.call_after_refresh(self.query_one(RunList).read)
 
     def on_resize(self, event: events.Resize) -> None:
