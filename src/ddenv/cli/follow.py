@@ -62,7 +62,7 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
     signal.signal(signal.SIGTERM, _interrupt)
     out = sys.stderr if as_json else sys.stdout
     interrupted = False
-    # Where a busy disk keeps the engine from writing, this waits, too.
+    # On a busy disk the engine may hold its lock for seconds.
     with RunFile(path, wait=ENGINE_WAIT) as file:
         state = fold(file.events())
         before = state.revision

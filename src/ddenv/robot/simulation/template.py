@@ -240,7 +240,7 @@ class Variants:
         return self._within(lambda _: self._template(keep).run(keep, seed, progress, full, listener))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
-        """What rests on what in the whole world, as `piles.settling.supports` has it."""
+        """Which models support which in the whole world; see `piles.settling.supports`."""
         return self._within(lambda whole: supports(whole.context, whole.rehearsals, whole.names, elements))
 
     def settled(self) -> Settled:

@@ -63,7 +63,7 @@ def _copies(part: Part, scope: Scope, text: bytes, folder: str, resources: Resou
         source, copied = resources.sdf(uri, part.at.source.parent)
     except (Missing, Unusable):
         return
-    # A URDF file, a stand-in or a built-in model has no `<model>` that could be copied.
+    # A URDF file, and a stand-in for a file, have no `<model>` that could be copied.
     if source != part.element.source or not copied.startswith(b"<model", part.element.start):
         return
     folder = _joined(folder, posixpath.dirname(uri) if uri.rpartition("/")[2] == source.name else uri)
