@@ -245,11 +245,17 @@ def test_ends_with_its_parent(writer):
 
 @pytest.mark.programs
 def test_a_scene_that_is_started_again_has_its_address_and_proves_it(writer, start_scene):
-    first = start_scene(writer.path)
-    url = url_of(first)
-    port, token = int(url.split(":")[2].split("/")[0]), url.split("/")[-2]
+    # A port that the scenes of other tests do not try.
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    token = server.Server().token
+    server.remember(writer.path, port, token)
     kept = state_file(server.FILE)
     assert kept.stat().st_mode & 0o777 == 0o600
+    first = start_scene(writer.path)
+    url = url_of(first)
+    assert url == f"http://127.0.0.1:{port}/{token}/"
     second = url_of(start_scene(writer.path))
     assert second.endswith(f"/{token}/") and second != url
     first.kill()
