@@ -6,6 +6,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Sequence
+from functools import lru_cache
 
 
 def printable(text: str) -> str:
@@ -29,18 +30,28 @@ def _width(char: str) -> int:
     return 2 if unicodedata.east_asian_width(char) in "WF" else 1
 
 
-def shortened(name: str, columns: int) -> str:
-    """`name` without control characters, cut in its middle to `columns`: names of copies differ at their ends."""
+def shortened(name: str, columns: int, head: int | None = None) -> str:
+    """`name` without control characters, cut to `columns`; `head` of them come before the ellipsis, or about half."""
     name = printable(name)
     if width(name) <= columns:
         return name
-    head, tail = "", ""
+    first, last = "", ""
     while True:
-        take_head = width(head) <= width(tail)
-        char = name[len(head)] if take_head else name[-1 - len(tail)]
-        if width(head) + width(tail) + _width(char) + 1 > columns:
-            return f"{head}…{tail}" if columns > 0 else ""
-        head, tail = (head + char, tail) if take_head else (head, char + tail)
+        take_first = width(first) <= width(last) if head is None else width(first) < head
+        char = name[len(first)] if take_first else name[-1 - len(last)]
+        if width(first) + width(last) + _width(char) + 1 > columns:
+            return f"{first}…{last}" if columns > 0 else ""
+        first, last = (first + char, last) if take_first else (first, char + last)
+
+
+@lru_cache(maxsize=64)
+def told_apart(names: tuple[str, ...], columns: int) -> dict[str, str]:
+    """Each name as it is shortened to `columns`, with the ellipsis nearest to the middle where no two look the same."""
+    for head in (None, *sorted(range(columns), key=lambda place: abs(place - columns // 2))):
+        texts = {name: shortened(name, columns, head) for name in names}
+        if len(set(texts.values())) == len(texts):
+            return texts
+    return {name: shortened(name, columns) for name in names}
 
 
 def truncated(line: str, columns: int) -> str:

@@ -14,7 +14,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
-from ddenv.text import count, percent, plain, shortened
+from ddenv.text import count, percent, plain, told_apart
 from ddenv.words.claims import made_of_usual, short
 from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
 from ddenv.words.slices import implied_words
@@ -116,8 +116,8 @@ def round_title(state: RunState) -> tuple[str, str]:
 def fitting(listing: Listed, width: int) -> tuple[Column, ...]:
     first = listing.rest[0] if listing.rest else None
     if isinstance(first, FreshRuns):
-        names = (name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
-        longest = Column("environment", max(13, *(cell_len(name) + 1 for name in names)))
+        rows = (_environment(each, listing) for each in listing.rest if isinstance(each, FreshRuns))
+        longest = Column("environment", max(13, *(cell_len(text) + 1 for text in rows)))
         return _fitted((longest, *FRESH_COLUMNS), width)
     unused: tuple[str, ...] = () if isinstance(first, Candidate) else OF_CANDIDATES
     if isinstance(first, Candidate) and first.distance is None:
@@ -144,7 +144,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     if isinstance(item, Test):
         return _run(snapshot, item, row + 1 - len(listing.trials))
     if isinstance(item, FreshRuns):
-        return certificate_words(snapshot, item)
+        return _certificate_words(snapshot, item, listing)
     tests = snapshot.state.tests_of(item.tests)
     done = [test for test in tests if test.is_finished]
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
@@ -210,9 +210,10 @@ def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
     }
 
 
-def name_of(one: FreshRuns) -> str:
+def _environment(one: FreshRuns, listing: Listed) -> str:
     if one.without is not None:
-        return f"- {shortened(one.without, MODEL_WIDTH)}"
+        models = (each.without for each in listing.rest if isinstance(each, FreshRuns))
+        return f"- {told_apart(tuple(filter(None, models)), MODEL_WIDTH)[one.without]}"
     if one.is_left:
         return "what is left"
     if one.is_chosen:
@@ -233,9 +234,9 @@ def certificate_title(state: RunState) -> tuple[str, str]:
     return f"Certificate{number}: {keeps}", far
 
 
-def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
+def _certificate_words(snapshot: Snapshot, one: FreshRuns, listing: Listed) -> Mapping[str, str]:
     return {
-        "environment": name_of(one),
+        "environment": _environment(one, listing),
         "runs": str(one.runs) if one.runs else "",
         "ended": signs(dict(one.outcomes)),
         "f": percent(one.shown / one.runs) if one.runs and not one.is_chosen else "",

@@ -18,7 +18,7 @@ from ddenv.runs.changes import changes
 from ddenv.runs.folder import attach_name
 from ddenv.runs.reasons import Nearest, Parting, Reason, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.runs.subject import read_parts
-from ddenv.text import as_sentence, padded, percent, plain, shortened
+from ddenv.text import as_sentence, padded, percent, plain, shortened, told_apart
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
 from ddenv.words.signs import CLAIM
@@ -115,14 +115,19 @@ def head(width: int) -> Text:
     return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
 
 
-def row(one: Entry, width: int) -> Text:
-    """The letter of a model on the map, its name, how often f shows without it, and the interval of that in %."""
+def listed(entries: Sequence[Entry], width: int) -> Iterator[Text]:
+    """The letter of each model on the map, its name, how often f shows without it, and the interval of that in %."""
+    names = told_apart(tuple(one.name for one in entries if one.claim is not None), _name(width))
+    return (_row(one, width, names.get(one.name, "")) for one in entries)
+
+
+def _row(one: Entry, width: int, name: str) -> Text:
     if one.figures:
         room = max(4, width - len(one.figures) - 4)
         return Text(f"   {padded(shortened(one.name, room), room)} {one.figures}", no_wrap=True)
     if one.claim is None:
         return Text(f"{'○' if one.name == NEAREST else ' '}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
-    name, claim = padded(shortened(one.name, _name(width)), _name(width)), one.claim
+    name, claim = padded(name, _name(width)), one.claim
     interval = f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}" if claim.runs and not claim.is_exact else ""
     figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
     return Text(f"{one.letter:<3}", "bold", no_wrap=True).append(f"{name}{figures}", "not bold")

@@ -34,7 +34,7 @@ from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.shared.background import call_if_open, refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
-from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
+from ddenv.workbench.why.entries import Entry, entries, head, head_of, listed, nothing_yet, remedy, said
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
@@ -200,7 +200,7 @@ class WhyScreen(Screen[None]):
             return
         width = max(20, options.size.width - options.styles.scrollbar_size_vertical)
         at = options.highlighted or 0
-        options.set_options(Option(row(each, width)) for each in self._entries)
+        options.set_options(map(Option, listed(self._entries, width)))
         self.query_one("#why-head", Static).update(head(width))
         options.highlighted = min(at, len(self._entries) - 1)
         self._show_entry()
