@@ -26,6 +26,8 @@ SCALE = {
     "probdd": (8.0, 0.25),
     "splitting": (6.2, 0.25),
 }
+# What is late takes another one in so many parts of the likely number.
+LATE = 3
 # Most candidates do not show f, and get all their re-runs.
 # Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
 RERUN, FEWER, MORE = 0.75, 0.35, 2.3
@@ -96,8 +98,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         now = in_the_making(state)
         if now is None or _is_overdue(state):
             return None
-        (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
-        return low - done, likely - done, high - done
+        return _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
     forecast, baseline = state.forecast, state.baseline
     if forecast is None or baseline is None or _is_overdue(state):
         return None
@@ -107,9 +108,15 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     asked = settings(state)
     certificate = certificate_tests(rate, asked.certify_rate, left, baseline.runs, baseline.runs)
     certificate = (RUNS_BESIDE,) * 3 if asked.accept_rate == "exact" else certificate
-    search = (max(0, each - done) for each in forecast.tests)
+    search = _after(forecast.tests, done)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
+
+
+def _after(expected: tuple[int, int, int], done: int) -> tuple[int, int, int]:
+    """What is left of these, as (low, likely, high). What takes longer than is likely is not about to end."""
+    low, likely, high = (max(0, each - done) for each in expected)
+    return low, max(likely, min(expected[1], high) // LATE), high
 
 
 def _seconds_of_a_test(state: RunState) -> float | None:
