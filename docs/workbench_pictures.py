@@ -401,6 +401,9 @@ async def branch(pilot: Pilot[int]) -> None:
     await press(pilot, "space")
     await until(pilot, lambda: state(pilot).paused)
     await press(pilot, "u")
+    if state(pilot).status == "waiting":
+        # The next reduction may wait already, which undo drops.
+        await press(pilot, "d")
     await until(pilot, lambda: state(pilot).nodes[-1].rejected)
     await press(pilot, "h")
     await take(pilot, "history")
