@@ -31,7 +31,9 @@ def _width(char: str) -> int:
 
 
 def shortened(name: str, columns: int, head: int | None = None) -> str:
-    """`name` without control characters, cut to `columns`; `head` of them come before the ellipsis, or about half."""
+    """`name` without control characters, cut to `columns`. `head` of them come before the ellipsis; by default about half, since
+    names of copies differ at their ends.
+    """
     name = printable(name)
     if width(name) <= columns:
         return name

@@ -26,7 +26,7 @@ SCALE = {
     "probdd": (8.0, 0.25),
     "splitting": (6.2, 0.25),
 }
-# What is late takes another one in so many parts of the likely number.
+# Where the likely number of tests is nearly made or exceeded, one part in so many of it is still expected.
 LATE = 3
 # Most candidates do not show f, and get all their re-runs.
 # Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
@@ -114,7 +114,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
 
 
 def _after(expected: tuple[int, int, int], done: int) -> tuple[int, int, int]:
-    """What is left of these, as (low, likely, high). What takes longer than is likely is not about to end."""
+    """What is left of `expected`, as (low, likely, high), once `done` are made. What is late is not about to end."""
     low, likely, high = (max(0, each - done) for each in expected)
     return low, max(likely, min(expected[1], high) // LATE), high
 
