@@ -13,10 +13,22 @@ from hypothesis import strategies as st
 from ddenv.engine.control import _EVENTS, Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
-from ddenv.guiding.commands import KINDS, parse, refusal, send, written
-from ddenv.guiding.course import GoBack, Pause, Resume, StartEngine, Step, Stop, Undo
+from ddenv.guiding.commands import (
+    KINDS,
+    GoBack,
+    Pause,
+    Resume,
+    Situation,
+    StartEngine,
+    Step,
+    Stop,
+    Undo,
+    parse,
+    refusal,
+    send,
+    written,
+)
 from ddenv.guiding.offers import ACTIONS, Pointed, offer
-from ddenv.guiding.situation import Situation
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.run_keys import GUIDING, KeyOffers
 from tests.engine.fake import ELEMENTS, new_run

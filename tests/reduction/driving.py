@@ -16,7 +16,7 @@ from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.procedure import Certificate, Leg, Past
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.round import Stacks
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.worlds import evidence
 

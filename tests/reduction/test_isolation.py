@@ -12,7 +12,7 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import settle
 from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.isolation import MOST_RUNS, Asked, Checked, Passing, isolating, isolation, passes
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.round import Stacks
 from ddenv.reduction.verdict import standing
 from tests.reduction.driving import Driver, Known, World
 from tests.reduction.worlds import carried_through, tried

@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.environment import Environment
-from ddenv.reduction.chance import beliefs, spatial_prior, undominated
-from ddenv.reduction.evidence import Evidence, Traits, Trial
+from ddenv.reduction.evidence import Evidence, Traits, Trial, spatial_prior
 from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.learner import Learner
+from ddenv.reduction.learner import Learner, beliefs, undominated
 from tests.reduction.worlds import evidence, tried
 
 

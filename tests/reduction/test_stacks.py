@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ddenv.environment import Environment
 from ddenv.reduction.evidence import Trial
 from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.round import Stacks
 from ddenv.runfile.supports import stacks
 from tests.reduction.test_algorithms import any_oracle, every_search
 from tests.reduction.worlds import evidence, tried

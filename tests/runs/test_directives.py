@@ -5,8 +5,7 @@ import shutil
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.guiding.selections import Try
-from ddenv.guiding.situation import Situation
+from ddenv.guiding.commands import Situation, Try
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import stack_with, stacks_of

@@ -8,11 +8,9 @@ import pytest
 from attached import Attached, starts
 from textual.widgets import Input, Select
 
-from ddenv.guiding import course
-from ddenv.guiding.commands import question
+from ddenv.guiding import commands as asks
+from ddenv.guiding.commands import Adopt, Situation, question
 from ddenv.guiding.offers import Pointed, offer
-from ddenv.guiding.selections import Adopt
-from ddenv.guiding.situation import Situation
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import commands
 from ddenv.workbench.map.world_map import WorldMap
@@ -173,8 +171,8 @@ async def test_what_breaks_off_a_certificate_asks_before(run):
         assert "A new search begins from 2 models" in session.said()
         # The budget alone breaks nothing off.
         state = session.screen.snapshot.state
-        assert question(course.Change({"budget": 900}), state) == ""
-        assert "aborts" in question(course.Change({"iterations": 9}), state)
+        assert question(asks.Change({"budget": 900}), state) == ""
+        assert "aborts" in question(asks.Change({"iterations": 9}), state)
 
 
 async def test_a_notice_waits_until_a_dialog_is_closed_and_goes_at_the_next_key(run):

@@ -2,9 +2,8 @@
 
 import fake_moments
 
-from ddenv.guiding.commands import written
+from ddenv.guiding.commands import Situation, written
 from ddenv.guiding.offers import Pointed, offer
-from ddenv.guiding.situation import Situation
 
 
 def why_not(action, state, row=None, models=()):

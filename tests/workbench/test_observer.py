@@ -10,7 +10,7 @@ import pytest
 from attached import Attached
 
 from ddenv.errors import UserError
-from ddenv.guiding.course import Pause, Resume, Stop
+from ddenv.guiding.commands import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.shared import poll as polling

@@ -63,8 +63,7 @@ def isolate_command(
     robot to reach its goal. It changes nothing else.
     """
     from ddenv.cli.follow import Interrupted, follow
-    from ddenv.guiding.course import Isolate
-    from ddenv.guiding.situation import Situation
+    from ddenv.guiding.commands import Isolate, Situation
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.programs import start_engine

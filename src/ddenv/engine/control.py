@@ -17,10 +17,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, rejudged
 from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.guiding.commands import KINDS, Command, parse, refusal
-from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
-from ddenv.guiding.selections import Accept, AcceptOther, Adopt, LeaveOut, Pin, Reject, Try, Unpin, Unveto, Veto
-from ddenv.guiding.situation import Situation, label_of, numbers_of
+from ddenv.guiding import commands as c
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import failures_at
 from ddenv.runfile.store import NoRoom, Request, RunFile
@@ -29,7 +26,7 @@ from ddenv.world.scenario import FailureSpec
 # Decisions within this time start one new search, not several, s.
 SETTLE = 0.5
 # Commands sent to an earlier engine must not pause this one.
-OF_THE_MOMENT = (Stop, Pause, Step, AcceptMode)
+OF_THE_MOMENT = (c.Stop, c.Pause, c.Step, c.AcceptMode)
 
 
 class Stopped(Exception):
@@ -122,7 +119,7 @@ class Control:
         for command in self._journal.file.commands(self._journal.state.last_command):
             if command.id > after:
                 return
-            if KINDS.get(command.kind) in OF_THE_MOMENT:
+            if c.KINDS.get(command.kind) in OF_THE_MOMENT:
                 self._handled(command)
             else:
                 self._obey(command)
@@ -135,7 +132,7 @@ class Control:
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
-            if KINDS.get(command.kind) is Accept:
+            if c.KINDS.get(command.kind) is c.Accept:
                 # The reduction comes before any other decision.
                 return
 
@@ -202,10 +199,10 @@ class Control:
     def _why_not(self, request: Request) -> str:
         """Obeys a command, or returns why it is not possible now."""
         try:
-            command = parse(request.kind, request.data)
+            command = c.parse(request.kind, request.data)
         except UserError as error:
             return str(error)
-        why = refusal(command, Situation(self._journal.state))
+        why = c.refusal(command, c.Situation(self._journal.state))
         if not why:
             self._do(command)
         return why
@@ -215,23 +212,23 @@ class Control:
         self._journal.record(events.CommandHandled())
         self._journal.command = None
 
-    def _do(self, command: Command) -> None:
+    def _do(self, command: c.Command) -> None:
         """Does what is possible now. Raises Stopped."""
         match command:
-            case Pause():
+            case c.Pause():
                 if not self._paused:
                     self._pause()
-            case Resume():
+            case c.Resume():
                 self._run(credit=None, pause_after_round=False)
-            case Step(unit):
+            case c.Step(unit):
                 self._run(credit=1 if unit == "test" else None, pause_after_round=unit == "round")
-            case Stop():
+            case c.Stop():
                 raise Stopped("stopped by the user")
-            case Undo():
+            case c.Undo():
                 here = self._journal.state.here
                 if here is not None and here.parent is not None:
                     self._go(here.parent, rejected=here.number)
-            case GoBack(node):
+            case c.GoBack(node):
                 self._go(node, rejected=None)
                 if not self._paused:
                     self._pause()
@@ -262,24 +259,24 @@ def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
     return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
 
 
-def _adopted(journal: Journal, asked: Adopt) -> events.Event:
+def _adopted(journal: Journal, asked: c.Adopt) -> events.Event:
     trial = journal.state.trials[asked.trial - 1]
     return events.Adopted(asked.trial, trial.environment, trial.tests[-1])
 
 
-def _left_out(journal: Journal, asked: LeaveOut) -> events.Event:
+def _left_out(journal: Journal, asked: c.LeaveOut) -> events.Event:
     test = asked.evidence(journal.state)
     assert test is not None
     return events.LeftOut(asked.model, test.environment, test.id, by_user=True)
 
 
-def _accepted_other(journal: Journal, asked: AcceptOther) -> events.Event:
+def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
     state = journal.state
     test = state.tests[asked.test - 1]
     unnamed = asked.instead or test.phase == "hand"
     return events.AcceptedOther(
         test.id,
-        f"test {test.id}" if unnamed else label_of(state, test),
+        f"test {test.id}" if unnamed else c.label_of(state, test),
         test.environment,
         _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id)),
         None if asked.instead else test.trial,
@@ -288,19 +285,19 @@ def _accepted_other(journal: Journal, asked: AcceptOther) -> events.Event:
 
 
 # What each decision of the user is in the run file.
-_EVENTS: dict[type[Command], Callable[[Journal, Any], events.Event]] = {
-    AcceptMode: lambda journal, asked: events.AcceptModeChanged(asked.mode),
-    Accept: lambda journal, asked: events.Decided(asked.round, asked.candidate, "accept"),
-    Reject: lambda journal, asked: events.Decided(asked.round, asked.candidate, "reject"),
-    Veto: lambda journal, asked: events.Vetoed(asked.round, asked.candidate),
-    Unveto: lambda journal, asked: events.Unvetoed(asked.round, asked.candidate),
-    Pin: lambda journal, asked: events.Pinned(numbers_of(journal.state, asked.new(journal.state))),
-    Unpin: lambda journal, asked: events.Unpinned(numbers_of(journal.state, asked.pinned(journal.state))),
-    Try: lambda journal, asked: events.TrialStarted(
+_EVENTS: dict[type[c.Command], Callable[[Journal, Any], events.Event]] = {
+    c.AcceptMode: lambda journal, asked: events.AcceptModeChanged(asked.mode),
+    c.Accept: lambda journal, asked: events.Decided(asked.round, asked.candidate, "accept"),
+    c.Reject: lambda journal, asked: events.Decided(asked.round, asked.candidate, "reject"),
+    c.Veto: lambda journal, asked: events.Vetoed(asked.round, asked.candidate),
+    c.Unveto: lambda journal, asked: events.Unvetoed(asked.round, asked.candidate),
+    c.Pin: lambda journal, asked: events.Pinned(c.numbers_of(journal.state, asked.new(journal.state))),
+    c.Unpin: lambda journal, asked: events.Unpinned(c.numbers_of(journal.state, asked.pinned(journal.state))),
+    c.Try: lambda journal, asked: events.TrialStarted(
         len(journal.state.trials) + 1, journal.number(Environment.of(asked.models))
     ),
-    Adopt: _adopted,
-    LeaveOut: _left_out,
-    AcceptOther: _accepted_other,
-    Change: lambda journal, asked: events.Changed(asked.new(journal.state)),
+    c.Adopt: _adopted,
+    c.LeaveOut: _left_out,
+    c.AcceptOther: _accepted_other,
+    c.Change: lambda journal, asked: events.Changed(asked.new(journal.state)),
 }

@@ -23,9 +23,8 @@ from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.guide import Search, make_guide, search
-from ddenv.reduction.round import Candidate, Round
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.round import Candidate, Round, Search, Stacks
 from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest

@@ -11,10 +11,10 @@ from ddenv.engine.judging import Sight, known_failure
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, anytime_interval
-from ddenv.reduction.chance import distances_to_failure
+from ddenv.reduction.evidence import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Each, Passing, isolation
 from ddenv.reduction.procedure import Judged, NamedClaim, Wants
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.round import Stacks
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import exact_runs
 from ddenv.runfile.progress import Isolation

@@ -11,7 +11,7 @@ from ddenv.engine.journal import Journal
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.slices import fresh_chance, implies
 from ddenv.reduction.procedure import Test as Wanted
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.round import Stacks
 from ddenv.runfile.events import Sliced, SlicesRefuted
 from ddenv.runfile.fold_claims import rests_on_slices
 from ddenv.runfile.fold_decisions import exact_runs, rested_on

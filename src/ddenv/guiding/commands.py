@@ -1,25 +1,569 @@
-"""All commands, their form in the run file's table `command`, and the rules that all of them share.
-
-A command is its kind with its fields as JSON: `veto {"round": 2, "candidate": 3}`. Models are numbers into the run's elements.
+"""The commands: for each, when it is possible (`refusal`), its words, and its form in the run file's table `command`: its kind with
+its fields as JSON, as in `veto {"round": 2, "candidate": 3}`. Models are numbers into the run's elements.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any, get_args
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, dataclass_transform, get_args
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.guiding.course import Change, CourseCommand, GoBack, Isolate, StartEngine, Undo
-from ddenv.guiding.selections import AcceptOther, Adopt, LeaveOut, Pin, SelectionCommand, Try, Unpin
-from ddenv.guiding.situation import Situation, waiting
+from ddenv.evidence.claims import current, fresh_runs_made, helping, in_the_making
+from ddenv.runfile.deeds import deed
+from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.reading import Invalid, plain, read
-from ddenv.runfile.state import RunState
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.snapshot import EngineIs
+from ddenv.runfile.state import REFUSED, Candidate, RunState, Test, Trial
 from ddenv.runfile.store import RunFile
-from ddenv.text import as_sentence, count, snake_case
+from ddenv.runfile.tested import made_for, purpose
+from ddenv.schemas import check, split_pair
+from ddenv.settings import SETTINGS, Value
+from ddenv.text import as_sentence, coordinates, count, first_of, printable, shortened, snake_case
 
-Command = CourseCommand | SelectionCommand
+Row = Candidate | Trial
+
+# Maximum number of models that a line names, and maximum width of each name in cells.
+NAMED, LONGEST = 2, 32
+
+FINISHED = "the run is finished; u, h, f, c, p, w and o continue from here"
+NO_FAILURE = "f is not known yet: the baseline comes first"
+NO_MODELS = "no such models"
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """A run, and what else decides whether a command is possible.
+
+    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the viewer's last command in brief until
+    the engine obeys it, or "".
+    """
+
+    state: RunState
+    engine: EngineIs = "alive"
+    barred: str = ""
+    pending: str = ""
+
+    def needs_engine(self) -> str:
+        """Why no engine can answer now, or ""."""
+        if self.engine == "starting":
+            return "the engine is still starting"
+        if self.state.status == "finished":
+            return FINISHED
+        return "no engine is running; space starts one" if self.engine == "absent" else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """A command in words: `brief` while it waits for its answer, `said` when it is sent, `question` before that, or ""."""
+
+    brief: str
+    said: str = ""
+    question: str = ""
+
+
+@dataclass_transform(frozen_default=True)
+class Asked:
+    """What the user asks of a run is one of these, and so a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
+
+    def refusal(self, now: Situation) -> str:
+        """Why it is not possible now, in one line, or ""."""
+        return now.needs_engine()
+
+    def words(self, state: RunState) -> Words:
+        return Words(type(self).__name__.lower())
+
+
+def label_of(state: RunState, test: Test) -> str:
+    """What a test was made for, in words."""
+    row = made_for(state, test)
+    if row is None and test.round is None:
+        return purpose(state, test)
+    return row.label if row is not None else f"a candidate of round {test.round}"
+
+
+def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
+    """The numbers of models, in the order of the world."""
+    number = {name: index for index, name in enumerate(state.elements)}
+    return tuple(sorted(number[name] for name in names))
+
+
+def waiting(state: RunState) -> Candidate | None:
+    """The candidate whose reduction waits for accept or reject."""
+    round, waits = state.round, state.waiting_candidate
+    return None if round is None or waits is None else round.candidates[waits]
+
+
+def new_search(state: RunState, size: int | None = None) -> str:
+    """What follows a decision that ends the search, as a sentence without a full stop.
+
+    A new one begins from `size` models, by default as many as are left.
+    """
+    if state.baseline is None:
+        return "The search begins with that"
+    return f"A new search begins from {count(len(state.environment) if size is None else size, 'model')}"
+
+
+def named(names: Iterable[str]) -> str:
+    """The first names of some models, short enough for a line."""
+    return first_of([shortened(name, LONGEST) for name in names], NAMED)
+
+
+# The course of a run.
+
+
+class Pause(Asked):
+    """Start no new test."""
+
+
+class Resume(Asked):
+    """Go on; also ends a step."""
+
+
+class Step(Asked):
+    """Run one test, or to the end of the round, then pause."""
+
+    unit: Literal["test", "round"] = "test"
+
+    def refusal(self, now: Situation) -> str:
+        waits = now.state.waiting_candidate is not None
+        return now.needs_engine() or ("a reduction waits: accept it with a, or reject it with x" if waits else "")
+
+    def words(self, _: RunState) -> Words:
+        return Words(f"step one {self.unit}")
+
+
+class AcceptMode(Asked):
+    """Make each reduction at once ("automatic"), or wait for accept or reject ("ask")."""
+
+    mode: Literal["automatic", "ask"]
+
+    def words(self, _: RunState) -> Words:
+        ask = self.mode == "ask"
+        said = "each reduction will wait for you" if ask else "reductions are accepted automatically"
+        return Words(f"accept mode {self.mode}", said)
+
+
+class Stop(Asked):
+    """End the engine; another one can go on from there."""
+
+    def refusal(self, now: Situation) -> str:
+        return "no engine is running" if now.engine == "absent" else ""
+
+
+class StartEngine(Asked):
+    """Start an engine on the run. It is not a command: the run file does not have it."""
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if now.engine == "alive":
+            return f"the engine is running already{'; space resumes' if state.paused else ''}"
+        if now.engine == "starting":
+            return "the engine is starting already"
+        if state.status == "finished":
+            return FINISHED
+        spent = state.budget is not None and state.made >= state.budget
+        return f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it" if spent else ""
+
+
+class Isolate(Asked):
+    """Start an engine that finds the nearest world that passes, or goes on with that. It is not a command, as `StartEngine`.
+
+    `again`: search also if that world is known.
+    """
+
+    again: bool = False
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if state.baseline is None:
+            return "no failure is known yet, so there is nothing to isolate"
+        if state.status != "finished" and state.isolating is None:
+            return "its search is not over; let it end first"
+        if now.engine != "absent":
+            return "an engine is working on the run; let it end first"
+        if state.isolated is not None and state.isolating is None and not self.again:
+            return "a nearest world that passes is known: W shows it; 'ddenv isolate RUN --again' searches again"
+        return ""
+
+
+class Undo(Asked):
+    """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
+
+    def refusal(self, now: Situation) -> str:
+        here = now.state.here
+        if here is None or here.parent is None:
+            return "there is no reduction to take back"
+        return "the last undo is not done yet" if now.pending == "undo" else ""
+
+    def words(self, state: RunState) -> Words:
+        here = state.here
+        if here is None or here.parent is None:
+            return Words("undo")
+        after = len(state.nodes[here.parent].environment)
+        said = f"{here.what} is taken back. {new_search(state, after)}"
+        again = f"It will not reduce to these {len(here.environment)} again, in any branch, unless you allow it"
+        return Words("undo", f"{said}. {again}: v on their row, or h and enter on #{here.number}")
+
+
+class GoBack(Asked):
+    """Make the environment of a node the current one again; the run pauses there."""
+
+    node: int
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if not 0 <= self.node < len(state.nodes):
+            return "there is no such place in the history"
+        if state.baseline is None:
+            return NO_FAILURE
+        return "the run is there already" if self.node == state.node else ""
+
+    def words(self, state: RunState) -> Words:
+        there = place(state.nodes[self.node])
+        question = (
+            f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o); then press space to go on. "
+            "Later results stay in the history, and you can come back to them. No test is repeated."
+        )
+        return Words("go back", f"back to {there}; the run pauses there, and space begins a new search", question)
+
+
+class Change(Asked):
+    """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
+
+    settings: dict[str, Any]
+
+    def refusal(self, now: Situation) -> str:
+        if not set(self.settings) <= set(CHANGEABLE):
+            return ONLY_CHANGEABLE
+        if wrong := [why for name, value in self.settings.items() if (why := _wrong(name, value))]:
+            return "; ".join(wrong)
+        new = self.new(now.state)
+        budget, done = new.get("budget"), now.state.made
+        if isinstance(budget, int) and budget <= done:
+            return f"budget: {count(done, 'test')} were made already; enter more, or leave it empty"
+        return "" if new else "these are the settings already"
+
+    def words(self, state: RunState) -> Words:
+        new = self.new(state).items()
+        words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
+        then = f". {new_search(state)}" if self.begins_anew(state) else ""
+        return Words("change settings", f"from now on: {words}{then}")
+
+    def begins_anew(self, state: RunState) -> bool:
+        """Whether a new search begins: the budget alone changes nothing in the order of the tests."""
+        return not set(self.new(state)) <= {"budget"}
+
+    def new(self, state: RunState) -> dict[str, Value]:
+        """The settings that differ from the current ones."""
+        now = settings(state)
+        return {key: value for key, value in self.settings.items() if getattr(now, key) != value}
+
+
+# The settings that may change during a run: all others define what a test is, or how f was fixed.
+CHANGEABLE = {one.name: one for one in SETTINGS.values() if one.may_change}
+ONLY_CHANGEABLE = f"only {', '.join(CHANGEABLE)} can be changed during a run"
+
+
+def typed(name: str, text: str) -> int | str | None:
+    """The value that was typed or chosen; None for no limit. Raises UserError."""
+    if CHANGEABLE[name].choices:
+        return text
+    if not text.strip() and CHANGEABLE[name].none:
+        return None
+    try:
+        return int(text.strip())
+    except ValueError:
+        raise UserError(f"{name}: expected a whole number, found '{text[:20]}'") from None
+
+
+def _wrong(name: str, value: Any) -> str:
+    """Why the setting cannot have a value, or ""."""
+    one = CHANGEABLE[name]
+    if not one.allows(value):
+        expected = one.range if one.kind is int else " or ".join(one.choices) or "a name"
+        return f"{name}: expected {expected}, found {printable(str(value)[:20])}"
+    try:
+        if name == "pair":
+            split_pair(str(value))
+        elif name == "algorithm":
+            check("algorithm", str(value))
+    except UserError as error:
+        return str(error)
+    return ""
+
+
+# Candidates and models chosen by hand.
+
+
+NONE_HELPS = "no certificate shows a model that only helps"
+
+
+class OfCandidate(Asked):
+    """A decision on a candidate of the current round."""
+
+    round: int
+    candidate: int
+
+    def meant(self, state: RunState) -> Candidate | None:
+        """The candidate, while its round goes on."""
+        current = state.round
+        if current is None or current.done or current.winner is not None or current.number != self.round:
+            return None
+        return current.candidates[self.candidate] if 0 <= self.candidate < len(current.candidates) else None
+
+    def label(self, state: RunState) -> str:
+        one = self.meant(state)
+        return "the candidate" if one is None else one.label
+
+    def refusal(self, now: Situation) -> str:
+        state, waits = now.state, waiting(now.state)
+        # When a new search is due, earlier reductions can no longer be accepted.
+        if state.round is None or waits is None or state.search_due:
+            return "that reduction no longer waits"
+        is_it = (self.round, self.candidate) == (state.round.number, waits.index)
+        return "" if is_it else "that reduction no longer waits"
+
+
+class Accept(OfCandidate):
+    """Make the reduction that waits."""
+
+    def words(self, state: RunState) -> Words:
+        return Words("accept", f"{self.label(state)} is accepted. The next round begins")
+
+
+class Reject(OfCandidate):
+    """Go on as if the candidate that waits had not shown f."""
+
+    def words(self, state: RunState) -> Words:
+        return Words("reject", f"{self.label(state)} is rejected")
+
+
+class Veto(OfCandidate):
+    """Leave out a candidate that has no verdict yet."""
+
+    def refusal(self, now: Situation) -> str:
+        one = self.meant(now.state)
+        if one is None:
+            return round_over(now.state)
+        if one.index == now.state.waiting_candidate:
+            return f"{one.label} showed f and waits: reject it with x"
+        return f"{one.label} is {one.verdict} already" if one.verdict else ""
+
+    def words(self, state: RunState) -> Words:
+        return Words("veto", f"{self.label(state)} is vetoed: it will not be tried in any round; v again undoes that")
+
+
+class Unveto(OfCandidate):
+    """Try a vetoed or rejected candidate after all."""
+
+    def refusal(self, now: Situation) -> str:
+        one = self.meant(now.state)
+        if one is None:
+            return round_over(now.state)
+        return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
+
+    def words(self, state: RunState) -> Words:
+        return Words("allow it again", f"{self.label(state)} is allowed again and will be tried after all")
+
+
+def round_over(state: RunState) -> str:
+    """Why candidates can no longer be left out."""
+    return "the rounds are over" if state.confirming and not state.ended else "this round is over"
+
+
+def _names_of(state: RunState, numbers: Sequence[int]) -> tuple[str, ...] | None:
+    """The names of numbered models, each once; None if there are no such models."""
+    if not all(0 <= number < len(state.elements) for number in numbers):
+        return None
+    return tuple(state.elements[number] for number in dict.fromkeys(numbers))
+
+
+class Pin(Asked):
+    """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
+
+    models: tuple[int, ...]
+
+    def refusal(self, now: Situation) -> str:
+        state, names = now.state, _names_of(now.state, self.models)
+        if not names:
+            return NO_MODELS
+        if gone := [name for name in names if name not in state.environment]:
+            return f"{named(gone[:1])} is removed already: go back (h) to an environment that has it, then pin it"
+        return "" if self.new(state) else "pinned already"
+
+    def words(self, state: RunState) -> Words:
+        return Words("pin", f"pinned, so that it always stays: {named(self.new(state))}. {new_search(state)}")
+
+    def new(self, state: RunState) -> tuple[str, ...]:
+        """The models that are not pinned yet."""
+        return tuple(name for name in _names_of(state, self.models) or () if name not in state.pinned)
+
+
+class Unpin(Asked):
+    """Let pinned models be removed again."""
+
+    models: tuple[int, ...]
+
+    def refusal(self, now: Situation) -> str:
+        return "" if self.pinned(now.state) else "not pinned"
+
+    def words(self, state: RunState) -> Words:
+        return Words("unpin", f"unpinned: {named(self.pinned(state))}. {new_search(state)}")
+
+    def pinned(self, state: RunState) -> tuple[str, ...]:
+        """The models that are pinned."""
+        return tuple(name for name in _names_of(state, self.models) or () if name in state.pinned)
+
+
+class Try(Asked):
+    """Test a selection: `models` are the ones that are kept."""
+
+    models: tuple[int, ...]
+
+    def refusal(self, now: Situation) -> str:
+        state, names = now.state, _names_of(now.state, self.models)
+        if names is None:
+            return NO_MODELS
+        keep = frozenset(names)
+        loose = next((pair for pair in state.welds if pair[0] in keep and pair[1] not in keep), None)
+        if loose is not None:
+            return f"{named(loose[:1])} is welded to {named(loose[1:])}: they stay or go together"
+        if state.baseline is None:
+            return NO_FAILURE
+        if keep == frozenset(state.environment):
+            return "that is the current environment: nothing is left out"
+        under_way = (trial for trial in state.trials if not trial.verdict)
+        return "that is being tried already" if any(frozenset(each.models) == keep for each in under_way) else ""
+
+    def words(self, state: RunState) -> Words:
+        names = _names_of(state, self.models) or ()
+        keep = frozenset(names)
+        without = [name for name in state.environment if name not in keep]
+        is_part = keep < frozenset(state.environment)
+        what = f"without {named(without)}" if is_part and len(without) <= len(names) else f"only {named(names)}"
+        what = f"{count(len(names), 'model')}, {what}" if names else "none of the models"
+        return Words("try", f"try {len(state.trials) + 1}: {what}")
+
+
+class Adopt(Asked):
+    """Make a try that showed f the environment."""
+
+    trial: int
+
+    def refusal(self, now: Situation) -> str:
+        state, trial = now.state, self.meant(now.state)
+        if trial is None:
+            return "there is no such try"
+        # What counted as f in the test may no longer count.
+        if trial.verdict != "similar" or state.tests[trial.tests[-1] - 1].outcome != "similar":
+            return f"{trial.label} did not show f"
+        if trial.models == state.environment:
+            return f"{trial.label} is the environment already"
+        return _lacks_pinned(state, trial.label, trial.models)
+
+    def words(self, state: RunState) -> Words:
+        trial = self.meant(state)
+        size = 0 if trial is None else trial.size
+        return Words("adopt", f"try {self.trial} is adopted. {new_search(state, size)}")
+
+    def meant(self, state: RunState) -> Trial | None:
+        """The try, None if no try has this number."""
+        return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
+
+
+class LeaveOut(Asked):
+    """Make what is left without a model that only helps the environment, by the runs of the certificate."""
+
+    model: int
+
+    def refusal(self, now: Situation) -> str:
+        return NONE_HELPS if self.evidence(now.state) is None else ""
+
+    def words(self, state: RunState) -> Words:
+        test = self.evidence(state)
+        size = 0 if test is None else len(state.environments[test.environment])
+        names = _names_of(state, (self.model,)) or ()
+        return Words("leave out", f"{named(names)} is left out. {new_search(state, size)}")
+
+    def evidence(self, state: RunState) -> Test | None:
+        """A fresh run without the model that showed f; None if the model does not only help."""
+        found, names = current(state), _names_of(state, (self.model,)) or ()
+        if found is None or not set(names) & set(helping(found)):
+            return None
+        fresh = (test for test in state.confirm_tests if test.node == found.node and test.run >= found.first_run)
+        return next((test for test in fresh if test.without in names and test.outcome == "similar"), None)
+
+
+def _lacks_pinned(state: RunState, label: str, models: Sequence[str]) -> str:
+    """Why a selection cannot become the environment, or ""."""
+    lacking = [name for name in state.environment if name in state.pinned and name not in models]
+    return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
+
+
+class AcceptOther(Asked):
+    """Count another failure as f from here on; the models of its test become the environment.
+
+    With `instead` it is a branch from where the test was made: only that failure is f in it.
+    """
+
+    test: int
+    instead: bool = False
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if state.baseline is None:
+            return NO_FAILURE
+        if not 0 < self.test <= len(state.tests):
+            return "there is no such test"
+        test = state.tests[self.test - 1]
+        if test.outcome != "other" or test.end_pose is None:
+            return f"test {test.id} did not end in another failure"
+        if self.instead:
+            return ""
+        label, models = label_of(state, test), state.environments[test.environment]
+        if state.here is None or not models < state.environments[state.here.id]:
+            return f"{label} is not part of the current environment"
+        return _lacks_pinned(state, label, models.names(state.elements))
+
+    def words(self, state: RunState) -> Words:
+        test = state.tests[self.test - 1]
+        models, label = count(len(state.environments[test.environment]), "model"), label_of(state, test)
+        if self.instead:
+            brief, what = "branch to another failure", f"test {test.id}"
+            said = f"a branch reduces the failure of test {test.id}, from {models} on"
+            then = (
+                "Reduce this failure instead of f? The run branches: these models become the environment, and only this failure "
+                "counts as f in the branch. Going back in the history (h) restores f and everything found for it."
+            )
+        else:
+            brief, what = "count another failure as f", printable(label)
+            said = f"the other failure of {label} counts as f, too"
+            then = "Count this failure as f, too? Then these models become the environment. u takes it back."
+        near = test.distance is not None and math.isfinite(test.distance)
+        apart = f", {test.distance:.2f} m from f's end" if near else ""
+        question = (
+            f"In {what} ({models}) the robot {deed(test.failure)} at {_position(test.end_pose)}{apart}."
+            f"\nIn f it {deed(state.failure)} at {_position(state.f_position)}.\n\n{then}"
+        )
+        return Words(brief, said, question)
+
+
+def _position(pose: tuple[float, ...] | None) -> str:
+    return "an unknown place" if pose is None else f"({coordinates(pose[:3])}) m"
+
+
+# All of them.
+
+
+_OfCourse = Pause | Resume | Step | AcceptMode | Stop | Undo | GoBack | Change
+Command = _OfCourse | Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | LeaveOut | AcceptOther
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, LeaveOut, AcceptOther, Undo, GoBack, Change)

@@ -7,33 +7,16 @@ from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, helping
-from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop, Undo
-from ddenv.guiding.selections import (
-    NONE_HELPS,
-    Accept,
-    AcceptOther,
-    Adopt,
-    LeaveOut,
-    Pin,
-    Reject,
-    Try,
-    Unpin,
-    Unveto,
-    Veto,
-    round_over,
-)
-from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of, waiting
+from ddenv.guiding import commands as c
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
 from ddenv.runfile.tested import adoptable
-from ddenv.text import shortened
 
 
 @dataclass(frozen=True, slots=True)
 class Pointed:
     """What the user points at: the `row` under the cursor, which may follow the run (`follows`), and selected `models`."""
 
-    row: Row | None = None
+    row: c.Row | None = None
     follows: bool = False
     models: tuple[str, ...] = ()
 
@@ -45,15 +28,15 @@ class Offer:
     `words` are for the footer, "" if the action's usual ones fit. `why_not` is why it is not possible now, or "".
     """
 
-    command: Command | StartEngine | Isolate | None = None
+    command: c.Command | c.StartEngine | c.Isolate | None = None
     words: str = ""
     why_not: str = ""
 
 
-Meaning = Callable[[Situation, Pointed], Command | StartEngine | Isolate | None]
+Meaning = Callable[[c.Situation, Pointed], c.Command | c.StartEngine | c.Isolate | None]
 
 
-def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
+def offer(action: str, now: c.Situation, pointed: Pointed) -> Offer:
     """What an action of `ACTIONS` does now."""
     if now.barred:
         return Offer(why_not=now.barred)
@@ -63,32 +46,32 @@ def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
         return Offer(why_not=str(error))
     if command is None:
         return Offer()
-    why_not = refusal(command, now)
-    again = isinstance(command, StartEngine) and now.state.engines
+    why_not = c.refusal(command, now)
+    again = isinstance(command, c.StartEngine) and now.state.engines
     return Offer(why_not=why_not) if why_not else Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
 
 
-def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
+def _pause(now: c.Situation, _: Pointed) -> c.Command | c.StartEngine:
     if now.engine == "absent":
-        return StartEngine()
-    return Resume() if now.state.paused else Pause()
+        return c.StartEngine()
+    return c.Resume() if now.state.paused else c.Pause()
 
 
-def _accept(now: Situation, pointed: Pointed) -> Command:
+def _accept(now: c.Situation, pointed: Pointed) -> c.Command:
     """Accept what waits, or else what is under the cursor, or else the last try that shows f."""
     state, row = now.state, pointed.row
-    if state.round is not None and (waits := waiting(state)):
-        return Accept(state.round.number, waits.index)
+    if state.round is not None and (waits := c.waiting(state)):
+        return c.Accept(state.round.number, waits.index)
     # While the cursor follows the run, its row may change before the key is pressed.
     if row is not None and pointed.follows and not isinstance(row, Trial) and not state.paused:
         row = None
     if isinstance(row, Trial) and row.verdict == "similar":
-        return Adopt(row.number)
+        return c.Adopt(row.number)
     other = None if row is None or row.verdict == "similar" else nearest_other(state, row)
     if other is not None:
-        return AcceptOther(other.id)
+        return c.AcceptOther(other.id)
     if last := adoptable(state):
-        return Adopt(last.number)
+        return c.Adopt(last.number)
     if row is None:
         raise UserError("there is nothing to accept")
     if row.verdict == "similar":
@@ -97,20 +80,20 @@ def _accept(now: Situation, pointed: Pointed) -> Command:
     raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
 
 
-def nearest_other(state: RunState, row: Row) -> Test | None:
+def nearest_other(state: RunState, row: c.Row) -> Test | None:
     """The test of a candidate or try that ended in another failure, nearest to the end of f."""
     others = [test for test in state.tests_of(row.tests) if test.outcome == "other" and test.end_pose is not None]
     return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
-def _reject(now: Situation, _: Pointed) -> Command:
-    waits = waiting(now.state)
+def _reject(now: c.Situation, _: Pointed) -> c.Command:
+    waits = c.waiting(now.state)
     if now.state.round is None or waits is None:
         raise UserError("there is nothing to reject")
-    return Reject(now.state.round.number, waits.index)
+    return c.Reject(now.state.round.number, waits.index)
 
 
-def _veto(now: Situation, pointed: Pointed) -> Command:
+def _veto(now: c.Situation, pointed: Pointed) -> c.Command:
     state, row = now.state, pointed.row
     if isinstance(row, Trial):
         raise UserError(f"{row.label} is your own selection; only candidates of the round can be vetoed")
@@ -118,37 +101,37 @@ def _veto(now: Situation, pointed: Pointed) -> Command:
         raise UserError("there are no candidates yet")
     if row is None:
         raise UserError(
-            round_over(state) if state.round.done else "no candidate is under the cursor: 2 shows the table"
+            c.round_over(state) if state.round.done else "no candidate is under the cursor: 2 shows the table"
         )
-    make = Unveto if row.verdict in REFUSED else Veto
+    make = c.Unveto if row.verdict in REFUSED else c.Veto
     return make(state.round.number, row.index)
 
 
-def _pin(now: Situation, pointed: Pointed) -> Command | None:
+def _pin(now: c.Situation, pointed: Pointed) -> c.Command | None:
     if not _any(now.state, pointed.models):
         return None
     state, models = now.state, pointed.models
     if all(name in state.pinned for name in models):
-        return Unpin(numbers_of(state, models))
-    return Pin(numbers_of(state, (name for name in models if name not in state.pinned)))
+        return c.Unpin(c.numbers_of(state, models))
+    return c.Pin(c.numbers_of(state, (name for name in models if name not in state.pinned)))
 
 
-def _try(now: Situation, pointed: Pointed, keep: frozenset[str]) -> Command | None:
+def _try(now: c.Situation, pointed: Pointed, keep: frozenset[str]) -> c.Command | None:
     if now.state.baseline is None:
-        raise UserError(NO_FAILURE)
-    return Try(numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
+        raise UserError(c.NO_FAILURE)
+    return c.Try(c.numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
 
 
-def _leave_out(now: Situation, _: Pointed) -> Command:
+def _leave_out(now: c.Situation, _: Pointed) -> c.Command:
     found = current(now.state)
     helps = () if found is None else helping(found)
     if not helps:
-        raise UserError(NONE_HELPS)
-    return LeaveOut(numbers_of(now.state, helps[:1])[0])
+        raise UserError(c.NONE_HELPS)
+    return c.LeaveOut(c.numbers_of(now.state, helps[:1])[0])
 
 
-def _isolate(now: Situation, _: Pointed) -> Command | Isolate:
-    return Stop() if now.engine != "absent" and now.state.isolating is not None else Isolate()
+def _isolate(now: c.Situation, _: Pointed) -> c.Command | c.Isolate:
+    return c.Stop() if now.engine != "absent" and now.state.isolating is not None else c.Isolate()
 
 
 def _any(state: RunState, models: Collection[str]) -> bool:
@@ -160,32 +143,32 @@ def _any(state: RunState, models: Collection[str]) -> bool:
     elements = frozenset(state.elements)
     fixed = next((name for name in models if name not in elements), None)
     if fixed is not None:
-        raise UserError(f"{shortened(fixed, LONGEST)} is protected: it always stays")
+        raise UserError(f"{c.named([fixed])} is protected: it always stays")
     return True
 
 
 # What the footer calls a command where the action's usual words do not fit.
 _FOOTER: dict[type, str] = {
-    StartEngine: "start",
-    Pause: "pause",
-    Resume: "resume",
-    Accept: "accept",
-    Adopt: "adopt",
-    AcceptOther: "count as f",
-    Reject: "reject",
-    Veto: "veto",
-    Unveto: "take back",
-    Undo: "undo",
-    Stop: "stop",
+    c.StartEngine: "start",
+    c.Pause: "pause",
+    c.Resume: "resume",
+    c.Accept: "accept",
+    c.Adopt: "adopt",
+    c.AcceptOther: "count as f",
+    c.Reject: "reject",
+    c.Veto: "veto",
+    c.Unveto: "take back",
+    c.Undo: "undo",
+    c.Stop: "stop",
 }
 
 # By the names of the run screen's actions. Its other actions change nothing in the run.
 ACTIONS: dict[str, Meaning] = {
     "pause": _pause,
-    "resume": lambda now, pointed: StartEngine(),
-    "step": lambda now, pointed: Step("test"),
-    "step_round": lambda now, pointed: Step("round"),
-    "mode": lambda now, pointed: AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask"),
+    "resume": lambda now, pointed: c.StartEngine(),
+    "step": lambda now, pointed: c.Step("test"),
+    "step_round": lambda now, pointed: c.Step("round"),
+    "mode": lambda now, pointed: c.AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask"),
     "accept": _accept,
     "reject": _reject,
     "veto": _veto,
@@ -193,7 +176,7 @@ ACTIONS: dict[str, Meaning] = {
     "without": lambda now, pointed: _try(now, pointed, frozenset(now.state.environment).difference(pointed.models)),
     "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
     "leave_out": _leave_out,
-    "undo": lambda now, pointed: Undo(),
+    "undo": lambda now, pointed: c.Undo(),
     "isolate": _isolate,
     # A dialog asks for the settings.
     "change": lambda now, pointed: None,

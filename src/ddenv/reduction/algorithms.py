@@ -14,9 +14,18 @@ import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.environment import Environment
-from ddenv.reduction.chance import LEAST
-from ddenv.reduction.guide import Guide, Search
-from ddenv.reduction.round import Candidate, Partition, Round, in_order, left_out, make_round, one_model_partitions
+from ddenv.reduction.evidence import LEAST
+from ddenv.reduction.guide import Guide
+from ddenv.reduction.round import (
+    Candidate,
+    Partition,
+    Round,
+    Search,
+    in_order,
+    left_out,
+    make_round,
+    one_model_partitions,
+)
 
 # A model is taken to be needed once the probability that it is not is below this; it is tried again at the end.
 DOUBT = 0.25
@@ -79,10 +88,7 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
 
 
 def _missed(
-    round: Round,
-    winner: Candidate | None,
-    missed: list[Environment],
-    broke: Callable[[Candidate], bool],
+    round: Round, winner: Candidate | None, missed: list[Environment], broke: Callable[[Candidate], bool]
 ) -> list[Environment]:
     """Groups of models of which at least one is needed, provided that f shows whenever everything that it needs is there.
 
@@ -106,19 +112,15 @@ def _without_implied(round: Round, missed: list[Environment], proves: bool) -> R
     return replace(round, candidates=tuple(worth))
 
 
-def ddmin(elements: Partition, guide: Guide) -> Search:
+def ddmin(elements: Partition, guide: Guide | None = None) -> Search:
     """Classic delta debugging. It cuts the environment into n chunks in the order of the world file, and first tries each chunk
     alone, then each complement. A chunk that shows the failure is split in two; a complement keeps its n - 1 chunks; when nothing
     shows the failure, n doubles. It uses neither positions nor the place of the failure, so it is the baseline that shows what
     space and time are worth.
 
-    Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model is tested, too.
+    Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model is tested, too. It asks nothing
+    of a guide.
     """
-    return by_chunks(elements)
-
-
-def by_chunks(elements: Partition) -> Search:
-    """`ddmin`, which asks nothing of a guide."""
     environment, partitions = elements, _cut(elements, 2)
     while environment:
         winner = yield in_order(environment, partitions, "partition", "complement")
@@ -158,7 +160,10 @@ def probdd(elements: Partition, guide: Guide) -> Search:
         # f needs something, we assume: leaving out everything is not worth a test.
         winner = (yield round) if round.candidates else None
         if winner is None:
-            _raise_chances(group, chance)
+            # Bayes' rule: at least one of the group is needed.
+            some_needed = float(1.0 - np.prod([1.0 - chance[model] for model in group]))
+            for model in group:
+                chance[model] = 1.0 if len(group) == 1 else min(1.0, chance[model] / some_needed)
         else:
             environment = tuple(model for model in environment if model in winner.models)
     return (yield from sweep(tuple(sorted(environment, key=chance.__getitem__))))
@@ -173,13 +178,6 @@ def _best_group(environment: Partition, chance: dict[int, float]) -> Partition:
     return tuple(order[: 1 + int(np.argmax(none_needed * np.arange(1, len(order) + 1)))])
 
 
-def _raise_chances(group: Partition, chance: dict[int, float]) -> None:
-    """Bayes' rule: at least one of the group is needed."""
-    some_needed = 1.0 - np.prod([1.0 - chance[model] for model in group])
-    for model in group:
-        chance[model] = 1.0 if len(group) == 1 else min(1.0, chance[model] / float(some_needed))
-
-
 def splitting(elements: Partition, guide: Guide) -> Search:
     """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves out a group from the far end, of
     the most informative size: the failure shows about as often as not. If it does not show, smaller groups are left out, until the
@@ -189,7 +187,8 @@ def splitting(elements: Partition, guide: Guide) -> Search:
 
     Noisy binary search (Burnashev and Zigangirov, 1974) for the farthest needed model, with the guide's probabilities as prior.
     """
-    line = _far_to_near(elements, guide)
+    scores = guide.rank(one_model_partitions(elements)) if elements else []
+    line = tuple(model for model, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1]))
     weight = dict(zip(line, -np.log1p(-guide.chances(line)), strict=True))
     environment = line
     passed = found = 0.0
@@ -276,8 +275,3 @@ def tried_again(environment: Partition, groups: Sequence[Partition], search: Cal
         elif len(group) > 1:
             waiting += [group[len(group) // 2 :], group[: len(group) // 2]]
     return (yield from search(environment))
-
-
-def _far_to_near(elements: Partition, guide: Guide) -> Partition:
-    scores = guide.rank(one_model_partitions(elements)) if elements else []
-    return tuple(model for model, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1]))

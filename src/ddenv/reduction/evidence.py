@@ -15,6 +15,13 @@ from ddenv.environment import Environment
 Names = tuple[str, ...]
 Place = tuple[float, float, float]
 
+# Probabilities of being needed stay between these, so that no test is impossible.
+LEAST, MOST = 1e-6, 1.0 - 1e-6
+# The expected number of needed models in each e-fold of the distance's rank.
+DENSITY = 0.5
+# How many models are compared with the whole path at a time: 5,000 at once would take hundreds of MB.
+BLOCK = 256
+
 
 class Lacking(Exception):
     """A schema needs evidence that is not known; the message names the field."""
@@ -39,7 +46,7 @@ class Trial:
 
     @property
     def models(self) -> frozenset[str]:
-        """The names of the models that were there, collected at each call: thousands of tests of thousands of models are many."""
+        """The names of the models that were there, collected at each call."""
         return frozenset(self.environment.names(self.elements))
 
 
@@ -100,8 +107,20 @@ class Evidence:
         return np.asarray(self.need("trajectory")[:, 1:4])
 
 
-# How many models are compared with the whole path at a time: 5,000 at once would take hundreds of MB.
-BLOCK = 256
+def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
+    """A lower bound of each model's distance from the end of f, shape (len(environment),), m. Raises Lacking."""
+    end = np.array(evidence.need("failure_position"))
+    apart = np.linalg.norm(evidence.places(environment) - end, axis=1)
+    sizes = [evidence.traits[name].size for name in environment] if evidence.traits else np.zeros(len(environment))
+    return np.asarray(np.maximum(apart - np.array(sizes) / 2, 0.0))
+
+
+def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
+    """The probability that each model is needed, shape (len(environment),): it falls with the rank of its distance to the failure, as
+    1 / rank, and has no scale. Raises Lacking.
+    """
+    ranks = np.argsort(np.argsort(distances_to_failure(environment, evidence), kind="stable"), kind="stable")
+    return np.asarray(np.clip(DENSITY / (1.0 + ranks), LEAST, MOST))
 
 
 def nearest_on_path(places: Floats, times: Floats, path: Floats) -> tuple[Floats, Floats]:

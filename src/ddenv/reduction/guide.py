@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from ddenv import schemas
 from ddenv.arrays import Floats
-from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.reduction.chance import UNIFORM, spatial_prior
-from ddenv.reduction.evidence import Evidence, Lacking, Names
-from ddenv.reduction.round import Candidate, Partition, Round
+from ddenv.reduction.evidence import Evidence, Lacking, Names, spatial_prior
+from ddenv.reduction.round import Candidate, Partition, Search
 
-Split = Callable[[Partition, int], list[Partition]]
-Rank = Callable[[Sequence[Partition]], list[float]]
-Chances = Callable[[Partition], Floats]
-Search = Generator[Round, Candidate | None, Environment]
-
+# The prior without any positions (Wang et al. 2021).
+UNIFORM = 0.1
 # Fields of the evidence in the words of `ddenv.reduce`, where those are others.
 _ARGUMENTS = {"trajectory": "a trajectory", "failure_position": "a failure_pose"}
 
@@ -39,9 +33,9 @@ class Guide:
     whether its tests say nothing about f. `proves`: the search has to show by itself that its end is minimal.
     """
 
-    split: Split
-    rank: Rank
-    chances: Chances
+    split: Callable[[Partition, int], list[Partition]]
+    rank: Callable[[Sequence[Partition]], list[float]]
+    chances: Callable[[Partition], Floats]
     n_partitions: int = 2
     candidates: str = "both"
     complement_order: str = "paper"
@@ -54,12 +48,7 @@ class Guide:
 
 
 def make_guide(
-    partitioning: str,
-    prioritization: str,
-    evidence: Callable[[], Evidence],
-    *,
-    prior: str = "spatial",
-    **more: Any,
+    partitioning: str, prioritization: str, evidence: Callable[[], Evidence], *, prior: str = "spatial", **more: Any
 ) -> Guide:
     """A guide for the schemas of these names, which look at what `evidence()` returns at that moment, and see models by name.
 
@@ -77,7 +66,7 @@ def make_guide(
         models = [name for part in partitions for name in part]
         if not all(partitions) or len(models) != len(names) or set(models) != set(names):
             raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
-        numbers = _numbers(known.elements)
+        numbers = {name: number for number, name in enumerate(known.elements)}
         return [tuple(map(numbers.__getitem__, part)) for part in partitions]
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
@@ -85,9 +74,8 @@ def make_guide(
         with _told("prioritization", prioritization):
             scores = [float(score) for score in rank([_names(known, part) for part in partitions], known)]
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
-            raise UserError(
-                f"prioritization '{prioritization}': expected a score for each of {len(partitions)} partitions"
-            )
+            expected = f"a score for each of {len(partitions)} partitions"
+            raise UserError(f"prioritization '{prioritization}': expected {expected}")
         return scores
 
     def chances_now(environment: Partition) -> Floats:
@@ -108,11 +96,6 @@ def search(algorithm: str, elements: Iterable[int], guide: Guide) -> Search:
 
 def _names(known: Evidence, models: Partition) -> Names:
     return tuple(map(known.elements.__getitem__, models))
-
-
-@lru_cache(maxsize=4)
-def _numbers(elements: Names) -> dict[str, int]:
-    return {name: number for number, name in enumerate(elements)}
 
 
 def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:

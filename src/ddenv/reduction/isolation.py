@@ -16,11 +16,9 @@ from typing import Any
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Claim, Procedure, Wanted, error_of, falls, often
 from ddenv.evidence.rates import estimated_rate, leans_to
-from ddenv.reduction.algorithms import by_chunks
-from ddenv.reduction.guide import Search
+from ddenv.reduction.algorithms import ddmin
 from ddenv.reduction.procedure import NamedClaim, Runs, Step, judge, settled
-from ddenv.reduction.round import Candidate, Partition, Round
-from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.round import Candidate, Partition, Round, Search, Stacks
 from ddenv.reduction.verdict import Verdict
 
 # A world passes if the robot reaches its goal in so many of its runs, and fails in at most this part of those of the whole world.
@@ -134,7 +132,7 @@ def _search(
 ) -> Generator[Step, Any, Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     if smaller:
-        searching = by_chunks(tuple(model for model in asked.suspects if model in smaller))
+        searching = ddmin(tuple(model for model in asked.suspects if model in smaller))
     else:
         searching = isolating(asked.suspects, asked.size)
     algorithm, winner = asked.stacks.expand(searching), None
@@ -157,11 +155,17 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Gen
     backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}
     rule, first = asked.rule, asked.first_run + number * asked.block
     if isinstance(rule, Each):
-        claim = often(passing, asked.at_least)
-        (rate,) = yield from settled(driver, iter([(None, passing, claim)]), lambda _: False, first, "isolate")
-        # The search has made these runs.
-        named = (_exactly(driver, model, with_it, rule.exact) for model, with_it in backs.items())
-        return Checked(removed, (replace(rate, claim=replace(rate.claim, verdict="passes")), *named))
+        runs = iter([(None, passing, often(passing, asked.at_least))])
+        (rate,) = yield from settled(driver, runs, lambda _: False, first, "isolate")
+        named = [replace(rate, claim=replace(rate.claim, verdict="passes"))]
+        for model, with_it in backs.items():
+            # The search has made these runs: the robot misses its goal in one of them if the model is needed.
+            shown = {run: driver.shown(with_it, run, full=True) for run in rule.exact}
+            known = tuple(run for run, one in shown.items() if one is not None)
+            missed = False in shown.values()
+            claim = Claim("needed" if missed else "not needed" if known == rule.exact else "not shown")
+            named.append(NamedClaim(model, with_it, claim, known))
+        return Checked(removed, tuple(named))
     certain = replace(rule, error=error)
 
     def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
@@ -175,15 +179,6 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Gen
     return Checked(removed, (yield from settled(driver, claims(), ends, first, "isolate")))
 
 
-def _exactly(driver: Runs, model: int, with_it: Environment, runs: tuple[int, ...]) -> NamedClaim:
-    """Whether the robot misses its goal in one of these runs once `model` is put back."""
-    known = tuple(run for run in runs if driver.shown(with_it, run, full=True) is not None)
-    missed = any(driver.shown(with_it, run, full=True) is False for run in known)
-    return NamedClaim(
-        model, with_it, Claim("needed" if missed else "not needed" if known == runs else "not shown"), known
-    )
-
-
 def isolating(suspects: Partition, first: int) -> Search:
     """What has to go from the whole world; empty if the robot does not pass even without all `suspects`.
 
@@ -193,19 +188,16 @@ def isolating(suspects: Partition, first: int) -> Search:
     size = max(1, first)
     while suspects:
         group = suspects[:size]
-        winner = yield _only(group, suspects)
+        whole, models = Environment.of(suspects), Environment.of(group)
+        # Its one candidate may be all suspects.
+        candidate = Candidate("partition", 0, group, models, whole - models)
+        winner = yield Round(1, suspects, (group,), (0.0,), (candidate,))
         if winner is not None:
-            return (yield from by_chunks(group))
+            return (yield from ddmin(group))
         if size >= len(suspects):
             break
         size *= 2
     return NOTHING
-
-
-def _only(group: Partition, suspects: Partition) -> Round:
-    """A round with `group` as its one candidate, even if these are all suspects."""
-    whole, models = Environment.of(suspects), Environment.of(group)
-    return Round(1, suspects, (group,), (0.0,), (Candidate("partition", 0, group, models, whole - models),))
 
 
 def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:

@@ -9,17 +9,7 @@ from scipy.spatial.distance import cdist
 from sklearn.linear_model import SGDClassifier
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.reduction.chance import (
-    LEAST,
-    MOST,
-    beliefs,
-    distances_to_failure,
-    logit,
-    sigmoid,
-    spatial_prior,
-    undominated,
-)
-from ddenv.reduction.evidence import Evidence, Names, Traits
+from ddenv.reduction.evidence import LEAST, MOST, Evidence, Names, Traits, distances_to_failure, spatial_prior
 from ddenv.reduction.partitionings import grouped
 
 # After this number of candidates the classifier counts as much as the spatial prior.
@@ -28,6 +18,8 @@ TRUST = 10.0
 EVEN = float(np.log(2.0))
 # Keeps the classifier's weights small while there are few tests.
 REGULARIZATION = 0.01
+# Iterations of belief propagation, each damped by one half: else messages would oscillate.
+SWEEPS = 12
 # The grid of Platt scaling: shifts of all log odds, and slopes.
 SHIFTS = np.linspace(-3.0, 3.0, 13)
 SLOPES = np.array([0.5, 0.75, 1.0, 1.25])
@@ -63,14 +55,22 @@ class Learner:
         order = np.argsort(chances, kind="stable")
         weights = -np.log1p(-chances[order])
         labels = np.empty(len(environment), dtype=int)
-        labels[order] = -_shares(weights, n_partitions)
+        # Each group but the last contains no needed model with even odds; the last gets the likeliest models. If the total weight is
+        # small, all groups get an equal share of it. A model that would exceed the share begins the next group.
+        share = min(EVEN, float(weights.sum()) / n_partitions)
+        before = np.cumsum(weights) - weights
+        labels[order] = -np.minimum(np.floor(before / share + 0.5), n_partitions - 1).astype(int)
         return grouped(environment, labels)
 
     def chances(self, environment: Names, evidence: Evidence) -> Floats:
         """The probability that each model is needed, shape (len(environment),). Learns from the tests since the last call."""
         rows, prior = features(environment, evidence), spatial_prior(environment, evidence)
         if not self._columns:
-            self._begin(environment, rows)
+            count, spread = len(environment), rows.std(axis=0)
+            self._columns = {name: column for column, name in enumerate(environment)}
+            self._rows, self._prior, self._there = np.zeros_like(rows), np.zeros(count), np.ones(count, dtype=bool)
+            self._mean, self._spread = rows.mean(axis=0), np.where(spread > 1e-9, spread, 1.0)
+            self._failed = np.zeros((0, count), dtype=bool)
         here = [self._columns[name] for name in environment]
         self._rows[here], self._prior[here] = (rows - self._mean) / self._spread, prior
         self._learn(here, evidence)
@@ -78,16 +78,12 @@ class Learner:
             return prior
         trust = self._lessons / (self._lessons + TRUST)
         logits = logit(self._prior) + trust * logit(self._classified(self._rows))
-        groups = self._groups(here)
+        # A superset of another group never says anything new.
+        telling = undominated(self._failed[:, here])
+        self._failed = self._failed[telling]
+        groups = self._failed[:, here]
         slope, shift = _scaling(logits[here], logits[~self._there], groups)
         return beliefs(sigmoid(slope * logits[here] + shift), groups, evidence.miss_chance)
-
-    def _begin(self, environment: Names, rows: Floats) -> None:
-        count, spread = len(environment), rows.std(axis=0)
-        self._columns = {name: column for column, name in enumerate(environment)}
-        self._rows, self._prior, self._there = np.zeros_like(rows), np.zeros(count), np.ones(count, dtype=bool)
-        self._mean, self._spread = rows.mean(axis=0), np.where(spread > 1e-9, spread, 1.0)
-        self._failed = np.zeros((0, count), dtype=bool)
 
     def _learn(self, here: list[int], evidence: Evidence) -> None:
         """Learns from the models that went since the last call, and from new candidates without f."""
@@ -125,28 +121,6 @@ class Learner:
             return np.full(len(samples), 0.5)
         return np.asarray(self._classifier.predict_proba(samples)[:, 1])
 
-    def _groups(self, here: list[int]) -> Booleans:
-        """Groups (T, len(here)) of which at least one model is needed: those that candidates without f left out.
-
-        Supersets of another group are dropped for good: they never say anything new.
-        """
-        groups = self._failed[:, here]
-        telling = undominated(groups)
-        self._failed = self._failed[telling]
-        return groups[telling]
-
-
-def _shares(weights: Floats, n: int) -> Integers:
-    """The group of each model, 0 to n - 1; `weights` (M,) are in rising order.
-
-    Each group but the last contains no needed model with even odds; the last gets the likeliest models. If the total weight is
-    small, all groups get an equal share of it.
-    """
-    share = min(EVEN, float(weights.sum()) / n)
-    before = np.cumsum(weights) - weights
-    # A model that would exceed the share begins the next group.
-    return np.minimum(np.floor(before / share + 0.5), n - 1).astype(int)
-
 
 def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, float]:
     """The slope and shift of all log odds that maximize the likelihood of the tests (Platt scaling, with a weak prior at 1 and 0).
@@ -163,6 +137,51 @@ def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, flo
     return float(slopes[best]), float(shifts[best])
 
 
+def logit(chances: Floats) -> Floats:
+    """The log odds of probabilities."""
+    chances = np.clip(chances, LEAST, MOST)
+    return np.log(chances) - np.log1p(-chances)
+
+
+def sigmoid(logits: Floats) -> Floats:
+    """The probabilities of log odds."""
+    return np.clip(1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0))), LEAST, MOST)
+
+
+def beliefs(prior: Floats, groups: Booleans, miss_chance: float = 0.0) -> Floats:
+    """The posterior probabilities (M,) of models, once tests have failed to show f without some groups of them.
+
+    `groups` (T, M): test t left out the models in row t and did not show f. `miss_chance` is the probability of that if none of
+    them is needed. Loopy belief propagation: each test sends each of its models the odds that no other model explains it.
+    """
+    groups = groups[groups.any(axis=1)]
+    if not len(groups):
+        return prior
+    before = logit(prior)
+    messages = np.zeros(groups.shape)
+    for _ in range(SWEEPS):
+        # The odds of each model without the message of the test that asks.
+        odds = np.clip(before + messages.sum(axis=0) - messages, -30.0, 30.0)
+        spared = np.where(groups, -np.logaddexp(0.0, odds), 0.0)
+        others = np.exp(spared.sum(axis=1, keepdims=True) - spared)
+        unexplained = 1.0 - others + others * miss_chance
+        messages = (messages + np.where(groups, -np.log(np.clip(unexplained, LEAST, 1.0)), 0.0)) / 2.0
+    return sigmoid(before + messages.sum(axis=0))
+
+
+def undominated(groups: Booleans) -> Integers:
+    """The rows (K,) of `groups` (T, M) that are not empty and no supersets of another row, which says more; of equal ones the
+    first.
+    """
+    _, firsts = np.unique(groups, axis=0, return_index=True)
+    rows = np.sort(firsts[groups[firsts].any(axis=1)])
+    wide = groups[rows].astype(np.float32)
+    inside = wide @ wide.T >= wide.sum(axis=1)[None, :]
+    np.fill_diagonal(inside, False)
+    minimal: Booleans = ~inside.any(axis=1)
+    return rows[minimal]
+
+
 # Added to distances before their logarithm is taken, so that they do not matter below this scale, m.
 NEAR = 0.1
 # The time scale on which early sensing matters, s.
@@ -176,11 +195,11 @@ def features(models: Names, evidence: Evidence) -> Floats:
     sensed, whether it was touched, size, friction, whether it can move. Raises evidence.Lacking without positions or f's place.
     """
     rows = np.zeros((len(models), 9))
-    rows[:, 0] = _scaled(distances_to_failure(models, evidence))
+    rows[:, 0] = np.log(NEAR + distances_to_failure(models, evidence))
     if evidence.trajectory is not None:
         places, path = evidence.places(models), evidence.path()
-        rows[:, 1] = _scaled(cdist(places, path).mean(axis=1))
-        rows[:, 2] = _scaled(evidence.nearest(models)[:, 0])
+        rows[:, 1] = np.log(NEAR + cdist(places, path).mean(axis=1))
+        rows[:, 2] = np.log(NEAR + evidence.nearest(models)[:, 0])
     sensed = evidence.first_sensed or {}
     times = np.array([sensed.get(name, np.inf) for name in models])
     rows[:, 3] = np.exp(-times / SOON)
@@ -191,7 +210,3 @@ def features(models: Names, evidence: Evidence) -> Floats:
     rows[:, 7] = np.log10(np.clip([each.friction for each in traits], 1e-3, 1e3))
     rows[:, 8] = [each.dynamic for each in traits]
     return rows
-
-
-def _scaled(distances: Floats) -> Floats:
-    return np.log(distances + NEAR)

@@ -31,8 +31,7 @@ from ddenv.evidence.certificate import (
     often,
 )
 from ddenv.evidence.rates import Shown
-from ddenv.reduction.guide import Search
-from ddenv.reduction.round import Candidate, Partition, Round
+from ddenv.reduction.round import Candidate, Partition, Round, Search
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
@@ -357,23 +356,21 @@ def judge(
             if not verdict:
                 break
             environment = environments[judged]
-            if not driver.refused_by_user(environment):
-                yield _judged(driver, judged, environment, verdict, rule, usual or rule)
+            if driver.refused(environment):
+                # Part of what lost the rate, unless the user refused it.
+                if not driver.refused_by_user(environment):
+                    yield Judged(judged, environment, "missed", 0)
+            else:
+                # By these runs alone: more of them may have ended.
+                runs, hits = decided_by(driver.shown, environment, rule)
+                missed = verdict == "dissimilar" and usual is not None and not usual.verdict(hits, runs - hits)
+                yield Judged(judged, environment, "missed" if missed else verdict, runs)
             if verdict == "similar":
                 return judged
             judged += 1
         if not wanted:
             return None
         yield Wants(tuple(Test(environments[index], run, why, index) for index, run in wanted))
-
-
-def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
-    if driver.refused(environment):
-        return Judged(index, environment, "missed", 0)
-    # By these runs alone: more of them may have ended.
-    runs, hits = decided_by(driver.shown, environment, rule)
-    missed = verdict == "dissimilar" and not usual.verdict(hits, runs - hits)
-    return Judged(index, environment, "missed" if missed else verdict, runs)
 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator[Step, Any, Certified]:
@@ -400,17 +397,15 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
     if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
         made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
     if certificate.exact:
-        made += tuple(_exactly(driver, model, rest, certificate.exact) for model, rest in rests.items())
+        # The search has made these runs.
+        for model, rest in rests.items():
+            shown = [driver.shown(rest, run) for run in certificate.exact]
+            open_verdict: Verdict = "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
+            claim = Claim("not needed" if True in shown else open_verdict)
+            made = (*made, NamedClaim(model, rest, claim, certificate.exact))
     certified = Certified(certificate, made)
     yield certified
     return certified
-
-
-def _exactly(driver: Driver, model: int, rest: Environment, runs: tuple[int, ...]) -> NamedClaim:
-    """Whether f shows without `model` in any of these runs of the search, which has made them."""
-    shown = [driver.shown(rest, run) for run in runs]
-    open_verdict: Verdict = "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
-    return NamedClaim(model, rest, Claim("not needed" if True in shown else open_verdict), runs)
 
 
 def settled(

@@ -20,8 +20,8 @@ from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
-from ddenv.reduction.guide import Search, make_guide, search
-from ddenv.reduction.round import Partition, Round
+from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.round import Partition, Round, Search
 from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.settings import SETTINGS
 

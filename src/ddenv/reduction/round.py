@@ -1,11 +1,13 @@
-"""A round: the environment's partitions in the order in which they are tried, and the candidates made from them."""
+"""A round: the environment's partitions in the order in which they are tried, and the candidates made from them. And stacks: models
+that rest on each other, as one element of a search, so that whatever is tested has all of a stack or nothing of it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass, replace
 
-from ddenv.environment import Environment
+from ddenv.environment import NOTHING, Environment
 
 # Models by their numbers, in an order that the algorithm chose.
 Partition = tuple[int, ...]
@@ -42,6 +44,10 @@ class Round:
     def exhaustive(self) -> bool:
         """Whether every model is a partition of its own: there is nothing finer to try."""
         return len(self.partitions) == len(self.environment)
+
+
+# Yields rounds, is sent the winner of each or None, and returns what is left.
+Search = Generator[Round, Candidate | None, Environment]
 
 
 def one_model_partitions(environment: Partition) -> list[Partition]:
@@ -105,3 +111,51 @@ def left_out(group: Partition, environment: Partition) -> Round:
     rest = tuple(model for model in environment if model not in gone)
     ranked = [(part, 0.0) for part in (group, rest) if part]
     return round_of(len(ranked), environment, ranked, [("complement", 0)])
+
+
+@dataclass(frozen=True)
+class Stacks:
+    """The stacks of an environment by their first models, which stand for them, in the order of the world."""
+
+    by_first: dict[int, Environment]
+
+    @classmethod
+    def of(cls, groups: Iterable[Environment]) -> Stacks:
+        """`groups` are disjoint and not empty, as of `ddenv.runfile.supports.stacks`."""
+        return cls({next(iter(group)): group for group in groups})
+
+    @property
+    def representatives(self) -> Partition:
+        """The first model of each stack."""
+        return tuple(self.by_first)
+
+    def expanded(self, representatives: Iterable[int]) -> Partition:
+        """All models of the stacks for which `representatives` stand, one stack after the other."""
+        return tuple(model for first in representatives for model in self.by_first[first])
+
+    def of_any(self, models: Environment) -> Environment:
+        """All models of the stacks of which any model is among `models`."""
+        whole = NOTHING
+        for stack in self.by_first.values():
+            if not stack.isdisjoint(models):
+                whole |= stack
+        return whole
+
+    def expand(self, search: Search) -> Search:
+        """`search`, which knows only the representatives, as a search that tests whole stacks."""
+        if all(len(stack) == 1 for stack in self.by_first.values()):
+            return (yield from search)
+        winner: Candidate | None = None
+        while True:
+            try:
+                round = search.send(winner)
+            except StopIteration as end:
+                return Environment.of(self.expanded(end.value))
+            candidates = []
+            for one in round.candidates:
+                models, lacks = (Environment.of(self.expanded(part)) for part in (one.models, one.lacks))
+                candidates.append(replace(one, part=self.expanded(one.part), models=models, lacks=lacks))
+            partitions = tuple(map(self.expanded, round.partitions))
+            environment = self.expanded(round.environment)
+            won = yield replace(round, environment=environment, partitions=partitions, candidates=tuple(candidates))
+            winner = None if won is None else round.candidates[candidates.index(won)]

@@ -11,9 +11,7 @@ from textual.containers import Horizontal
 from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
-from ddenv.guiding.commands import question, refusal
-from ddenv.guiding.course import GoBack
-from ddenv.guiding.situation import Situation
+from ddenv.guiding.commands import GoBack, Situation, question, refusal
 from ddenv.runfile import branches
 from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.progress import Node

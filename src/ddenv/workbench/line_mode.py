@@ -13,10 +13,8 @@ from typing import TextIO
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs
-from ddenv.guiding.commands import Command, question, said, send, starts_engine
-from ddenv.guiding.course import Isolate, StartEngine
+from ddenv.guiding.commands import Command, Isolate, Row, Situation, StartEngine, question, said, send, starts_engine
 from ddenv.guiding.offers import Offer, Pointed, offer
-from ddenv.guiding.situation import Row, Situation
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor

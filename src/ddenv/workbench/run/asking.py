@@ -13,10 +13,20 @@ from typing import Any
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.guiding.commands import Command, drops, question, refusal, said, send, starts_engine
-from ddenv.guiding.course import Isolate, StartEngine
-from ddenv.guiding.selections import Accept, Reject
-from ddenv.guiding.situation import Situation
+from ddenv.guiding.commands import (
+    Accept,
+    Command,
+    Isolate,
+    Reject,
+    Situation,
+    StartEngine,
+    drops,
+    question,
+    refusal,
+    said,
+    send,
+    starts_engine,
+)
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runs import processor
 from ddenv.runs.folder import attach_name

@@ -12,8 +12,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Input, Select, Static
 
 from ddenv.errors import UserError
-from ddenv.guiding import course
-from ddenv.guiding.situation import Situation
+from ddenv.guiding import commands
+from ddenv.guiding.commands import Situation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
@@ -25,10 +25,10 @@ from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.entry import Entry
 
 # Beside the pair and the algorithm, which have lists.
-OTHERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "method")
+OTHERS = tuple(one for one in commands.CHANGEABLE.values() if one.shown != "method")
 
 
-class Change(ModalScreen[course.Change | None]):
+class Change(ModalScreen[commands.Change | None]):
     """Returns the command that changes the settings, None if it was cancelled."""
 
     CSS_PATH = "run_dialogs.tcss"
@@ -97,7 +97,7 @@ class Change(ModalScreen[course.Change | None]):
         field = self.query_one(f"#{one.name}", Select) if one.choices else self.query_one(f"#{one.name}", Input)
         return str(field.value)
 
-    def _command(self) -> course.Change:
+    def _command(self) -> commands.Change:
         """The command for the settings in the dialog. Raises UserError, which begins with the name of the first wrong field."""
         kinds = {kind: str(self.query_one(f"#{kind}", Select).value) for kind in KINDS}
         asked: dict[str, Value] = {
@@ -107,12 +107,12 @@ class Change(ModalScreen[course.Change | None]):
         wrong = []
         for one in OTHERS:
             try:
-                asked[one.name] = course.typed(one.name, self._text(one))
+                asked[one.name] = commands.typed(one.name, self._text(one))
             except UserError as error:
                 wrong.append(str(error))
         if wrong:
             raise UserError("; ".join(wrong))
-        command = course.Change(course.Change(asked).new(self._state))
+        command = commands.Change(commands.Change(asked).new(self._state))
         if why := command.refusal(Situation(self._state)):
             raise UserError(why)
         return command

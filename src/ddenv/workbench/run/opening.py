@@ -11,8 +11,7 @@ from rich.text import Text
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import FreshRuns
-from ddenv.guiding.course import GoBack, Stop
-from ddenv.guiding.selections import AcceptOther
+from ddenv.guiding.commands import AcceptOther, GoBack, Stop
 from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot

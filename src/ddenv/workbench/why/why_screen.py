@@ -16,7 +16,7 @@ from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.guiding.course import Isolate, Stop
+from ddenv.guiding.commands import Isolate, Stop
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
