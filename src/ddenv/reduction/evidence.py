@@ -116,7 +116,7 @@ def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
 
 
 def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
-    """The probability that each model is needed, shape (len(environment),): it falls with the rank of its distance to the failure, as
+    """The probability that each model is needed, shape (len(environment),): it falls with the rank of its distance to f, as
     1 / rank, and has no scale. Raises Lacking.
     """
     ranks = np.argsort(np.argsort(distances_to_failure(environment, evidence), kind="stable"), kind="stable")

@@ -55,7 +55,7 @@ class Learner:
         order = np.argsort(chances, kind="stable")
         weights = -np.log1p(-chances[order])
         labels = np.empty(len(environment), dtype=int)
-        # Each group but the last contains no needed model with even odds; the last gets the likeliest models. If the total weight is
+        # Each group but the last contains no needed model with even odds; the last gets the likeliest. If the total weight is
         # small, all groups get an equal share of it. A model that would exceed the share begins the next group.
         share = min(EVEN, float(weights.sum()) / n_partitions)
         before = np.cumsum(weights) - weights
