@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ddenv.engine.__main__ import _begin
-from ddenv.engine.beginning import check_repeats
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, DiskSpace
 from ddenv.engine.driver import Driver
@@ -174,7 +173,7 @@ def engine(
 def drive(path: Path, pool: FakePool, mixed: bool = False, **options) -> RunState:
     """Works on a run to its end; `options` are those of `engine`."""
     with engine(path, pool, **options) as one:
-        check_repeats(one.journal, one.bench, mixed)
+        one.bench.check_repeats(mixed)
         one.driver.reduce()
         return one.journal.state
 

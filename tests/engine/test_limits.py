@@ -6,9 +6,17 @@ from dataclasses import replace
 
 import pytest
 
-from ddenv.engine.beginning import MOST_DEATHS, check_crash_loop
 from ddenv.engine.journal import Journal
-from ddenv.engine.limits import FACTOR, GENEROUS, KNOWN_AFTER, LEAST, MOST_LATE, memory_limit
+from ddenv.engine.limits import (
+    FACTOR,
+    GENEROUS,
+    KNOWN_AFTER,
+    LEAST,
+    MOST_DEATHS,
+    MOST_LATE,
+    check_crash_loop,
+    memory_limit,
+)
 from ddenv.engine.pool import Pool
 from ddenv.engine.worker import Broken, Run
 from ddenv.errors import UserError

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine import bench
-from ddenv.engine.beginning import note_start
 from ddenv.engine.journal import Journal
+from ddenv.engine.limits import note_start
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.settled import Settled, notes_on

@@ -10,15 +10,14 @@ import sys
 import threading
 from contextlib import closing
 from pathlib import Path
-from typing import Literal
 
 from ddenv import __version__
-from ddenv.engine.beginning import check_crash_loop, check_repeats, note_start
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, DiskSpace, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
+from ddenv.engine.limits import check_crash_loop, note_start
 from ddenv.engine.margins import find_margins
 from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import machine, simulator, tests_of_others
@@ -41,20 +40,12 @@ def main() -> int:
     parser.add_argument("--cluster", help="where the tests are made, in place of what the scenario says")
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
     parser.add_argument("--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow")
-    parser.add_argument(
-        "--anyway", choices=("yes", "no"), default="no", help="start although the last engines died at once"
-    )
+    parser.add_argument("--anyway", choices=("yes", "no"), default="no", help="start after engines died at once")
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
     parser.add_argument("--certify", type=int, help="one more certificate, with at least so many runs of what is left")
-    parser.add_argument(
-        "--certify-rate", type=float, help="the last certificate goes on until it shows this part of the rate"
-    )
-    parser.add_argument(
-        "--isolate", type=int, help="find the nearest world that passes, with so many fresh runs; 0: as usual"
-    )
-    parser.add_argument(
-        "--margins", help="find margins of the numbers with these names, a JSON list of globs; []: of all"
-    )
+    parser.add_argument("--certify-rate", type=float, help="the last one goes on until it shows this part of the rate")
+    parser.add_argument("--isolate", type=int, help="find the nearest world that passes; fresh runs, 0: as usual")
+    parser.add_argument("--margins", help="find margins of the numbers of these globs, a JSON list; []: of all")
     parser.add_argument("--most-runs", type=int, default=300, help="runs that margins may take")
     parser.add_argument("--give-up", choices=("yes", "no"), default="no", help="end the isolation that is open")
     parser.add_argument("--after", type=int, help="the last command before it was asked to start")
@@ -105,7 +96,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
             bench = Bench(journal, pool, control, others)
             if scenario.oracle is None:
-                check_repeats(journal, bench, options.bits == "mixed")
+                bench.check_repeats(options.bits == "mixed")
             note_start(scenario, world, robot, journal)
             if options.certify:
                 Driver(scenario, world, journal, bench, control).certify(options.certify, options.certify_rate)
@@ -120,18 +111,24 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         journal.lose_running()
         journal.record(events.EngineStopped(str(stop)))
         return 1
-    except UserError as error:
-        journal.lose_running()
-        journal.record(events.EngineFailed(str(error)))
-        raise
     except Exception as error:
-        # A bug in ddenv: the traceback goes to the log, and views show the reason.
-        journal.record(events.EngineFailed(f"unexpected {type(error).__name__}: {error} (see the log beside the run)"))
+        journal.lose_running()
+        # Of a bug in ddenv the traceback goes to the log, and views show the reason.
+        bug = f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
+        journal.record(events.EngineFailed(str(error) if isinstance(error, UserError) else bug))
         raise
     finally:
         file.set_live([])
         file.settle()
     return 0
+
+
+def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
+    # This event comes first: all events before it are another engine's.
+    journal.record(events.EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
+    journal.lose_running()
+    if accept_mode not in (None, journal.state.accept_mode):
+        journal.record(events.AcceptModeChanged(accept_mode or ""))
 
 
 def _give_up(file: RunFile) -> int:
@@ -152,14 +149,6 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     return ClusterPool(
         scenario, world, robot, cluster, lambda tests, words: journal.record(events.Cluster(tests, words))
     )
-
-
-def _begin(journal: Journal, jobs: int, accept_mode: Literal["automatic", "ask"] | None) -> None:
-    # This event comes first: all events before it are another engine's.
-    journal.record(events.EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
-    journal.lose_running()
-    if accept_mode and accept_mode != journal.state.accept_mode:
-        journal.record(events.AcceptModeChanged(accept_mode))
 
 
 if __name__ == "__main__":

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ddenv.reduction.procedure import Test
 from ddenv.reduction.verdict import Acceptance, decided_by, standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import Comparing, Implied, TestFinished, TestStarted, TrialJudged
+from ddenv.runfile.events import Compared, Comparing, Implied, SupportsStarted, TestFinished, TestStarted, TrialJudged
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
@@ -143,16 +142,36 @@ class Bench:
             self._pool.submit(number, Run(keep, seed, full, wall_limit(state)))
         return False
 
-    def settle(self, elements: frozenset[str], late: Callable[[], None]) -> Start | Broken:
-        """How the world settles; calls `late` once if that takes longer than `PATIENCE`. Raises as `work`."""
-        found = self._pool.settle(elements)
+    def settle(self) -> Start | Broken:
+        """How the world settles; tells if that takes longer than `PATIENCE`. Raises as `work`."""
+        found = self._pool.settle(frozenset(self._journal.state.elements))
         until = time.monotonic() + PATIENCE
         while (result := found()) is None:
             if time.monotonic() > until:
                 until = math.inf
-                late()
+                self._journal.record(SupportsStarted())
             self.tick()
         return result
+
+    def check_repeats(self, mixed: bool) -> None:
+        """Makes the first baseline run again if this engine computes with anything else than the earlier ones.
+
+        Raises UserError if the bits differ, unless the run goes on `mixed`; and Stopped.
+        """
+        state, run = self._journal.state, self._journal.file.path
+        sound = (test for test in state.tests if test.phase == "baseline" and test.is_finished)
+        test = next((test for test in sound if test.outcome not in BROKEN), None)
+        if state.physics.now == state.physics.proven or test is None:
+            return
+        result = self.made_again(test)
+        if result is not None and not mixed:
+            how = f"broke ({result.failure})" if isinstance(result, Broken) else "gives a different trajectory"
+            raise UserError(
+                f"{run}: repeated, the first run of the whole world {how}: the tests were made with {state.physics.proven}, and "
+                f"this is {state.physics.now}; 'ddenv resume {run} --mixed' continues anyway, 'ddenv resume {run} --again' "
+                "repeats all tests in a new run"
+            )
+        self._journal.record(Compared(result is None))
 
     def made_again(self, test: KnownTest) -> RunResult | Broken | None:
         """Makes a run of the whole world again, once all workers are idle; returns how it ended unless it repeats bit for bit."""
@@ -188,18 +207,15 @@ class Bench:
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
             if verdict:
-                self._judge(trial, environment, verdict)
+                runs, _ = decided_by(self._journal.shown, environment, self.rule)
+                tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
+                self._journal.record(TrialJudged(trial.number, verdict, tests))
             for _, run in wanted:
                 test = Test(environment, run, "hand")
                 if self._key(test) in self._started:
                     continue
                 if not self._pool.idle or self._make(test, trial.number) is None:
                     return
-
-    def _judge(self, trial: Trial, environment: Environment, verdict: str) -> None:
-        runs, _ = decided_by(self._journal.shown, environment, self.rule)
-        tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
-        self._journal.record(TrialJudged(trial.number, verdict, tests))
 
     def _is_spent(self) -> bool:
         """Whether no test may start any more. Raises Stopped once none runs."""
@@ -232,7 +248,14 @@ class Bench:
         finished = sorted([*taken, *self._pool.finished(0.0 if taken else wait)], key=lambda one: one[0])
         for test, result in finished:
             self._record(test, result)
-            self._give_up_if_all_break(result)
+            if result.outcome == "timeout":
+                give_up_if_late(self._journal, result.failure)
+            self._broken = self._broken + 1 if result.outcome in BROKEN else 0
+            if self._broken >= MOST_BROKEN:
+                raise UserError(
+                    f"{self._broken} tests in a row broke; the last one: {result.failure}; "
+                    f"fix this and continue with 'ddenv resume {self._journal.file.path}' (it repeats these tests)"
+                )
         # Before the search gets the workers that are free now.
         self._serve_trials()
         if self._busy == 0:
@@ -241,45 +264,26 @@ class Bench:
                 time.sleep(wait)
         if time.monotonic() >= self._next_live:
             self._next_live = time.monotonic() + LIVE_PERIOD
-            self._show_live()
-
-    def _give_up_if_all_break(self, result: RunResult | Broken) -> None:
-        """Raises UserError after too many broken tests in a row, or if the whole world takes too long."""
-        if result.outcome == "timeout":
-            give_up_if_late(self._journal, result.failure)
-        self._broken = self._broken + 1 if result.outcome in BROKEN else 0
-        if self._broken >= MOST_BROKEN:
-            raise UserError(
-                f"{self._broken} tests in a row broke; the last one: {result.failure}; "
-                f"fix this and continue with 'ddenv resume {self._journal.file.path}' (it repeats these tests)"
-            )
-
-    def _show_live(self) -> None:
-        live = self._pool.live()
-        note_slow(self._journal, live)
-        if live or self._live_shown:
-            self._journal.file.set_live([test for test, _ in live])
-        self._live_shown = bool(live)
+            live = self._pool.live()
+            note_slow(self._journal, live)
+            if live or self._live_shown:
+                self._journal.file.set_live([test for test, _ in live])
+            self._live_shown = bool(live)
 
     def _record(self, test: int, result: RunResult | Broken) -> None:
-        data, journal = result_data(result, self._counted()), self._journal
+        journal = self._journal
+        if self._failed != journal.state.failures:
+            spec = FailureSpec.model_validate(journal.state.scenario["failure"])
+            self._failures, self._failed = failures_of(journal.file, journal.state, spec), journal.state.failures
+        data = result_data(result, self._failures)
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
             started = journal.state.tests[test - 1]
             environment = journal.state.environments[started.environment]
             self._started.discard((environment, started.run, journal.is_full(started.phase)))
-        by_number: dict[str, Any] = {
-            "first_sensed": journal.in_order(data["first_sensed"]),
-            "first_touched": journal.in_order(data["first_touched"]),
-            "took_part": journal.models(data["took_part"]) if "took_part" in data else None,
-        }
-        journal.record(TestFinished(test, **data | by_number), motions_of(result))
+        for name in ("first_sensed", "first_touched"):
+            data[name] = journal.in_order(data[name])
+        if "took_part" in data:
+            data["took_part"] = journal.models(data["took_part"])
+        journal.record(TestFinished(test, **data), motions_of(result))
         compare(journal, [journal.state.tests[test - 1]])
-
-    def _counted(self) -> tuple[Failure, ...]:
-        """f, and the other failures that the user accepted."""
-        state = self._journal.state
-        if self._failed != state.failures:
-            spec = FailureSpec.model_validate(state.scenario["failure"])
-            self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
-        return self._failures

@@ -8,13 +8,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ddenv.engine.beginning import settle
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
-from ddenv.engine.limits import limit_after, note_rare
+from ddenv.engine.limits import limit_after, note, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
+from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import RUNS_BESIDE, error_of
@@ -26,6 +26,7 @@ from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.round import Candidate, Round, Search, Stacks
 from ddenv.reduction.verdict import Acceptance
+from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
 from ddenv.runfile.fold_decisions import exact_runs
@@ -74,7 +75,7 @@ class Driver:
         journal, reduction = self._journal, self._reduction
         # Unknown names are refused before a robot runs.
         self.algorithm(steps.Leg(1, NOTHING, (NOTHING,), NOTHING, {}, Acceptance(1)))
-        settle(self._scenario, self._world, journal, self._bench)
+        self._settle()
         leg: steps.Leg | None = None
         if journal.state.baseline is not None:
             leg = self._first_leg()
@@ -84,6 +85,31 @@ class Driver:
             self._end(False, str(self._baseline))
         else:
             self._conclude()
+
+    def _settle(self) -> None:
+        """Finds which models support others, once. Raises UserError if stacks are to be kept together and it cannot be found."""
+        scenario, journal, needed = self._scenario, self._journal, self._reduction.keep_supports
+        moves = any(model.links and not model.static for model in self._world.models)
+        # A simulator in Python names the models that affected a run, and those that they rest on.
+        in_python = scenario.oracle is not None and scenario.oracle.use is not None
+        if (not moves or (in_python and not needed)) and self._reduction.slice and journal.state.ties is None:
+            journal.record(events.Still())
+        if journal.state.ties is not None or journal.state.unsettled or journal.state.supports or not moves:
+            return
+        why = "only ddenv's own simulator finds which models rest on which; leave it out, or 'oracle'"
+        if scenario.oracle is None:
+            found = self._bench.settle()
+            if not isinstance(found, Broken):
+                for about, words in notes_on(self._world, found.settled):
+                    note(journal, about, words)
+                ties = None if found.ties is None else journal.pairs(found.ties)
+                journal.record(events.Supports(journal.pairs(found.supports), ties))
+                return
+            why = f"it is not known which models rest on which: {found.failure}"
+            if not needed:
+                journal.record(events.Supports((), why=found.failure))
+        if needed:
+            raise UserError(f"reduction.keep_supports: {why}")
 
     def certify(self, at_least: int, certify_rate: float | None = None) -> None:
         """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`.

@@ -1,4 +1,4 @@
-"""What one test may take, real time and memory; and what is noted of a whole world that is slow.
+"""What one test may take, real time and memory; how often engines may die at once; and what is noted of the whole world.
 
 The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and later tests a multiple
 of what these took; the baseline's event holds it. Without a size, the workers share most of what this process may use.
@@ -11,13 +11,16 @@ from collections.abc import Iterable
 
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
-from ddenv.runfile.events import Noted
+from ddenv.runfile import events
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runfile.store import Live
 from ddenv.runs import processor
+from ddenv.runs.programs import log_of
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
 from ddenv.text import between, count, duration
+from ddenv.world.model import Model, World
+from ddenv.world.placement import notes_on_start
 from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
@@ -36,6 +39,17 @@ KNOWN_AFTER = 10.0
 RARE = 0.7
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
+# So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
+MOST_DEATHS, LAST = 3, 3000
+NOWHERE = (
+    events.AcceptModeChanged,
+    events.Comparing,
+    events.SupportsStarted,
+    events.LegStarted,
+    events.EnvironmentNamed,
+    events.TestStarted,
+    events.TestLost,
+)
 HELPS = "try fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
 
 
@@ -61,10 +75,33 @@ def memory_limit(scenario: Scenario, jobs: int) -> float:
     return asked * GIGABYTE if asked is not None else SHARE * processor.usable_memory() / jobs
 
 
+def check_crash_loop(journal: Journal) -> None:
+    """Raises UserError if the last engines all died before they got anywhere."""
+    path, last = journal.file.path, journal.state.revision
+    deaths, place = 0, 0
+    for event in journal.file.events(max(0, last - LAST)):
+        if isinstance(event.event, events.EngineStarted):
+            deaths += 1
+        elif not isinstance(event.event, NOWHERE):
+            deaths, place = 0, event.id
+    if deaths >= MOST_DEATHS:
+        raise UserError(
+            f"{path}: the last {deaths} engines died after event {place}, before a test ended; {log_of(path)} may say why; "
+            f"'ddenv resume {path} --anyway' tries once more, perhaps with fewer --jobs"
+        )
+
+
+def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal) -> None:
+    """Notes what the files alone show of the start, before the first test."""
+    if journal.state.baseline is None:
+        for about, words in notes_on_start(world, robot, scenario.robot.spawn, (scenario.goal.x, scenario.goal.y)):
+            note(journal, about, words)
+
+
 def note(journal: Journal, about: str, words: str) -> None:
     """Writes an event with a sentence, unless one `about` the same is there."""
     if about not in dict(journal.state.notes):
-        journal.record(Noted(about, words))
+        journal.record(events.Noted(about, words))
 
 
 def note_rare(journal: Journal) -> None:

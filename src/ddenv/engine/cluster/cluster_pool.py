@@ -5,6 +5,7 @@ whole world has the bits that it has here.
 from __future__ import annotations
 
 import pickle
+import threading
 import uuid
 import warnings
 from collections.abc import Callable, Mapping
@@ -13,14 +14,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
 import numpy as np
-from distributed import Client, Future, KilledWorker
+from distributed import Client, Future, KilledWorker, Security, SSHCluster
 
 from ddenv import __version__
-from ddenv.engine.cluster.link import GOODBYE, Link
 from ddenv.engine.cluster.made_there import Asked, Hello, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
@@ -28,17 +29,111 @@ from ddenv.engine.worker import Broken, Run, Start, reason_of
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
+from ddenv.runs.trust import hosts_of
 from ddenv.text import count, printable
+from ddenv.world.access import is_file
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario, seed_of
 
-# What is said of the cluster: how many tests it makes at the same time now, and a sentence.
-Tell = Callable[[int, str], None]
 # The number of the test made here to compare with.
 REFERENCE = 0
 # The maximum time until a result that is there has come, s. A client that is closed meanwhile would never bring it, and its thread
 # would keep the engine from ending.
 FETCHED = 20.0
+# The time between two looks at who is there, and between two attempts to connect, s.
+PERIOD, AGAIN = 0.5, 2.0
+# How long a scheduler may take to answer, and to say goodbye, s.
+ANSWER, GOODBYE = 10.0, 2.0
+
+
+class Link:
+    """The connection to the scheduler of `cluster`, in a thread of its own; it is made again when it is lost.
+
+    It calls `attached` with each new connection, `there` with the addresses of all workers and how many tests each can make at a
+    time, and `lost` with the reason.
+    """
+
+    def __init__(
+        self,
+        cluster: str,
+        attached: Callable[[Client], None],
+        there: Callable[[Mapping[str, int]], None],
+        lost: Callable[[str], None],
+    ) -> None:
+        """Raises UserError if no scheduler answers."""
+        self._cluster, self._attached, self._there, self._lost = cluster, attached, there, lost
+        self._client: Any = None
+        self._ssh: Any = None
+        self._closed = threading.Event()
+        try:
+            self._connect()
+        except Exception as error:
+            self._end()
+            raise UserError(
+                f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, or run the tests on this "
+                "machine with --cluster here"
+            ) from None
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+        self._thread.start()
+
+    def _connect(self) -> None:
+        hosts, how = hosts_of(self._cluster), {"timeout": ANSWER, "set_as_default": False, "name": "ddenv"}
+        if hosts:
+            # Dask makes the first one its scheduler.
+            self._ssh = SSHCluster([hosts[0], *hosts])
+            self._client = Client(self._ssh, **how)
+        elif is_file(Path(self._cluster)):
+            self._client = Client(scheduler_file=self._cluster, **how)
+        else:
+            if self._cluster.startswith("tls:"):
+                how["security"] = Security(require_encryption=True)
+            self._client = Client(self._cluster, **how)
+
+    def _follow(self) -> None:
+        while not self._closed.is_set():
+            if self._client is not None:
+                self._attached(self._client)
+                why = self._watch()
+                if self._closed.is_set():
+                    return
+                self._lost(why)
+                self._end()
+            self._closed.wait(AGAIN)
+            try:
+                self._connect()
+            except Exception:
+                # It is not there yet.
+                self._end()
+
+    def _watch(self) -> str:
+        """Tells who is there, as often as that changes, until the scheduler is lost; returns why."""
+        before, comm = None, self._client.scheduler_comm
+        while not self._closed.wait(PERIOD):
+            # Dask connects again by itself, but has forgotten what it was asked.
+            if self._client.status != "running" or self._client.scheduler_comm is not comm:
+                return "the connection broke"
+            try:
+                threads = dict(self._client.ncores())
+            except Exception as error:
+                return reason_of(error)
+            if threads != before:
+                before = threads
+                self._there(threads)
+        return ""
+
+    def _end(self) -> None:
+        ending, self._client, self._ssh = (self._client, self._ssh), None, None
+        for each in ending:
+            # What is left of a broken connection may complain.
+            with suppress(Exception):
+                if each is not None:
+                    each.close(timeout=GOODBYE)
+
+    def close(self) -> None:
+        """Ends the connection, and what was started over SSH."""
+        self._closed.set()
+        self._end()
+        self._thread.join(ANSWER)
 
 
 @dataclass(eq=False)
@@ -65,8 +160,12 @@ class _Worker:
 class ClusterPool:
     """The workers of the `cluster` of a scenario, and one process here while something is made to compare with."""
 
-    def __init__(self, scenario: Scenario, world: World, robot: Model, cluster: str, tell: Tell) -> None:
-        """Raises UserError if no scheduler answers, or where Drake is needed and not installed."""
+    def __init__(
+        self, scenario: Scenario, world: World, robot: Model, cluster: str, tell: Callable[[int, str], None]
+    ) -> None:
+        """`tell` is told how many tests the cluster makes at the same time now, and a sentence. Raises UserError if no scheduler
+        answers, or where Drake is needed and not installed.
+        """
         self._cluster, self._tell, self._parts = cluster, tell, (scenario, world, robot)
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
@@ -124,28 +223,29 @@ class ClusterPool:
         self._send()
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
-        """As `Pool.finished`: tests that have ended, waiting at most `seconds` for one."""
-        self._look_here()
+        """As `Pool.finished`. Raises UserError, too, if the run to compare with broke."""
+        if self._home is not None and self._reference is None:
+            for _, result in self._home.finished(0.0):
+                if isinstance(result, Broken):
+                    what = "the first run of the whole world, to compare the cluster with, broke"
+                    raise UserError(f"{what}: {result.failure}")
+                self._reference = result
         with suppress(Empty):
             self._due.get(timeout=0.0 if self._ready else seconds)()
             while True:
                 self._due.get_nowait()()
         self._take_in()
         self._send()
-        self._say()
+        if self._room != self._said:
+            workers = sum(worker.accepted for worker in self._workers.values())
+            tests = count(self._room, "test")
+            self._news.append(f"{count(workers, 'worker')} of the cluster can run {tests} at the same time")
+        if self._news:
+            self._said = self._room
+            self._tell(self._room, "; ".join(self._news))
+            self._news.clear()
         ready, self._ready = self._ready, []
         return sorted(ready, key=lambda one: one[0])
-
-    def _look_here(self) -> None:
-        """Raises UserError if the run to compare with broke."""
-        if self._home is None or self._reference is not None:
-            return
-        for _, result in self._home.finished(0.0):
-            if isinstance(result, Broken):
-                raise UserError(
-                    f"the first run of the whole world, to compare the cluster with, broke: {result.failure}"
-                )
-            self._reference = result
 
     # What happens to the cluster.
 
@@ -179,38 +279,29 @@ class ClusterPool:
         new = [_Worker(address, threads[address]) for address in threads if address not in self._workers]
         for worker in new:
             self._workers[worker.address] = worker
-            self._ask(worker)
+            self._hand_out(worker, greet, Asked(self._run, self._topic, REFERENCE, self._whole), None)
         if new:
-            first = (
-                ": each first runs the whole world once, to compare the bits with ours"
-                if self._home is not None
-                else ""
-            )
-            self._news.append(f"{count(len(new), 'worker')} joined the cluster{first}")
+            first = ": each first runs the whole world once, to compare the bits with ours"
+            self._news.append(f"{count(len(new), 'worker')} joined the cluster{first if self._home else ''}")
 
     def _gone(self, address: str) -> int:
         """Forgets a worker; returns how many of its tests have to be made again."""
         worker = self._workers.pop(address)
         again = [asked for asked, _ in worker.asked.values() if asked is not None]
         worker.asked.clear()
-        self._wait_again(again)
+        for asked in again:
+            self._wait_again(asked)
         return len(again)
 
-    def _wait_again(self, tests: list[Asked]) -> None:
-        for asked in tests:
-            self._progress.pop(asked.test, None)
-        self._waiting = sorted([*self._waiting, *tests], key=lambda asked: asked.test)
+    def _wait_again(self, asked: Asked) -> None:
+        self._progress.pop(asked.test, None)
+        self._waiting = sorted([*self._waiting, asked], key=lambda one: one.test)
 
     def _noted(self, event: tuple[float, Mapping[str, Any]]) -> None:
         """A running test's progress; comes in Dask's own thread."""
         self._progress[event[1]["test"]] = event[1]
 
     # Tests.
-
-    def _ask(self, worker: _Worker) -> None:
-        """Asks a new worker who it is, and what bits it computes."""
-        whole = Asked(self._run, self._topic, REFERENCE, self._whole)
-        self._hand_out(worker, greet, whole, None)
 
     def _send(self) -> None:
         """Hands tests to the workers with the most free threads, in the order of the algorithm."""
@@ -225,18 +316,25 @@ class ClusterPool:
         assert self._client is not None
         key = f"{what.__name__}-{uuid.uuid4().hex}"
         try:
-            future = self._client.submit(
-                what, self._sent, words, key=key, workers=[worker.address], pure=False, priority=-words.test
-            )
+            how = {"key": key, "workers": [worker.address], "pure": False, "priority": -words.test}
+            future = self._client.submit(what, self._sent, words, **how)
         except Exception:
             # The connection has just broken: the link will say so.
             if asked is not None:
-                self._wait_again([asked])
+                self._wait_again(asked)
             self._client = None
             return
         worker.asked[key] = asked, future
         ended = self._later(self._ended)
-        future.add_done_callback(lambda done: ended(worker, key, _answer(done)))
+
+        def answer(done: Future[Any]) -> None:
+            try:
+                came = done.result(timeout=FETCHED)
+            except BaseException as error:
+                came = error
+            ended(worker, key, came)
+
+        future.add_done_callback(answer)
 
     def _ended(self, worker: _Worker, key: str, answer: Any) -> None:
         """A result, a hello with a run, or an exception came back. Raises UserError if the world cannot be simulated."""
@@ -245,27 +343,20 @@ class ClusterPool:
             return
         asked, _ = worker.asked.pop(key)
         if asked is None:
-            self._answered(worker, answer)
+            if not isinstance(answer, BaseException):
+                worker.hello, run = answer
+                self._greeted.append((worker, run))
+            elif not isinstance(answer, CancelledError | KilledWorker):
+                self._leave_out(worker, f"it cannot run tests: {reason_of(answer)}")
             return
         if isinstance(answer, CancelledError | NotWanted | KilledWorker | TimeoutError):
-            self._wait_again([asked])
+            self._wait_again(asked)
             return
         self._progress.pop(asked.test, None)
         if isinstance(answer, UserError):
             raise answer
         broke = isinstance(answer, BaseException)
         self._ready.append((asked.test, Broken("error", reason_of(answer)) if broke else answer))
-
-    # Who may make tests.
-
-    def _answered(self, worker: _Worker, answer: Any) -> None:
-        if isinstance(answer, CancelledError | KilledWorker):
-            return
-        if isinstance(answer, BaseException):
-            self._leave_out(worker, f"it cannot run tests: {reason_of(answer)}")
-            return
-        worker.hello, run = answer
-        self._greeted.append((worker, run))
 
     def _take_in(self) -> None:
         """Compares what new workers made, once there is something to compare with."""
@@ -282,17 +373,6 @@ class ClusterPool:
 
     def _leave_out(self, worker: _Worker, why: str) -> None:
         self._news.append(f"worker {worker.name} is not used: {why}")
-
-    def _say(self) -> None:
-        """Tells what has changed."""
-        if self._room != self._said:
-            workers = sum(worker.accepted for worker in self._workers.values())
-            tests = count(self._room, "test")
-            self._news.append(f"{count(workers, 'worker')} of the cluster can run {tests} at the same time")
-        if self._news:
-            self._said = self._room
-            self._tell(self._room, "; ".join(self._news))
-            self._news.clear()
 
     # As of `Pool`.
 
@@ -326,14 +406,6 @@ class ClusterPool:
         self._link.close()
 
 
-def _answer(done: Future[Any]) -> Any:
-    """What came of a task; the exception where it came to nothing."""
-    try:
-        return done.result(timeout=FETCHED)
-    except BaseException as error:
-        return error
-
-
 def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | None) -> str:
     """Why a worker is left out whose first run of the whole world is `there`; "" if it may make tests.
 
@@ -345,15 +417,13 @@ def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | No
         return ""
     if isinstance(there, Broken):
         return f"its first run of the whole world broke: {there.failure}"
-    if there is None or not _same_bits(there, here):
-        theirs, ours = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
-        return f"its first run of the whole world has different bits; it has {theirs}; this machine has {ours}"
+    same = False
+    if there is not None:
+        ends = [(run.outcome, run.failure, run.cut, run.took_part) for run in (there, here)]
+        rows, ours = ({**run.motions, "": run.trajectory} for run in (there, here))
+        moved = rows.keys() == ours.keys() and all(np.array_equal(rows[name], ours[name]) for name in ours)
+        same = moved and ends[0] == ends[1]
+    if not same:
+        theirs, mine = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
+        return f"its first run of the whole world has different bits; it has {theirs}; this machine has {mine}"
     return ""
-
-
-def _same_bits(one: RunResult, other: RunResult) -> bool:
-    """Whether two runs of the same models with the same seed are the same to the last bit."""
-    first, second = ((run.outcome, run.failure, run.cut, run.took_part) for run in (one, other))
-    ours, theirs = ({**run.motions, "": run.trajectory} for run in (one, other))
-    same_models = ours.keys() == theirs.keys()
-    return first == second and same_models and all(np.array_equal(ours[name], theirs[name]) for name in ours)

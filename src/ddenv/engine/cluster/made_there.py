@@ -10,9 +10,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
-from distributed import Worker, get_worker
+from distributed import get_worker
 
 from ddenv import __version__
 from ddenv.engine.pool import Pool
@@ -27,8 +26,6 @@ from ddenv.world.scenario import Scenario
 LOOK = 0.2
 # The time between two reports of a running test, s.
 PERIOD = 0.5
-
-
 # What a test needs. It is sent once to each worker, as bytes.
 Parts = tuple[Scenario, World, Model]
 
@@ -80,24 +77,16 @@ def make(parts: bytes, asked: Asked) -> RunResult | Broken:
         child.submit(asked.test, asked.task)
         due = 0.0
         while not (ended := child.finished(LOOK)):
-            if not _is_wanted(worker, key):
+            # Dask itself never stops a task that runs.
+            task = worker.state.tasks.get(key)
+            if task is None or task.state != "executing":
                 raise NotWanted(key)
             if time.monotonic() > due:
                 due = time.monotonic() + PERIOD
-                _report(worker, child, asked)
+                for live, real in child.live():
+                    row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models}
+                    worker.log_event(asked.topic, row | {"real": real})
     return ended[0][1]
-
-
-def _is_wanted(worker: Worker, key: Any) -> bool:
-    """Whether the scheduler still has this worker make the task: Dask itself never stops one that runs."""
-    task = worker.state.tasks.get(key)
-    return task is not None and task.state == "executing"
-
-
-def _report(worker: Worker, child: Pool, asked: Asked) -> None:
-    for live, real in child.live():
-        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models, "real": real}
-        worker.log_event(asked.topic, row)
 
 
 # The idle children, with the run that each is for.
@@ -112,10 +101,16 @@ def _child(parts: bytes, run: str) -> Iterator[Pool]:
         kept = next((one for one in _idle if one[0] == run), _idle[0] if _idle else None)
         if kept is not None:
             _idle.remove(kept)
-    if kept is not None and kept[0] != run:
-        # A worker has memory for one a thread.
-        kept[1].close()
-    child = kept[1] if kept is not None and kept[0] == run else _new(parts)
+    if kept is not None and kept[0] == run:
+        child = kept[1]
+    else:
+        if kept is not None:
+            # A worker has memory for one a thread.
+            kept[1].close()
+        # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
+        multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
+        known: Parts = pickle.loads(parts)
+        child = Pool(*known, 1, at_a_time=get_worker().state.nthreads)
     try:
         yield child
     except BaseException:
@@ -123,13 +118,6 @@ def _child(parts: bytes, run: str) -> Iterator[Pool]:
         raise
     with _lock:
         _idle.append((run, child))
-
-
-def _new(parts: bytes) -> Pool:
-    # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
-    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
-    known: Parts = pickle.loads(parts)
-    return Pool(*known, 1, at_a_time=get_worker().state.nthreads)
 
 
 def forget(run: str) -> None:
