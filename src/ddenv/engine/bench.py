@@ -234,6 +234,11 @@ class Bench:
         """
         self._look(WAIT)
 
+    def wait_for_search(self) -> None:
+        """Raises Steered once a new search may begin, and as `work`."""
+        while True:
+            self.tick()
+
     def _look(self, wait: float) -> None:
         """As `tick`; waits at most `wait` s for a test to finish."""
         self._look_around(wait)

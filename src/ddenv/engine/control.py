@@ -72,9 +72,9 @@ class DiskSpace:
         return not self._terminated.wait(PERIOD)
 
     def _tell(self, enough: bool) -> None:
-        changed, self._enough = enough != self._enough, enough
-        if not changed:
+        if enough == self._enough:
             return
+        self._enough = enough
         # A small event may find room where a result does not.
         self._telling = True
         with suppress(UserError):
@@ -112,10 +112,7 @@ class Control:
         self._last = -math.inf
         self._disk = disk
         self._offset = clock_offset()
-        self._catch_up(after)
-
-    def _catch_up(self, after: float) -> None:
-        """Obeys what was asked for before this engine was."""
+        # What was asked for before this engine was.
         for command in self._journal.file.commands(self._journal.state.last_command):
             if command.id > after:
                 return
@@ -128,20 +125,17 @@ class Control:
         """Obeys new commands. Raises Stopped."""
         if self._terminated.is_set():
             raise Stopped("the engine was terminated")
-        self._look_at_clock()
+        # What is reckoned from the time that the run took would be wrong after a jump of the clock.
+        offset = clock_offset()
+        jump, self._offset = offset - self._offset, offset
+        if abs(jump) > SMALL:
+            self._journal.record(events.ClockJumped(jump))
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
             if c.KINDS.get(command.kind) is c.Accept:
                 # The reduction comes before any other decision.
                 return
-
-    def _look_at_clock(self) -> None:
-        """Records a jump since the last look: what is reckoned from the time that the run took would be wrong."""
-        offset = clock_offset()
-        jump, self._offset = offset - self._offset, offset
-        if abs(jump) > SMALL:
-            self._journal.record(events.ClockJumped(jump))
 
     def search_begins(self) -> None:
         """From now on what the user changes ends a search."""
@@ -274,14 +268,10 @@ def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
     state = journal.state
     test = state.tests[asked.test - 1]
     unnamed = asked.instead or test.phase == "hand"
-    return events.AcceptedOther(
-        test.id,
-        f"test {test.id}" if unnamed else c.label_of(state, test),
-        test.environment,
-        _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id)),
-        None if asked.instead else test.trial,
-        asked.instead,
-    )
+    what = f"test {test.id}" if unnamed else c.label_of(state, test)
+    judged = _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id))
+    trial = None if asked.instead else test.trial
+    return events.AcceptedOther(test.id, what, test.environment, judged, trial, asked.instead)
 
 
 # What each decision of the user is in the run file.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from dataclasses import replace
@@ -24,7 +25,7 @@ from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.round import Candidate, Round, Search, Stacks
+from ddenv.reduction.round import Round, Search, Stacks
 from ddenv.reduction.verdict import Acceptance
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
@@ -42,6 +43,11 @@ from ddenv.world.scenario import Reduction, Scenario
 
 # Another failure competes to be f if it shows at least once where f shows so often. Rarer ones hardly ever win by luck.
 COMPETES = 4
+# A resumed run would not repeat the rounds that it made before.
+OTHER_WAY = (
+    "round {} would now differ: the run was started with other versions of ddenv, scikit-learn or a package of schemas; "
+    "continue with those, or start a new run"
+)
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
@@ -148,9 +154,9 @@ class Driver:
         # An engine that was killed may not have compared its last one.
         compare(self._journal, self._journal.state.finished_tests)
         # The user may have gone back before this engine started; then it pauses there.
-        with suppress(Steered):
-            while self._journal.state.search_due:
-                self._bench.tick()
+        if self._journal.state.search_due:
+            with suppress(Steered):
+                self._bench.wait_for_search()
         slice_environment(self._journal)
         return self._next_leg()
 
@@ -171,8 +177,7 @@ class Driver:
         self._bench.rule = self._leg.rule
         self._trials.clear()
         self._unknown.clear()
-        self._learn(leg.tests)
-        self._look_at(leg.evidence_test)
+        self._learn(leg.tests, leg.evidence_test)
         return self._leg
 
     def _check_repeats(self) -> None:
@@ -221,19 +226,18 @@ class Driver:
         return max(1, self._journal.state.jobs) if self._control.speculates() else 1
 
     def goes_on(self) -> bool:
-        """Whoever accepts each reduction by hand also goes back by hand."""
+        # Whoever accepts each reduction by hand also goes back by hand.
         automatic = self._journal.state.accept_mode == "automatic"
         return self._only_certify is None and automatic and self._reduction.accept_rate == "kept"
 
     def algorithm(self, leg: steps.Leg) -> Search:
         """The algorithm and the schemas by name. Raises UserError for unknown ones."""
         asked = self._reduction
-        partitioning, prioritization = split_pair(asked.pair)
         self._stacks = Stacks(leg.free)
         guide = make_guide(
-            partitioning,
-            prioritization,
-            self._known,
+            *split_pair(asked.pair),
+            # Only rounds use it, after the first similar run.
+            lambda: replace(self._evidence, trials=tuple(self._trials.values())),
             prior=asked.prior,
             n_partitions=leg.n_partitions or asked.n_partitions,
             candidates=asked.candidates,
@@ -242,31 +246,24 @@ class Driver:
             skip=asked.skip,
             rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
             runs=lambda: leg.rule.misses,
-            broke=self._broke,
+            # The algorithm knows one model of each stack.
+            broke=lambda candidate: (
+                leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
+            ),
             proves=leg.rule.proves,
         )
         searched = partial(search, asked.algorithm, guide=guide)
         return self._stacks.expand(tried_again(self._stacks.representatives, leg.again, searched))
 
-    def _known(self) -> Evidence:
-        """The evidence for the schemas; only rounds use it, after the first similar run."""
-        return replace(self._evidence, trials=tuple(self._trials.values()))
-
-    def _broke(self, candidate: Candidate) -> bool:
-        """Whether tests of a candidate of the algorithm, which knows one model of each stack, broke and left it unknown."""
-        return self._leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
-
-    def _learn(self, tests: Iterable[int]) -> None:
-        """The schemas see the tests behind the verdicts of a round: a resumed run sees the same."""
+    def _learn(self, tests: Iterable[int], similar: int | None) -> None:
+        """The schemas see the tests behind the verdicts of a round, and the last similar run: a resumed run sees the same."""
         state = self._journal.state
         for test in (state.tests[number - 1] for number in tests):
             if test.outcome not in BROKEN:
                 environment = state.environments[test.environment]
                 self._trials[test.id] = Trial(environment, test.outcome == "similar", state.elements)
-
-    def _look_at(self, test: int) -> None:
-        """The schemas see `test`, the last similar run."""
-        self._evidence = self._sight.evidence(self._journal, test)
+        if similar is not None:
+            self._evidence = self._sight.evidence(self._journal, similar)
 
     # What the procedure finds.
 
@@ -296,20 +293,17 @@ class Driver:
         state, leg = self._journal.state, self._journal.state.leg
         parts = tuple(map(Environment.of, step.round.partitions))
         assert leg is not None
-        place = step.number - leg.first_round
-        if place < len(leg.past):
-            past = leg.past[place]
+        if leg.first_round + len(leg.past) > step.number:
+            past = leg.past[step.number - leg.first_round]
             if past.digest != digest(parts):
-                raise UserError(other_way(step.number))
-            self._learn(past.tests)
+                raise UserError(OTHER_WAY.format(step.number))
+            self._learn(past.tests, past.evidence_test)
             self._unknown.update(step.round.candidates[index].models | self._leg.pinned for index in past.unknown)
-            if past.evidence_test is not None:
-                self._look_at(past.evidence_test)
             return steps.Past(past.winner)
         if state.round is None or state.round.number < step.number:
             self._announce(step.number, step.round)
         elif state.round.split.parts != parts:
-            raise UserError(other_way(step.number))
+            raise UserError(OTHER_WAY.format(step.number))
         # Whoever waits before the first test of a round sees its candidates.
         self._audit_slice()
         return None
@@ -373,13 +367,11 @@ class Driver:
             journal.record(events.RoundFinished(step.number))
             self._control.round_finished()
         assert journal.state.leg is not None
-        self._learn(journal.state.leg.past[-1].tests)
-        if step.winner is not None:
-            assert journal.state.evidence_test is not None
-            self._look_at(journal.state.evidence_test)
-            if slice_environment(journal):
-                # The search goes on in the slice.
-                raise Steered
+        past = journal.state.leg.past[-1]
+        self._learn(past.tests, past.evidence_test)
+        if step.winner is not None and slice_environment(journal):
+            # The search goes on in the slice.
+            raise Steered
 
     def _search_ended(self, step: steps.SearchEnded) -> None:
         self._audit_slice()
@@ -396,22 +388,15 @@ class Driver:
         if last is None or (self._only_certify is not None and last.claims):
             asked, number = self._reduction, len(journal.state.certificates) + 1
             # What the bets have won so far holds for any share, so that the same ones can go on.
-            goes_on = last is not None and self._certify_rate is not None and not last.seeds
+            before = last if last is not None and self._certify_rate is not None and not last.seeds else None
             # Where chosen runs were reduced, a rate is shown if the user asks for one.
             exact = () if self._certify_rate else self._leg.rule.exact
             shown = [run for run in exact if journal.shown(journal.environment, run)]
             seeds = tuple(journal.state.tests[test - 1].seed for test in journal.tests(journal.environment, shown))
             at_least = max(self._only_certify or 0, RUNS_BESIDE) if seeds else self._only_certify or asked.baseline_runs
-            started = events.CertificateStarted(
-                number,
-                last.first_run if last is not None and goes_on else journal.fresh_run,
-                journal.rate_of_whole(),
-                asked.keep_rate,
-                last.error if last is not None and goes_on else error_of(number),
-                at_least,
-                self._certify_rate or asked.certify_rate,
-                seeds,
-            )
+            first, error = (before.first_run, before.error) if before else (journal.fresh_run, error_of(number))
+            rate, share = journal.rate_of_whole(), self._certify_rate or asked.certify_rate
+            started = events.CertificateStarted(number, first, rate, asked.keep_rate, error, at_least, share, seeds)
             journal.record(started)
             last = journal.state.certificates[-1]
         terms = terms_of(journal.state, last)
@@ -433,36 +418,30 @@ class Driver:
         return last
 
     def _claim_made(self, named: steps.NamedClaim, first: int) -> events.ClaimMade:
-        journal, outcomes = self._journal, dict[str, int]()
-        runs = named.exact or [first + run for run in named.runs]
-        for test in journal.tests(named.environment, runs, full=not named.exact):
-            outcome = journal.state.tests[test - 1].outcome
-            outcomes[outcome] = outcomes.get(outcome, 0) + 1
-        sound = sum(number for outcome, number in outcomes.items() if outcome not in BROKEN)
-        shown = outcomes.get("similar", 0)
+        journal, runs = self._journal, named.exact or [first + run for run in named.runs]
+        tests = journal.tests(named.environment, runs, full=not named.exact)
+        outcomes = Counter(journal.state.tests[test - 1].outcome for test in tests)
+        shown, sound = outcomes["similar"], outcomes.total() - sum(outcomes[outcome] for outcome in BROKEN)
         number, claim = journal.number(named.environment), named.claim
         share = shown / max(1, sound)
         interval = (share, share) if named.exact else anytime_interval(shown, sound)
-        return events.ClaimMade(named.model, number, claim.verdict, shown, sound, *interval, outcomes, claim.bound)
+        return events.ClaimMade(
+            named.model, number, claim.verdict, shown, sound, *interval, dict(outcomes), claim.bound
+        )
 
     def _stepped_back(self, step: steps.SteppedBack) -> None:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
         node, lost = nodes[step.place].number, nodes[step.place + 1].number
         journal.record(events.RateLost(node, lost, step.again, journal.full_tests(step.tests)))
-        self._wait_for_search()
+        self._bench.wait_for_search()
 
     def _left_out(self, step: steps.LeftOut) -> None:
         journal, first = self._journal, self._certificate.first_run
         runs = range(first, journal.fresh_run)
         evidence = journal.evidence_of(journal.tests(step.environment, runs, full=True))
         journal.record(events.LeftOut(step.model, journal.number(step.environment), evidence))
-        self._wait_for_search()
-
-    def _wait_for_search(self) -> None:
-        """A new search begins once the run is not paused. Raises Steered."""
-        while True:
-            self._bench.tick()
+        self._bench.wait_for_search()
 
     # The end.
 
@@ -488,14 +467,6 @@ class Driver:
         # Tests of later candidates are no longer needed.
         self._journal.lose_running()
         self._journal.record(events.Finished(minimal, reason))
-
-
-def other_way(round: int) -> str:
-    """The error if a resumed run would not repeat the rounds that it made before."""
-    return (
-        f"round {round} would now differ: the run was started with other versions of ddenv, scikit-learn or a "
-        "package of schemas; continue with those, or start a new run"
-    )
 
 
 # Each is recorded, and answered as the step says.

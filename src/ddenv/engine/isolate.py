@@ -63,7 +63,14 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     rule = Passing.of(sum(test.outcome == "pass" for test in sound), len(sound))
     least = at_least or max(FEWEST_RUNS, reduction.baseline_runs)
     last = state.isolations[-1] if state.isolations else None
-    suspects, size = _suspects(world, journal, reduction)
+    # One model of each stack that may go: first those that the reduction has left, then the nearest to f.
+    evidence = Sight(world, state.elements, reduction.delta, reduction.seed).evidence(
+        journal, known_failure(state).failure_test
+    )
+    distance = distances_to_failure(state.elements, evidence).tolist()
+    stacks, left = _free(journal).by_first, journal.environment
+    gone = {first: left.isdisjoint(stack) for first, stack in stacks.items()}
+    suspects = sorted(stacks, key=lambda first: (gone[first], min(distance[model] for model in stacks[first])))
     chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
     journal.record(
         events.IsolationStarted(
@@ -75,24 +82,12 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
             keep_rate=reduction.keep_rate,
             error=ERROR,
             at_least=least,
-            suspects=suspects,
-            size=size,
+            suspects=tuple(suspects),
+            size=sum(not gone[first] for first in suspects),
             before=before,
             chosen=chosen,
         )
     )
-
-
-def _suspects(world: World, journal: Journal, reduction: Reduction) -> tuple[tuple[int, ...], int]:
-    """One model of each stack that may go: first those that the reduction has left (returns how many), then the nearest to f."""
-    state, f = journal.state, known_failure(journal.state).failure_test
-    sight = Sight(world, state.elements, reduction.delta, reduction.seed)
-    distance = distances_to_failure(state.elements, sight.evidence(journal, f)).tolist()
-    stacks, left = _free(journal).by_first, journal.environment
-    order = sorted(
-        stacks, key=lambda first: (left.isdisjoint(stacks[first]), min(distance[model] for model in stacks[first]))
-    )
-    return tuple(order), sum(not left.isdisjoint(stacks[first]) for first in order)
 
 
 def _free(journal: Journal) -> Stacks:
@@ -108,17 +103,9 @@ class _Isolator:
         self._journal, self._bench = journal, bench
         self._whole = journal.state.environments[0]
         now = _open(journal).asked
-        self._asked = Asked(
-            whole=self._whole,
-            suspects=now.suspects,
-            stacks=_free(journal),
-            size=now.size,
-            rule=Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than),
-            keep_rate=now.keep_rate,
-            at_least=now.at_least,
-            first_run=now.run,
-            block=now.block,
-        )
+        rule = Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than)
+        terms = rule, now.keep_rate, now.at_least, now.run, now.block
+        self._asked = Asked(self._whole, now.suspects, _free(journal), now.size, *terms)
 
     def carry_out(self) -> Environment | None:
         """To the end; returns what has to go so that the robot passes. Raises as `Bench.work`, and Stopped."""
@@ -130,13 +117,12 @@ class _Isolator:
             except StopIteration as end:
                 removed: Environment | None = end.value
                 return removed
-            match step:
-                case Wants():
-                    self._bench.work(step.tests)
-                case Judged():
-                    self._judged(step)
-                case Checked():
-                    self._check(step)
+            if isinstance(step, Wants):
+                self._bench.work(step.tests)
+            elif isinstance(step, Judged):
+                self._judged(step)
+            elif isinstance(step, Checked):
+                self._check(step)
 
     # What the procedure asks.
 
@@ -170,15 +156,14 @@ class _Isolator:
         journal, now = self._journal, _open(self._journal)
         first = now.asked.run + len(now.checks) * now.asked.block
         rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)
-        claims = tuple(self._made(claim, first) for claim in check.claims)
+        claims = []
+        for one in check.claims:
+            shown = [self.shown(one.environment, run) for run in one.exact or [first + run for run in one.runs]]
+            runs, reached = sum(type(each) is bool for each in shown), shown.count(True)
+            interval = (reached / max(1, runs),) * 2 if one.exact else anytime_interval(reached, runs)
+            claims.append(events.ReturnedMade(one.model, one.claim.verdict, reached, runs, *interval))
         environment = journal.number(self._whole - check.removed)
-        journal.record(events.IsolationChecked(environment, claims, rests_on))
-
-    def _made(self, named: NamedClaim, first: int) -> events.ReturnedMade:
-        shown = [self.shown(named.environment, run) for run in named.exact or [first + run for run in named.runs]]
-        runs, reached = sum(type(one) is bool for one in shown), sum(one is True for one in shown)
-        interval = (reached / max(1, runs),) * 2 if named.exact else anytime_interval(reached, runs)
-        return events.ReturnedMade(named.model, named.claim.verdict, reached, runs, *interval)
+        journal.record(events.IsolationChecked(environment, tuple(claims), rests_on))
 
     def _known_checks(self) -> list[Checked]:
         """What fresh runs have shown before this engine."""

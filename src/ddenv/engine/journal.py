@@ -55,9 +55,8 @@ class Journal:
         if after.mixed_until != before.mixed_until:
             # What was made with something else implies nothing of tests that are made now.
             self._implying.clear()
-        if after.tests is not before.tests:
-            for test in after.tests.changed_since(before.tests):
-                self._enter(test)
+        for test in after.tests.changed_since(before.tests):
+            self._enter(test)
         if after.engines != before.engines:
             self._forget(lambda test: test.outcome in BROKEN and self._is_made_again(test))
         if after.refuted is not before.refuted:
@@ -195,13 +194,13 @@ class Journal:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         whole, state = self._numbers[self.whole], self.state
         # In the runs that chose f it was lucky.
-        chose = 0 if state.baseline is None else state.baseline.chose
+        lucky = {("baseline", run) for run in range(0 if state.baseline is None else state.baseline.chose)}
         tests = [
             test
             for test in state.tests
             if test.environment == whole
             and test.phase not in (CERTIFY, ISOLATE)
-            and (test.phase != "baseline" or test.run >= chose)
+            and (test.phase, test.run) not in lucky
         ]
         for first in dict.fromkeys(certificate.first_run for certificate in state.certificates):
             # A certificate runs the whole world at first only where what is left missed f: these runs would show it as too rare.
@@ -225,8 +224,8 @@ class Journal:
     @property
     def has_broken(self) -> bool:
         """Whether tests broke, so that the baseline, a verdict or a claim is unknown."""
-        state = self.state
-        return state.left_unknown or (state.baseline is None and any(state.tally[outcome] for outcome in BROKEN))
+        broken = any(self.state.tally[outcome] for outcome in BROKEN)
+        return self.state.left_unknown or (self.state.baseline is None and broken)
 
     def lose_running(self) -> None:
         """Records tests that were started and never ended as lost."""

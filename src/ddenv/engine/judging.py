@@ -38,9 +38,9 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None.
     """
     if isinstance(result, Broken):
-        nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
-        unnoticed: dict[str, dict[str, float]] = {"first_sensed": {}, "first_touched": {}}
-        return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed, "cut": False}
+        unknown = {"distance": None, "end_pose": None, "first_sensed": {}, "first_touched": {}, "cut": False}
+        none = {"simulated_seconds": 0.0, "wall_seconds": 0.0}
+        return {"outcome": result.outcome, "failure": result.failure, **unknown, **none}
     outcome, distance = result.outcome, None
     if failures:
         judgement = nearest([judge(result, failure) for failure in failures])
@@ -56,8 +56,8 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
         "end_pose": pose if all(map(math.isfinite, pose)) else None,
         "simulated_seconds": result.simulated_seconds,
         "wall_seconds": result.wall_seconds,
-        "first_sensed": _to_ms(result.first_sensed),
-        "first_touched": _to_ms(result.first_touched),
+        "first_sensed": {name: round(seconds, 3) for name, seconds in result.first_sensed.items()},
+        "first_touched": {name: round(seconds, 3) for name, seconds in result.first_touched.items()},
         "cut": result.cut,
         **more,
     }
@@ -74,10 +74,6 @@ def motions_of(result: RunResult | Broken) -> Motions:
 def nearest(judgements: Sequence[Judgement]) -> Judgement:
     """The judgement that counts: a similar one, else the nearest."""
     return min(judgements, key=lambda each: (each.outcome != "similar", each.distance))
-
-
-def _to_ms(times: dict[str, float]) -> dict[str, float]:
-    return {name: round(seconds, 3) for name, seconds in times.items()}
 
 
 def known_failure(state: RunState) -> BaselineFinished:
@@ -152,9 +148,16 @@ def fix_failure(
 
     # By the oracle alone, not by kind: what it judges as one failure cannot be reduced as two.
     groups = grouped(len(failing), apart)
-    seen = [_seen([failing[one] for one in group]) for group in groups]
+    seen = []
+    for group in ([failing[one] for one in group] for group in groups):
+        kinds = Counter(test.failure for test in group)
+        names = tuple(kind for kind, _ in kinds.most_common())
+        # The first one is in their middle.
+        seen.append(SeenFailure(group[0].id, len(group), names, end_of(group[0])))
     if wanted > len(seen):
-        return _no_such_failure(seen, wanted, sum(test.outcome not in BROKEN for test in tests))
+        listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
+        runs = sum(test.outcome not in BROKEN for test in tests)
+        return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
     f = groups[wanted - 1][0]
     judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failed}
     shown = {id for id, judgement in judged.items() if judgement.outcome == "similar"}
@@ -184,17 +187,6 @@ def fix_failure(
     )
 
 
-def _seen(group: Sequence[Test]) -> SeenFailure:
-    """A group of failing tests, the one in their middle first."""
-    kinds = Counter(test.failure for test in group)
-    return SeenFailure(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
-
-
-def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str:
-    listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
-    return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
-
-
 def _no_failure(tests: Sequence[Test]) -> str:
     broken = [test for test in tests if test.outcome in BROKEN]
     if len(broken) == len(tests):
@@ -220,15 +212,6 @@ def traits_of(model: Model) -> Traits:
     return Traits(size, friction, not model.static)
 
 
-def _end(state: RunState, run: Test) -> tuple[float, float, float]:
-    """Where f ended; if several failures count as f, the one that `run` showed."""
-    ends = [end_of(state.tests[test - 1]) for test in state.failures]
-    if run.end_pose is None:
-        return ends[0]
-    here = end_of(run)
-    return min(ends, key=lambda end: math.dist(end, here))
-
-
 class Sight:
     """The part of the evidence that comes from the world and never changes in a run."""
 
@@ -241,12 +224,15 @@ class Sight:
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""
         state, run = journal.state, journal.state.tests[test - 1]
+        # If several failures count as f, the one that the run showed.
+        ends = [end_of(state.tests[test - 1]) for test in state.failures]
+        end = ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, end_of(run)))
         # Whether a model that affected no run was sensed depends on which of two equal runs was simulated.
         seen = set(state.elements) if run.took_part is None else set(run.took_part.names(state.elements))
         return replace(
             self._known,
             trajectory=trajectory_of(rows_of(journal.file, test)),
-            failure_position=_end(state, run),
+            failure_position=end,
             first_sensed={name: at for name, at in run.first_sensed if name in seen},
             touched=frozenset(name for name, _ in run.first_touched),
             miss_chance=known_failure(state).miss_chance,

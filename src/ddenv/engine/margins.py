@@ -147,9 +147,16 @@ class _Search:
         """The runs that are needed next: of one number after the other, twice, then of the nearest fix."""
         while self._looks < 2 * len(self._now.wanted):
             name = self._now.wanted[self._looks % len(self._now.wanted)]
-            values = list(self._of(self._now, name))
+            now = self._now
+            tried = next(one for one in now.numbers if one.asked.name == name)
+            used = sum(one.name != name for one in now.runs[now.before_call :])
+            earlier = sum(one.name == name for one in now.runs[: now.before_call])
+            first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
+            most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.asked.budget - used)
+            rule = known.Rule(tried.rate, tried.error)
+            values = list(known.wanted(tried.asked, rule, known.known_of(now, name), most))
             # Later runs may have ended before earlier ones.
-            made = {(one.value, one.run) for one in self._now.runs if one.name == name}
+            made = {(one.value, one.run) for one in now.runs if one.name == name}
             new = {value for value, _ in values} - {value for value, _ in made} - self._possible
             if sum(self._is_impossible(name, value) for value in sorted(new)):
                 # Others are wanted in their place.
@@ -159,15 +166,13 @@ class _Search:
                 yield from ((name, value, run) for value, run in values if (value, run) not in made)
                 return
             self._looks, self._possible = self._looks + 1, set()
-        yield from self._of_fix(self._now)
-
-    def _of(self, now: Margins, name: str) -> Iterator[tuple[float, int]]:
-        tried = next(one for one in now.numbers if one.asked.name == name)
-        used = sum(one.name != name for one in now.runs[now.before_call :])
-        earlier = sum(one.name == name for one in now.runs[: now.before_call])
-        first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
-        most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.asked.budget - used)
-        return known.wanted(tried.asked, known.Rule(tried.rate, tried.error), known.known_of(now, name), most)
+        runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
+        for fix in known.fixes_of(self._now)[: known.MOST_FIXES]:
+            if fix.confirmed is None:
+                fresh = {one.run for one in self._now.runs if (one.name, one.value) == (fix.name, fix.value)}
+                yield from ((fix.name, fix.value, run) for run in runs if run not in fresh)
+            if fix.confirmed is not False:
+                return
 
     def _changes(self, name: str, value: float) -> tuple[tuple[str, float], ...]:
         return known.changes_at(next(one.asked for one in self._now.numbers if one.asked.name == name), value)
@@ -180,15 +185,6 @@ class _Search:
             self._journal.record(events.MarginImpossible(name, value, str(error)))
             return True
         return False
-
-    def _of_fix(self, now: Margins) -> Iterator[Wanted]:
-        for fix in known.fixes_of(now)[: known.MOST_FIXES]:
-            if fix.confirmed is None:
-                made = {one.run for one in now.runs if (one.name, one.value) == (fix.name, fix.value)}
-                runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
-                yield from ((fix.name, fix.value, run) for run in runs if run not in made)
-            if fix.confirmed is not False:
-                return
 
     def _start(self, one: Wanted) -> None:
         name, value, run = one

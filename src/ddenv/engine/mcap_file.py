@@ -17,7 +17,7 @@ from mcap_ros2.writer import Writer
 from ddenv.engine.judging import rows_of
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
+from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
@@ -102,20 +102,6 @@ def definition(kind: str) -> str:
     return f"\n{'=' * 80}\n".join(texts).removeprefix(f"MSG: {kind}\n")
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """A test to write, under a name of its own; `full` if it was not cut short."""
-
-    name: str
-    test: int
-    models: frozenset[str]
-    seed: int
-    full: bool
-
-    def frame(self, name: str) -> str:
-        return f"{self.name}/{name}"
-
-
 @dataclass
 class Streams:
     """What a controller was given and what it commanded, in order."""
@@ -142,8 +128,7 @@ def write_mcap(run: Path, target: Path) -> list[str]:
         if subject.scenario.oracle is not None:
             raise UserError(f"{run}: a simulator of your own made it; only runs on Drake have streams to write")
         state = fold(file.events())
-        chosen = [_named(state, name, test) for name, test in _chosen(file, state)]
-        stored = {one.test: rows_of(file, one.test) for one in chosen}
+        chosen = [(name, state.tests[number - 1], rows_of(file, number)) for name, number in _chosen(file, state)]
     if not chosen:
         raise UserError(f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}")
     template = Variants(subject.world, subject.robot, subject.scenario)
@@ -151,15 +136,15 @@ def write_mcap(run: Path, target: Path) -> list[str]:
     writer = Writer(output)
     schemas = {kind: writer.register_msgdef(kind, definition(kind)) for kind in KINDS}
     writer.write_message(RESULT, schemas[WORDS], {"data": shown(state)}, nanoseconds(0.0))
-    for one in chosen:
-        streams = Streams()
-        result = template.run(one.models, one.seed, None, one.full, streams)
-        if not np.array_equal(result.trajectory, stored[one.test]):
-            raise UserError(f"{run}: test {one.test} gives different bits here: another Drake or processor made it")
-        for topic, kind, seconds, message in messages(one, result, streams, subject):
-            whole = topic if topic.startswith("/") else f"/{one.name}/{topic}"
+    for name, test, rows in chosen:
+        streams, models = Streams(), frozenset(state.models_of(test))
+        result = template.run(models, test.seed, None, not test.cut, streams)
+        if not np.array_equal(result.trajectory, rows):
+            raise UserError(f"{run}: test {test.id} gives different bits here: another Drake or processor made it")
+        for topic, kind, seconds, message in messages(name, models, result, streams, subject):
+            whole = topic if topic.startswith("/") else f"/{name}/{topic}"
             writer.write_message(whole, schemas[kind], message, nanoseconds(seconds))
-        said.append(f"/{one.name}: test {one.test}, seed {one.seed}, {result.simulated_seconds:.1f} s")
+        said.append(f"/{name}: test {test.id}, seed {test.seed}, {result.simulated_seconds:.1f} s")
     writer.finish()  # type: ignore[no-untyped-call]
     write_file(target, output.getvalue())
     return said
@@ -185,26 +170,23 @@ def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
             return
 
 
-def _named(state: RunState, name: str, number: int) -> Chosen:
-    test = state.tests[number - 1]
-    return Chosen(name, number, frozenset(state.models_of(test)), test.seed, not test.cut)
-
-
 # The messages.
 
 
-def messages(one: Chosen, result: RunResult, streams: Streams, subject: Subject) -> Iterator[Row]:
-    """What is still, what moved, and what the robot sensed and did."""
-    goal, removable, base = subject.scenario.goal, frozenset(subject.elements), one.frame("base_link")
+def messages(run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Subject) -> Iterator[Row]:
+    """What is still, what moved, and what the robot sensed and did in a run of these models."""
+    goal, removable, base = subject.scenario.goal, frozenset(subject.elements), f"{run}/base_link"
     yield "goal", PLACE, 0.0, {"header": header(0.0, MAP), "pose": pose(Pose((goal.x, goal.y, 0.0)))}
-    there = [model for model in subject.world.models if model.name in one.models or model.name not in removable]
-    # What moves is drawn in a frame of its own.
-    frames = (one.frame(model.name) if model.name in result.motions else MAP for model in there)
-    colors = (LEFT_COLOR if model.name in one.models else ALWAYS_COLOR for model in there)
-    models = zip(there, (model.name for model in there), frames, colors, strict=True)
-    yield "models", MARKERS, 0.0, _markers(models)
+    drawn = []
+    for model in subject.world.models:
+        if model.name in models or model.name not in removable:
+            # What moves is drawn in a frame of its own.
+            frame = f"{run}/{model.name}" if model.name in result.motions else MAP
+            drawn.append((model, model.name, frame, LEFT_COLOR if model.name in models else ALWAYS_COLOR))
+    yield "models", MARKERS, 0.0, _markers(drawn)
     yield "robot", MARKERS, 0.0, _markers([(subject.robot, "robot", base, ROBOT_COLOR)])
-    for child, rows in ((base, result.trajectory), *((one.frame(name), rows) for name, rows in result.motions.items())):
+    moved = {base: result.trajectory} | {f"{run}/{name}": rows for name, rows in result.motions.items()}
+    for child, rows in moved.items():
         for seconds, *at in rows.tolist():
             yield TRANSFORMS, TF, seconds, {"transforms": [transform(seconds, MAP, child, at)]}
     for name, seconds in sorted(result.first_touched.items(), key=lambda touched: touched[1]):
@@ -212,67 +194,72 @@ def messages(one: Chosen, result: RunResult, streams: Streams, subject: Subject)
     joints = streams.setup.joints if streams.setup else ()
     for reading, command in streams.heard:
         yield from _sensed(reading, joints, base, subject.scenario.sensors.lidar)
-        yield _commanded(reading.time, command, base)
+        if isinstance(command, WheelSpeeds):
+            names = sorted(command.speeds)
+            speeds = _wheels(reading.time, names, [command.speeds[name] for name in names])
+            yield "cmd_wheels", WHEELS, reading.time, speeds
+        else:
+            asked = twist(command.speed, command.turn_rate)
+            yield "cmd_vel", TWIST, reading.time, {"header": header(reading.time, base), "twist": asked}
 
 
 def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.Lidar | None) -> Iterator[Row]:
     at = reading.time
-    yield "odom", ODOMETRY, at, _odometry(at, reading.estimate, base)
+    guess, covariance = reading.estimate, [0.0] * 36
+    # Of x, y and the turn about z.
+    for place, deviation in zip((0, 7, 35), guess.spread, strict=True):
+        covariance[place] = deviation**2
+    orientation = turn(math.cos(guess.heading / 2), 0.0, 0.0, math.sin(guess.heading / 2))
+    yield (
+        "odom",
+        ODOMETRY,
+        at,
+        {
+            "header": header(at, MAP),
+            "child_frame_id": base,
+            "pose": {
+                "pose": {"position": vector(guess.x, guess.y), "orientation": orientation},
+                "covariance": covariance,
+            },
+            "twist": {"twist": twist(guess.speed, guess.turn_rate)},
+        },
+    )
     if reading.wheels is not None:
         yield "joint_states", WHEELS, at, _wheels(at, joints, reading.wheels)
     if reading.imu is not None:
-        yield "imu", IMU, at, _imu(at, reading.imu, reading.estimate.heading, base)
+        imu, yaw = reading.imu, reading.estimate.heading
+        yield (
+            "imu",
+            IMU,
+            at,
+            {
+                "header": header(at, base),
+                "orientation": pose(Pose.from_rpy(0.0, 0.0, 0.0, imu.roll, imu.pitch, yaw))["orientation"],
+                "angular_velocity": vector(0.0, 0.0, imu.yaw_rate),
+                # In ROS 2, -1 says that it is not measured.
+                "linear_acceleration_covariance": [-1.0, *[0.0] * 8],
+            },
+        )
     if reading.scan is not None and lidar is not None:
         scan, frame = reading.scan, f"{base}/lidar"
         there = transform(scan.time, base, frame, (*scan.origin, 1.0, 0.0, 0.0, 0.0))
         yield TRANSFORMS, TF, scan.time, {"transforms": [there]}
-        yield "scan", SCAN, scan.time, _scan(scan, frame, lidar)
-
-
-def _odometry(seconds: float, guess: Estimate, base: str) -> Message:
-    covariance = [0.0] * 36
-    # Of x, y and the turn about z.
-    for place, deviation in zip((0, 7, 35), guess.spread, strict=True):
-        covariance[place] = deviation**2
-    at = {"position": vector(guess.x, guess.y), "orientation": heading(guess.heading)}
-    return {
-        "header": header(seconds, MAP),
-        "child_frame_id": base,
-        "pose": {"pose": at, "covariance": covariance},
-        "twist": {"twist": twist(guess.speed, guess.turn_rate)},
-    }
-
-
-def _imu(seconds: float, imu: Imu, yaw: float, base: str) -> Message:
-    return {
-        "header": header(seconds, base),
-        "orientation": pose(Pose.from_rpy(0.0, 0.0, 0.0, imu.roll, imu.pitch, yaw))["orientation"],
-        "angular_velocity": vector(0.0, 0.0, imu.yaw_rate),
-        # In ROS 2, -1 says that it is not measured.
-        "linear_acceleration_covariance": [-1.0, *[0.0] * 8],
-    }
-
-
-def _scan(scan: Scan, frame: str, lidar: scenario.Lidar) -> Message:
-    angles = scan.angles
-    return {
-        "header": header(scan.time, frame),
-        "angle_min": float(angles[0]),
-        "angle_max": float(angles[-1]),
-        "angle_increment": float(angles[1] - angles[0]),
-        "scan_time": 1.0 / lidar.rate,
-        "range_min": lidar.nearest,
-        "range_max": lidar.range,
-        "ranges": scan.ranges.tolist(),
-    }
-
-
-def _commanded(seconds: float, command: Twist | WheelSpeeds, base: str) -> Row:
-    if isinstance(command, WheelSpeeds):
-        names = sorted(command.speeds)
-        return "cmd_wheels", WHEELS, seconds, _wheels(seconds, names, [command.speeds[name] for name in names])
-    values = {"header": header(seconds, base), "twist": twist(command.speed, command.turn_rate)}
-    return "cmd_vel", TWIST, seconds, values
+        angles = scan.angles
+        yield (
+            "scan",
+            SCAN,
+            scan.time,
+            {
+                "header": header(scan.time, frame),
+                "angle_min": float(angles[0]),
+                "angle_max": float(angles[-1]),
+                "angle_increment": float(angles[1] - angles[0]),
+                "scan_time": 1.0 / lidar.rate,
+                "range_min": lidar.nearest,
+                "range_max": lidar.range,
+                "ranges": scan.ranges.tolist(),
+            },
+        )
 
 
 def _wheels(seconds: float, joints: Sequence[str], speeds: Sequence[float]) -> Message:
@@ -282,20 +269,14 @@ def _wheels(seconds: float, joints: Sequence[str], speeds: Sequence[float]) -> M
 
 def _markers(models: Iterable[tuple[Model, str, str, Color]]) -> Message:
     """A marker for each shape of models; each with its name, its frame, and the colour of shapes without one of their own."""
-    shapes = (
-        (frame, name, (Pose() if frame == MAP else model.links[0].pose.inverse()) @ at, shape, own or color)
-        for model, name, frame, color in models
-        for shape, at, own in _shapes(model)
-    )
-    drawn = (marker(number, *one) for number, one in enumerate(shapes, 1))
+    drawn: list[Message | None] = []
+    for model, name, frame, color in models:
+        origin = Pose() if frame == MAP else model.links[0].pose.inverse()
+        # Each visual, or each collision of a link that has none.
+        for item in (item for link in model.links for item in link.visuals or link.collisions):
+            own = item.color if isinstance(item, Visual) else None
+            drawn.append(marker(len(drawn) + 1, frame, name, origin @ item.pose, item.shape, own or color))
     return {"markers": [one for one in drawn if one]}
-
-
-def _shapes(model: Model) -> Iterator[tuple[Shape, Pose, Color | None]]:
-    """Shape, pose and colour of each visual, or of each collision of a link that has none."""
-    for link in model.links:
-        for item in link.visuals or link.collisions:
-            yield item.shape, item.pose, item.color if isinstance(item, Visual) else None
 
 
 # The parts of messages.
@@ -316,10 +297,6 @@ def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
 
 def turn(w: float = 1.0, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
     return {"x": float(x), "y": float(y), "z": float(z), "w": float(w)}
-
-
-def heading(yaw: float) -> Message:
-    return turn(math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
 
 
 def twist(speed: float, turn_rate: float) -> Message:

@@ -15,18 +15,7 @@ from multiprocessing.connection import wait
 from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
-from ddenv.engine.worker import (
-    Broken,
-    Make,
-    Moment,
-    Ready,
-    Run,
-    Settle,
-    Start,
-    Task,
-    WorkerProcess,
-    simulator_of,
-)
+from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, WorkerProcess, simulator_of
 from ddenv.errors import UserError
 from ddenv.robot import check_drake
 from ddenv.robot.deadline import Stopwatch
@@ -37,11 +26,7 @@ from ddenv.world.scenario import Scenario
 
 # A simulated step makes a thousand small allocations: with more of them cached by glibc, a step takes 59 us, not 75.
 # And a worker has one core: libraries that use threads would only slow down other workers.
-FOR_DRAKE = {
-    "GLIBC_TUNABLES": "glibc.malloc.tcache_count=127",
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-}
+FOR_DRAKE = {"GLIBC_TUNABLES": "glibc.malloc.tcache_count=127", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 _one_at_a_time = threading.Lock()
 
@@ -125,13 +110,7 @@ class Pool:
     """`jobs` workers on one scenario, each with a pipe of its own: whoever waits for a test is woken up as it ends."""
 
     def __init__(
-        self,
-        scenario: Scenario,
-        world: World,
-        robot: Model,
-        jobs: int,
-        make: Make = simulator_of,
-        at_a_time: int | None = None,
+        self, scenario: Scenario, world: World, robot: Model, jobs: int, make: Make = simulator_of, at_a_time: int = 0
     ) -> None:
         """`make` makes the simulator in each worker. `at_a_time` tests share the machine's memory, `jobs` if not given. Raises
         UserError where Drake is needed and not installed.
@@ -215,7 +194,10 @@ class Pool:
             if not heard.isdisjoint(slot.worker.handles):
                 self._listen(slot)
             if slot.job is not None and slot.result is None:
-                self._kill_if_late(slot, slot.job)
+                limit, what = (slot.job.limit, "") if slot.begun else (PREPARATION, " to prepare")
+                if slot.clock.look() > limit:
+                    slot.worker.kill()
+                    self._replace(slot, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}"))
         if time.monotonic() >= self._next_memory:
             self._next_memory = time.monotonic() + MEMORY_PERIOD * max(1.0, len(self._slots) / FEW)
             for slot in self._slots:
@@ -246,21 +228,14 @@ class Pool:
             case _:
                 slot.result = answer
 
-    def _kill_if_late(self, slot: _Slot, job: Job) -> None:
-        limit, what = (job.limit, "") if slot.begun else (PREPARATION, " to prepare")
-        if slot.clock.look() > limit:
-            slot.worker.kill()
-            self._replace(slot, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}"))
-
     def _lose(self, slot: _Slot, how: str) -> None:
         """A worker is gone. Its job is broken, or made by another one if it had not yet begun. Raises UserError if that goes on and
         on.
         """
         slot.breaks += not slot.ready
         if slot.breaks > MOST_BREAKS:
-            raise UserError(
-                f"the simulator's processes die before they run a test: {how}; is there enough memory for the world?"
-            )
+            what = "the simulator's processes die before they run a test"
+            raise UserError(f"{what}: {how}; is there enough memory for the world?")
         self._replace(slot, Broken("error", how) if slot.ready else None)
 
     def _replace(self, slot: _Slot, broken: Broken | None) -> None:

@@ -58,11 +58,14 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
             continue
         # Files that cannot be read are skipped.
         with suppress(UserError, KeyError, TypeError), RunFile(path) as other:
-            written = list(other.events()) if _is_alike(run, other) else []
+            ours, theirs = (next((each.event for each in file.events(most=1)), None) for file in (run, other))
+            # Both are asked for tests of the same models in the same world.
+            alike = isinstance(ours, Created) and isinstance(theirs, Created) and _asked(ours) == _asked(theirs)
+            documents = alike and all(run.documents(n) == other.documents(n) for n in ("world", "robot", "resource "))
+            written = other.events() if documents else []
             engines = (each.event for each in written if isinstance(each.event, EngineStarted))
-            if {(one.version, one.simulator, one.machine) for one in engines} == {
-                (__version__, simulator(), machine())
-            }:
+            made_by = {(one.version, one.simulator, one.machine) for one in engines}
+            if made_by == {(__version__, simulator(), machine())}:
                 known |= dict(_tests_of(path, fold(written)))
     return known
 
@@ -77,20 +80,13 @@ def _tests_of(path: Path, state: RunState) -> Iterator[tuple[Key, Place]]:
                     yield (models, test.seed, full), Place(path, test, state.elements)
 
 
-def _is_alike(run: RunFile, other: RunFile) -> bool:
-    """Whether both runs are asked for tests of the same models in the same world."""
-    ours, theirs = (next((each.event for each in file.events(most=1)), None) for file in (run, other))
-    if not isinstance(ours, Created) or not isinstance(theirs, Created):
-        return False
-    alike = _asked(ours.scenario) == _asked(theirs.scenario) and ours.elements == theirs.elements
-    return alike and all(run.documents(name) == other.documents(name) for name in ("world", "robot", "resource "))
-
-
-def _asked(scenario: dict[str, Any]) -> Any:
-    """A scenario without its paths, and of how it is reduced only whether tests end early: the contents of files are compared."""
-    paths = dict.fromkeys(("name", "description", "world", "folder"))
+def _asked(created: Created) -> Any:
+    """The elements, and the scenario without its paths, and of how it is reduced only whether tests end early: contents of files
+    are compared.
+    """
+    scenario, paths = created.scenario, dict.fromkeys(("name", "description", "world", "folder"))
     robot, reduction = scenario["robot"] | {"model": None}, scenario["reduction"]["early_stop"]
-    return scenario | paths | {"robot": robot, "reduction": reduction}
+    return created.elements, scenario | paths | {"robot": robot, "reduction": reduction}
 
 
 def result_of(place: Place) -> RunResult | None:

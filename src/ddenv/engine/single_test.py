@@ -57,7 +57,12 @@ def plan(
     if test is not None:
         if minimal or keep is not None or seed is not None:
             raise UserError("--test: has models and a seed of its own; leave out --keep, --minimal and --seed")
-        models, seed = _of_test(subject, test)
+        state = subject.state
+        if state is None:
+            raise UserError("--test: needs a run; a scenario has no tests yet")
+        if not 0 < test <= len(state.tests):
+            raise UserError(f"--test: there is no test {test}; the run has tests 1 to {len(state.tests)}")
+        models, seed = state.models_of(state.tests[test - 1]), state.tests[test - 1].seed
     for name in leave_out or []:
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
@@ -83,22 +88,14 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[st
     return subject.state.environment if minimal and subject.state else subject.elements
 
 
-def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
-    """The models and the seed of a test of the run."""
-    state = subject.state
-    if state is None:
-        raise UserError("--test: needs a run; a scenario has no tests yet")
-    if not 0 < number <= len(state.tests):
-        raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(state.tests)}")
-    test = state.tests[number - 1]
-    return state.models_of(test), test.seed
-
-
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
     """Makes the runs in worker processes; yields the result of each, in order, as plain data. Without f a failed run is just
     "failed".
     """
-    failures = _failures(subject)
+    failures: tuple[Failure, ...] = ()
+    if subject.run is not None and subject.state is not None:
+        with RunFile(subject.run) as file:
+            failures = failures_of(file, subject.state, subject.scenario.failure)
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
     started = shown = 0
@@ -118,14 +115,6 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
         pool.close()
 
 
-def _failures(subject: Subject) -> tuple[Failure, ...]:
-    """What counts as f."""
-    if subject.run is None or subject.state is None:
-        return ()
-    with RunFile(subject.run) as file:
-        return failures_of(file, subject.state, subject.scenario.failure)
-
-
 # Far from all runs of a reduction, of its certificates and of isolations.
 FIRST_RUN = 1_000_000_000
 # After this number of broken runs nothing is said.
@@ -134,10 +123,8 @@ MOST_BROKEN = 5
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What fresh runs showed so far: `shown` of the `runs` that did not break showed f.
-
-    `fails`: f shows at the rate that the certificate expects (True), or at less than half of it (False); None while that is
-    open.
+    """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f shows at the rate that the
+    certificate expects (True), or at less than half of it (False); None while that is open.
     """
 
     fails: bool | None
@@ -146,9 +133,9 @@ class Reproduction:
     broken: int
 
     def __str__(self) -> str:
-        said = {True: "it fails as it did", False: "it does not fail as it did", None: "the runs do not decide"}[
-            self.fails
-        ]
+        said = "the runs do not decide"
+        if self.fails is not None:
+            said = "it fails as it did" if self.fails else "it does not fail as it did"
         return f"{said}: f in {self.shown} of {count(self.runs, 'run')}"
 
 
@@ -175,9 +162,8 @@ def expected(subject: Subject, where: object) -> Certificate:
     """The certificate of all that is left. Raises UserError where there is none, or where it showed no failure."""
     found = None if subject.state is None else current(subject.state)
     if found is None:
-        raise UserError(
-            f"{where}: no certificate says how often what is left fails; make one first: ddenv certify {where}"
-        )
+        what = "no certificate says how often what is left fails"
+        raise UserError(f"{where}: {what}; make one first: ddenv certify {where}")
     if not found.claims[0].low and not found.seeds:
         raise UserError(f"{where}: no fresh run of what is left showed f, so there is nothing to reproduce")
     return found
@@ -187,9 +173,8 @@ def reproduce(
     subject: Subject, certificate: Certificate, most: int, jobs: int
 ) -> Iterator[tuple[dict[str, Any], Reproduction]]:
     """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
-    expects; where chosen runs were reduced, with their seeds, of which each has to show f.
-
-    Yields each run's result, and what all of them show together.
+    expects; where chosen runs were reduced, with their seeds, of which each has to show f. Yields each run's result, and what all
+    of them show together.
     """
     shown: list[bool] = []
     broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low

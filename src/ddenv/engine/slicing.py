@@ -24,10 +24,9 @@ CHEAP = 0.1
 
 
 def slice_environment(journal: Journal) -> bool:
-    """Cuts the environment down, with an event, where every run known there allows it; returns whether it did.
-
-    Other seeds may meet what went: with `accept_rate: kept` it is done after a reduction only if the chance of that is at most
-    what may be lost of the rate. In accept mode `ask` it is not done.
+    """Cuts the environment down, with an event, where every run known there allows it; returns whether it did. Other seeds may meet
+    what went: with `accept_rate: kept` it is done after a reduction only if the chance of that is at most what may be lost of the
+    rate. In accept mode `ask` it is not done.
     """
     state, there = journal.state, journal.environment
     tests, met = _known(journal, there)
@@ -39,7 +38,13 @@ def slice_environment(journal: Journal) -> bool:
     left = journal.pinned
     for models in met:
         left |= models
-    left = _closed(journal, left, there)
+    # With what goes together with them.
+    ties, before = journal.ties, NOTHING
+    assert ties is not None
+    together = Stacks.of(map(journal.models, stacks_of(state, state.environment)))
+    while left != before:
+        before = left
+        left = together.of_any(ties.closed(left, there))
     if left == there or journal.is_refused(left) or state.evidence_test is None:
         return False
     audit, chose = audit_is_due(state), tuple(test.id for test in tests)
@@ -77,32 +82,18 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
     return tests, list(met.values())
 
 
-def _closed(journal: Journal, models: Environment, there: Environment) -> Environment:
-    """`models`, with what goes together with them."""
-    ties, state, before = journal.ties, journal.state, NOTHING
-    assert ties is not None
-    together = Stacks.of(map(journal.models, stacks_of(state, state.environment)))
-    while models != before:
-        before = models
-        models = together.of_any(ties.closed(models, there))
-    return models
-
-
 def audit_is_due(state: RunState, phase: str = "") -> bool:
     """Whether the next implied test has to be simulated: the first one, then one in `audit`; during the `phase` of a certificate
     every one, while that is cheap.
     """
-    if phase == CERTIFY and _is_cheap(state):
-        return True
+    if phase == CERTIFY:
+        made = [test for test in state.finished_tests if test.implied_by is None]
+        audits = sum(test.simulated_seconds for test in made if test.audits is not None and test.phase == CERTIFY)
+        if audits <= CHEAP * sum(test.simulated_seconds for test in made):
+            return True
     every = read(state.scenario, SETTINGS["audit"])
     known = state.implied + sum(len(node.sliced_by) for node in state.nodes)
     return isinstance(every, int) and state.audits * every <= known + state.audits
-
-
-def _is_cheap(state: RunState) -> bool:
-    made = [test for test in state.finished_tests if test.implied_by is None]
-    audits = sum(test.simulated_seconds for test in made if test.audits is not None and test.phase == CERTIFY)
-    return audits <= CHEAP * sum(test.simulated_seconds for test in made)
 
 
 def compare(journal: Journal, audits: Iterable[Test]) -> None:

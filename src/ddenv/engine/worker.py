@@ -53,10 +53,8 @@ Make = Callable[[Scenario, World, Model], Simulator]
 
 @dataclass(frozen=True)
 class Start:
-    """What rests on what in the settled world, as (upper, lower), and how it settled.
-
-    `ties` has models with what they are tied to: without it they would move by themselves. None: nothing is known without a
-    test.
+    """What rests on what in the settled world, as (upper, lower), and how it settled. `ties` has models with what they are tied to:
+    without it they would move by themselves. None: nothing is known without a test.
     """
 
     supports: list[tuple[str, str]]
@@ -66,9 +64,8 @@ class Start:
 
 @dataclass(frozen=True)
 class Run:
-    """Asks for a test. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other values by name.
-
-    It may take `limit` s of real time, without its preparation; None for what the scenario says.
+    """Asks for a test. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other values by name. It may
+    take `limit` s of real time, without its preparation; None for what the scenario says.
     """
 
     keep: frozenset[str]
@@ -175,7 +172,15 @@ def _settle_in(output: Connection) -> None:
     for stream in (1, 2):
         os.dup2(output.fileno(), stream)
     output.close()
-    threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
+    parent = os.getppid()
+
+    def follow() -> None:
+        """Ends the worker when its engine is killed: nobody would use its results."""
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
 
 
 def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]) -> Answer:
@@ -224,13 +229,6 @@ def reason_of(error: BaseException) -> str:
     text = " ".join(str(error).split())
     words = text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"
     return printable(words)[:REASON]
-
-
-def _follow_parent(parent: int) -> None:
-    """Ends the worker when its engine is killed: nobody would use its results."""
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
 
 
 # As the engine sees it.
@@ -291,15 +289,11 @@ class WorkerProcess:
             piece = os.read(self._output.fileno(), PIECE)
             self._silent = not piece
             self._said.add(piece)
-            self._log(piece)
-
-    def _log(self, piece: bytes) -> None:
-        left = LOGGED - self._logged
-        if left < 0:
-            return
-        self._logged += len(piece)
-        with suppress(OSError):
-            os.write(2, piece if len(piece) <= left else piece[:left] + LEFT_OUT)
+            left = LOGGED - self._logged
+            self._logged += len(piece)
+            if left >= 0:
+                with suppress(OSError):
+                    os.write(2, piece if len(piece) <= left else piece[:left] + LEFT_OUT)
 
     def kill(self) -> None:
         """Ends it at once, whatever it does. Does nothing if it has ended."""
@@ -316,7 +310,11 @@ class WorkerProcess:
         for _ in range(MOST_LEFT // PIECE):
             self._listen()
         self._end()
-        return _words(0 if code is None else code, self._said.last_lines(LAST_LINES))
+        said = self._said.last_lines(LAST_LINES)
+        how = f"exit code {code}" if code is None or code >= 0 else signal_name(-code)
+        # Nobody else kills workers.
+        perhaps = ", perhaps out of memory" if code == -signal.SIGKILL else ""
+        return f"{how}{perhaps}{': ' if said else ''}{' | '.join(said)}"
 
     def _end(self) -> None:
         self._process.join()
@@ -325,15 +323,13 @@ class WorkerProcess:
         self._process.close()
 
     def memory(self) -> int:
-        """The memory in use by it and by what it has started, bytes; 0 where that is not known."""
-        return sum(_resident(pid) for pid in _family(self.pid))
-
-
-def _words(code: int, said: list[str]) -> str:
-    how = f"exit code {code}" if code >= 0 else signal_name(-code)
-    # Nobody else kills workers.
-    perhaps = ", perhaps out of memory" if code == -signal.SIGKILL else ""
-    return f"{how}{perhaps}{': ' if said else ''}{' | '.join(said)}"
+        """The memory in use by it and by what it has started, without what they share with others, bytes; 0 if unknown."""
+        used = 0
+        for pid in _family(self.pid):
+            with suppress(OSError, ValueError):
+                _, resident, shared = (PROC / str(pid) / "statm").read_text().split()[:3]
+                used += (int(resident) - int(shared)) * os.sysconf("SC_PAGE_SIZE")
+        return used
 
 
 def _family(pid: int) -> Iterator[int]:
@@ -343,12 +339,3 @@ def _family(pid: int) -> Iterator[int]:
         for thread in (PROC / str(pid) / "task").iterdir():
             for child in (thread / "children").read_text().split():
                 yield from _family(int(child))
-
-
-def _resident(pid: int) -> int:
-    """The memory of one process, without what it shares with others, bytes."""
-    try:
-        _, resident, shared = (PROC / str(pid) / "statm").read_text().split()[:3]
-    except (OSError, ValueError):
-        return 0
-    return (int(resident) - int(shared)) * os.sysconf("SC_PAGE_SIZE")

@@ -33,12 +33,11 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
         number, before, fork = todo.pop()
         found.append(Row(f"{before}{fork}", nodes[number]))
         after = before + ("│ " if fork else "")
-        straight = _straight(children[number], straight_path)
-        if straight is not None:
-            todo.append((straight, after, ""))
-        sides = [child for child in children[number] if child != straight]
-        # The first one goes on top of the stack: it is drawn above those made later.
-        todo += [(child, after, "├─") for child in reversed(sides)]
+        # What goes straight down: the child on the path to the current node, or else the latest.
+        straight = next((child for child in children[number] if child in straight_path), (children[number] or [0])[-1])
+        # The first side branch goes on top of the stack: it is drawn above those made later.
+        ordered = [straight, *(child for child in reversed(children[number]) if child != straight)]
+        todo += [(child, after, "├─" if child != straight else "") for child in ordered if child]
     return found
 
 
@@ -53,17 +52,12 @@ def sign(node: Node, here: int) -> str:
 
 def words(node: Node, here: int) -> str:
     """What a node is, in words."""
-    found = ["here"] if node.number == here else []
-    if node.rejected:
+    said = {
+        "here": node.number == here,
         # The column has no room for both, and "minimal" alone would hide that it is refused.
-        found.append("was minimal" if node.minimal else "taken back")
-    elif node.minimal:
-        found.append("minimal")
-    if node.lost_rate:
-        found.append("f too rare")
-    return ", ".join(found)
-
-
-def _straight(children: Sequence[int], straight_path: set[int]) -> int | None:
-    """The child that goes straight down: the one on the path to the current node, or else the latest."""
-    return next((child for child in children if child in straight_path), children[-1] if children else None)
+        "was minimal": node.rejected and node.minimal,
+        "taken back": node.rejected and not node.minimal,
+        "minimal": node.minimal and not node.rejected,
+        "f too rare": node.lost_rate,
+    }
+    return ", ".join(words for words, holds in said.items() if holds)

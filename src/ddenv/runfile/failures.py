@@ -48,11 +48,12 @@ def atlas(state: RunState) -> tuple[OtherFailure, ...]:
             x, y, z = test.end_pose[:3]
             kinds[test.failure].append((test.id, (x, y, z)))
     epsilon = settings(state).epsilon
-    found = [
-        _failure(state, kind, position, tests)
-        for kind, ends in kinds.items()
-        for position, tests in _by_end(ends, epsilon)
-    ]
+    found = []
+    for kind, ends in kinds.items():
+        for position, tests in _by_end(ends, epsilon):
+            sizes = {test: len(state.environments[state.tests[test - 1].environment]) for test in tests}
+            smallest = min(tests, key=lambda test: (sizes[test], test))
+            found.append(OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest]))
     return tuple(sorted(found, key=lambda one: (-len(one.tests), one.tests)))
 
 
@@ -62,23 +63,15 @@ def _by_end(ends: list[tuple[int, Place]], epsilon: float) -> Iterable[tuple[Pla
     for start in range(0, len(ends), CHUNK):
         rest: list[tuple[int, Place]] = []
         for test, end in ends[start : start + CHUNK]:
-            distance, around = min(
-                ((math.dist(end, centre), tests) for centre, tests in groups), default=(math.inf, [])
-            )
+            apart = ((math.dist(end, centre), tests) for centre, tests in groups)
+            distance, around = min(apart, default=(math.inf, []))
             if distance <= epsilon:
                 around.append(test)
             else:
                 rest.append((test, end))
-        groups += [
-            (rest[group[0]][1], [rest[one][0] for one in group]) for group in alike([e for _, e in rest], epsilon)
-        ]
+        for group in alike([end for _, end in rest], epsilon):
+            groups.append((rest[group[0]][1], [rest[one][0] for one in group]))
     return groups
-
-
-def _failure(state: RunState, kind: str, position: Place, tests: list[int]) -> OtherFailure:
-    sizes = {test: len(state.environments[state.tests[test - 1].environment]) for test in tests}
-    smallest = min(tests, key=lambda test: (sizes[test], test))
-    return OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest])
 
 
 def grouped(number: int, apart: Callable[[int, int], float | None]) -> list[list[int]]:

@@ -45,7 +45,13 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
         if isinstance(event, e.CommandRefused):
             changes["refusal"] = recorded.command, event.why
     after = state.changed(revision=recorded.id, updated_at=recorded.time, **changes)
-    return _with_clock(state, after)
+    stood, stands = _stands(state), _stands(after)
+    # The clock stops where the run stands still, and starts where it goes on.
+    if stands and not stood:
+        return after.changed(**_stopped(after, after.updated_at))
+    if stood and not stands and not after.ended and after.started_at is None:
+        return after.changed(started_at=after.updated_at)
+    return after
 
 
 def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator[tuple[Recorded, RunState, RunState]]:
@@ -110,13 +116,7 @@ def compared(state: RunState, event: e.Compared, _: float) -> Changes:
 
 
 def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
-    return {
-        **_stopped(state, at),
-        "status": status,
-        "reason": reason,
-        "waiting_candidate": None,
-        "paused": False,
-    }
+    return {**_stopped(state, at), "status": status, "reason": reason, "waiting_candidate": None, "paused": False}
 
 
 def engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
@@ -164,16 +164,6 @@ def clock_jumped(state: RunState, event: e.ClockJumped, at: float) -> Changes:
     return {} if state.started_at is None else {"started_at": min(at, state.started_at + event.seconds)}
 
 
-def _with_clock(before: RunState, after: RunState) -> RunState:
-    """`after`, the state after one more event, with the clock stopped where the run stands still, and started where it goes on."""
-    stood, stands = _stands(before), _stands(after)
-    if stands and not stood:
-        return after.changed(**_stopped(after, after.updated_at))
-    if stood and not stands and not after.ended and after.started_at is None:
-        return after.changed(started_at=after.updated_at)
-    return after
-
-
 def _stands(state: RunState) -> bool:
     return state.paused or state.needs_room > 0 or state.waiting_candidate is not None
 
@@ -208,9 +198,21 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     if max((model for part in event.partitions for model in part), default=0) >= len(state.elements):
         raise ValueError("partitions")
     parts = tuple(map(Environment.of, event.partitions))
-    _check(event, whole, parts)
+    together = event.pinned
+    for part in parts:
+        together |= part
+    if len(together) != sum(map(len, event.partitions)) + len(event.pinned) or not together <= whole or not all(parts):
+        raise ValueError("partitions")
+    asked = {(kind, partition) for kind, partition, _ in event.candidates}
+    if len(asked) != len(event.candidates) or any(partition >= len(parts) for _, partition in asked):
+        raise ValueError("candidates")
     if state.round is not None and event.round <= state.round.number:
         raise ValueError(event.round)
+    # Each part's letter is that which it had in the split before, or else the first that is free.
+    before = None if state.round is None else state.round.split
+    had = {} if before is None else dict(zip(before.parts, before.letters, strict=True))
+    kept = {had[part] for part in parts if part in had}
+    free = (number for number in itertools.count() if number not in kept)
     split = Split(
         whole.names(state.elements),
         tuple(tuple(map(state.elements.__getitem__, part)) for part in event.partitions),
@@ -218,7 +220,7 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
         whole,
         parts,
         event.pinned,
-        _letters(parts, None if state.round is None else state.round.split),
+        tuple(had[part] if part in had else next(free) for part in parts),
     )
     candidates = PersistentTuple.of(
         Candidate(index, kind, partition, split, distance)
@@ -232,38 +234,15 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     }
 
 
-def _letters(parts: tuple[Environment, ...], before: Split | None) -> tuple[int, ...]:
-    """The number of each part's letter: that which it had in the split `before`, or else the first that is free."""
-    had = {} if before is None else dict(zip(before.parts, before.letters, strict=True))
-    kept = {had[part] for part in parts if part in had}
-    free = (number for number in itertools.count() if number not in kept)
-    return tuple(had[part] if part in had else next(free) for part in parts)
-
-
-def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, ...]) -> None:
-    """Raises ValueError unless partitions are disjoint and inside the environment, and candidates unique."""
-    models = sum(map(len, event.partitions)) + len(event.pinned)
-    together = event.pinned
-    for part in parts:
-        together |= part
-    if len(together) != models or not together <= whole or not all(parts):
-        raise ValueError("partitions")
-    asked = {(kind, partition) for kind, partition, _ in event.candidates}
-    if len(asked) != len(event.candidates) or any(partition >= len(parts) for _, partition in asked):
-        raise ValueError("candidates")
-
-
 def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
     """A search is foretold anew in each round: each forecast narrows the one before, unless they contradict each other."""
     if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
-    if state.forecast is None:
-        return {"forecast": event}
-    done = event.tests_done - state.forecast.tests_done
-    low, high = max(event.tests[0], state.forecast.tests[0] - done), min(event.tests[2], state.forecast.tests[2] - done)
-    if low > high:
-        return {"forecast": event}
-    return {"forecast": replace(event, tests=(low, min(max(low, event.tests[1]), high), high))}
+    low, likely, high = event.tests
+    if state.forecast is not None:
+        done = event.tests_done - state.forecast.tests_done
+        low, high = max(low, state.forecast.tests[0] - done), min(high, state.forecast.tests[2] - done)
+    return {"forecast": event if low > high else replace(event, tests=(low, min(max(low, likely), high), high))}
 
 
 def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
@@ -276,11 +255,11 @@ def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Cha
     # Something in the part that it leaves out is needed, and these parts are disjoint.
     round: Round = changes["round"]
     round = replace(round, missed=round.missed + (candidate.kind == "complement" or len(round.partitions) == 2))
-    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
-    if needed == state.lower_bound:
-        return changes | {"round": round}
-    point = Point(state.tests_done, len(state.environment), needed)
-    return changes | {"round": round, "lower_bound": needed, "history": (*state.history, point)}
+    changes["round"], needed = round, min(max(state.lower_bound, round.missed, 1), len(round.environment))
+    if needed != state.lower_bound:
+        point = Point(state.tests_done, len(state.environment), needed)
+        changes |= {"lower_bound": needed, "history": (*state.history, point)}
+    return changes
 
 
 def waiting(state: RunState, event: e.Waiting, _: float) -> Changes:
@@ -335,8 +314,7 @@ def digest(parts: Iterable[Environment]) -> int:
 def accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float) -> Changes:
     if event.mode == state.accept_mode:
         return {}
-    ask = event.mode == "ask"
-    words = "reductions wait for accept or reject" if ask else "reductions are accepted automatically"
+    words = "reductions wait for accept or reject" if event.mode == "ask" else "reductions are accepted automatically"
     return {"accept_mode": event.mode, **decision(state, at, "accept_mode", words)}
 
 
@@ -383,19 +361,12 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Still: lambda *_: {"ties": ()},
     e.Noted: lambda state, event, _: {"notes": (*state.notes, (event.about, event.words))},
-    e.IsolationFinished: lambda state, event, at: {
-        **fold_claims.isolation_found(state, event),
-        **_as_it_was(state, at),
-    },
-    e.IsolationGivenUp: lambda state, _, at: {
-        "isolations": fold_decisions.without_open(state),
-        **_as_it_was(state, at),
-    },
+    e.IsolationFinished: lambda state, event, at: fold_claims.isolation_found(state, event) | _as_it_was(state, at),
+    e.IsolationGivenUp: lambda state, _, at: _as_it_was(state, at) | {"isolations": fold_decisions.without_open(state)},
     e.MarginImpossible: fold_claims.margin_ran,
-    e.MarginsFinished: lambda state, _, at: {
-        **_as_it_was(state, at),
-        "margins": replace(fold_claims.open_margins(state), ended=True),
-    },
+    e.MarginsFinished: lambda state, _, at: (
+        _as_it_was(state, at) | {"margins": replace(fold_claims.open_margins(state), ended=True)}
+    ),
     e.CommandRefused: lambda *_: {},
     e.CommandHandled: lambda *_: {},
 }

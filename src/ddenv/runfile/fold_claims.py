@@ -10,7 +10,7 @@ from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, ori
 from ddenv.runfile.fold_tests import Changes, shared, with_node, with_removal, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Margins, Node, NumberTried, Returned
-from ddenv.runfile.state import OUTCOMES, RunState, Test
+from ddenv.runfile.state import OUTCOMES, RunState
 
 
 def certificate_started(state: RunState, event: e.CertificateStarted, _: float) -> Changes:
@@ -30,18 +30,20 @@ def certificate_started(state: RunState, event: e.CertificateStarted, _: float) 
 
 def certificate_finished(state: RunState, event: e.CertificateFinished, _: float) -> Changes:
     _check_tests(state, event.tests)
-    claims = tuple(_claim(state, claim) for claim in event.claims)
-    last = replace(state.certificates[-1], claims=claims)
+    claims = []
+    for made in event.claims:
+        known = made.environment < len(state.environments) and all(outcome in OUTCOMES for outcome in made.outcomes)
+        if not known or made.shown > made.runs or (made.verdict == "lost" and not made.runs):
+            raise ValueError(made)
+        special = {"without": _name(state, made.without), "outcomes": tuple(made.outcomes.items())}
+        claims.append(Claim(**shared(made, Claim) | special))
+    last = replace(state.certificates[-1], claims=tuple(claims))
     unknown = any(claim.verdict == "unknown" for claim in claims)
     return {"certificates": (*state.certificates[:-1], last), "left_unknown": state.left_unknown or unknown}
 
 
-def _claim(state: RunState, made: e.ClaimMade) -> Claim:
-    known = made.environment < len(state.environments) and all(outcome in OUTCOMES for outcome in made.outcomes)
-    if not known or made.shown > made.runs or (made.verdict == "lost" and not made.runs):
-        raise ValueError(made)
-    without = None if made.without is None else state.elements[made.without]
-    return Claim(**shared(made, Claim) | {"without": without, "outcomes": tuple(made.outcomes.items())})
+def _name(state: RunState, model: int | None) -> str | None:
+    return None if model is None else state.elements[model]
 
 
 def _check_tests(state: RunState, tests: Sequence[int]) -> None:
@@ -97,7 +99,13 @@ def isolation_checked(state: RunState, event: e.IsolationChecked, _: float) -> C
     _check_tests(state, event.tests)
     last = _open(state)
     removals, number = with_removal(state, event.environment)
-    check = Check(number, tuple(_returned(state, claim) for claim in event.claims))
+    claims = []
+    for made in event.claims:
+        of_others = ("needed", "not needed") if made.back is None else ("passes", "fails")
+        if made.reached > made.runs or made.verdict in of_others:
+            raise ValueError(made)
+        claims.append(Returned(**shared(made, Returned) | {"back": _name(state, made.back)}))
+    check = Check(number, tuple(claims))
     if not check.claims or check.claims[0].back is not None:
         raise ValueError(event)
     return {"removals": removals, "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
@@ -109,14 +117,6 @@ def isolation_found(state: RunState, event: e.IsolationFinished) -> Changes:
     if removal is not None and (not last.checks or last.checks[-1].removal != removal):
         raise ValueError(removal)
     return {"isolations": (*state.isolations[:-1], replace(last, ended=True, found=removal))}
-
-
-def _returned(state: RunState, made: e.ReturnedMade) -> Returned:
-    if made.reached > made.runs or made.verdict in (
-        ("needed", "not needed") if made.back is None else ("passes", "fails")
-    ):
-        raise ValueError(made)
-    return Returned(**shared(made, Returned) | {"back": None if made.back is None else state.elements[made.back]})
 
 
 def _open(state: RunState) -> Isolation:
@@ -189,20 +189,24 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
     for test in state.tests:
         if test.implied_by is not None and test.is_finished:
             state = state.changed(**with_test(state, test.id, {"outcome": "lost"}))
-    state = state.changed(
-        nodes=tuple(_without_void(reached, state) for reached in state.nodes),
-        trials=tuple(
-            replace(trial, verdict="", tests=()) if _any_implied(state, trial.tests) else trial
-            for trial in state.trials
-        ),
-    )
+    nodes = []
+    for reached in state.nodes:
+        runs = [test for test in state.tests_of(reached.runs) if test.implied_by is None]
+        if len(runs) < len(reached.runs):
+            shown = sum(test.outcome == "similar" for test in runs)
+            reached = replace(reached, runs=tuple(test.id for test in runs), shown=shown)
+        nodes.append(reached)
     # Void tests are no longer counted.
     done = state.tests_done
-    state = state.changed(history=tuple(replace(point, tests=min(point.tests, done)) for point in state.history))
+    history = tuple(replace(point, tests=min(point.tests, done)) for point in state.history)
+    state = state.changed(nodes=tuple(nodes), history=history)
     return {
         "tests": state.tests,
         "tally": state.tally,
-        "trials": state.trials,
+        "trials": tuple(
+            replace(trial, verdict="", tests=()) if _any_implied(state, trial.tests) else trial
+            for trial in state.trials
+        ),
         **searched_anew(state),
         "implied": 0,
         "refuted": (audit.id, event.by),
@@ -217,11 +221,3 @@ def rests_on_slices(state: RunState, node: Node) -> bool:
 
 def _any_implied(state: RunState, tests: Sequence[int]) -> bool:
     return any(state.tests[test - 1].implied_by is not None for test in tests if test > 0)
-
-
-def _without_void(node: Node, state: RunState) -> Node:
-    """A node without the runs whose results are void."""
-    if not _any_implied(state, node.runs):
-        return node
-    runs: list[Test] = [state.tests[test - 1] for test in node.runs if state.tests[test - 1].implied_by is None]
-    return replace(node, runs=tuple(test.id for test in runs), shown=sum(test.outcome == "similar" for test in runs))

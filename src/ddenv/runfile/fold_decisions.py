@@ -21,19 +21,15 @@ NAMED, LONGEST = 3, 40
 
 
 def pinned(state: RunState, event: e.Pinned, at: float) -> Changes:
-    models = _named(state, event.models)
-    words = f"pinned {listed(models)}"
-    return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
+    models = [state.elements[model] for model in event.models]
+    said = decision(state, at, "pin", f"pinned {listed(models)}")
+    return {**searched_anew(state), "pinned": state.pinned.union(models), **said}
 
 
 def unpinned(state: RunState, event: e.Unpinned, at: float) -> Changes:
-    models = _named(state, event.models)
-    words = f"unpinned {listed(models)}"
-    return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
-
-
-def _named(state: RunState, models: Iterable[int]) -> tuple[str, ...]:
-    return tuple(map(state.elements.__getitem__, models))
+    models = [state.elements[model] for model in event.models]
+    said = decision(state, at, "unpin", f"unpinned {listed(models)}")
+    return {**searched_anew(state), "pinned": state.pinned.difference(models), **said}
 
 
 def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
@@ -96,13 +92,11 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
     """An undone reduction is not accepted again; an environment that the user goes to is wanted."""
     node = state.nodes[event.node]
     wanted = state.environments[node.id]
-    state = state.changed(
-        refused=tuple(refusal for refusal in state.refused if refusal.environment != wanted),
-        lost=tuple(
-            (failures, lost) for failures, lost in state.lost if failures != state.failures or not wanted <= lost
-        ),
-    )
-    changes: Changes = {"refused": state.refused, "lost": state.lost}
+    changes: Changes = {
+        "refused": tuple(refusal for refusal in state.refused if refusal.environment != wanted),
+        "lost": tuple(one for one in state.lost if one[0] != state.failures or not wanted <= one[1]),
+    }
+    state = state.changed(**changes)
     nodes = with_node(state.nodes, replace(node, rejected=False, lost_rate=False))
     if event.rejected is None:
         words = f"went to {place(node)}"
@@ -131,15 +125,13 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
 
 def changed(state: RunState, event: e.Changed, at: float) -> Changes:
     before = dict(state.scenario["reduction"])
-    words = ", ".join(f"{key} from {_said(before.get(key))} to {_said(value)}" for key, value in event.settings.items())
+    said = {key: [before.get(key), value] for key, value in event.settings.items()}
+    limits = {key: ["no limit" if one is None else one for one in both] for key, both in said.items()}
+    words = ", ".join(f"{key} from {old} to {new}" for key, (old, new) in limits.items())
     scenario = {**state.scenario, "reduction": before | event.settings}
     # The budget does not affect the search.
     anew = {} if set(event.settings) == {"budget"} else searched_anew(state)
     return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
-
-
-def _said(value: object) -> object:
-    return "no limit" if value is None else value
 
 
 def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
@@ -172,13 +164,13 @@ def arrived(
     how: str,
     what: str,
     tests: Iterable[int],
-    below: int | None = None,
+    below: int = -1,
 ) -> Changes:
     """The run moves to environment `number`, a new node below the current one, or below node number `below`; `tests` ran it."""
     environment = state.environments[number].names(state.elements)
     reduction = state.scenario.get("reduction", {})
     runs, shown = seen(state.tests, tests)
-    parent = state.node if below is None else below
+    parent = state.node if below < 0 else below
     node = Node(
         number=len(state.nodes),
         parent=parent,

@@ -20,14 +20,17 @@ END = ("outcome", "failure", "distance", "end_pose", "simulated_seconds", "cut",
 
 
 def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) -> Changes:
-    removals, removal = state.removals, None
+    removals, removal, node = state.removals, None, state.node
     if event.phase == ISOLATE:
-        removals, removal = with_removal(state, event.environment)
+        (removals, removal), node = with_removal(state, event.environment), 0
+    elif event.phase == CERTIFY and event.without is None:
+        # Of a fresh run, that with its environment on the way to the current one.
+        node = next((one.number for one in reversed(state.path) if one.id == event.environment), node)
     special = {
         "id": event.test,
         "without": None if event.without is None else state.elements[event.without],
         "removal": removal,
-        "node": _node_of(state, event),
+        "node": node,
         "engine": state.engines,
     }
     test = Test(**shared(event, Test) | special)
@@ -53,15 +56,6 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
 def shared(event: Any, kind: type[Any]) -> dict[str, Any]:
     """The fields that a part of an event and the state have in common."""
     return {field.name: getattr(event, field.name) for field in fields(kind) if hasattr(event, field.name)}
-
-
-def _node_of(state: RunState, event: e.TestStarted | e.Implied) -> int:
-    """The node of a test: of a fresh run, that with its environment on the way to the current one."""
-    if event.phase == ISOLATE:
-        return 0
-    if event.phase == CERTIFY and event.without is None:
-        return next((node.number for node in reversed(state.path) if node.id == event.environment), state.node)
-    return state.node
 
 
 def with_removal(state: RunState, environment: int) -> tuple[PersistentTuple[Removal], int]:
@@ -176,24 +170,19 @@ def rested_upon(before: RunState, event: e.Event) -> Changes:
 
 def _noted(state: RunState, test: Test) -> Changes:
     """The nodes, with a finished test entered where it ran the whole environment of one."""
-    number = _run_of(state, test)
-    if number is None or not _is_sound(test):
-        return {}
-    node = state.nodes[number]
-    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + (test.outcome == "similar"))
-    return {"nodes": with_node(state.nodes, after)}
-
-
-def _run_of(state: RunState, test: Test) -> int | None:
+    node: Node | None = None
+    round, here = state.round, state.here
     if test.phase == CERTIFY:
         # Beside what is left, the whole world runs where that missed f, which would show its rate as too low.
         beside = test.node != state.node and state.nodes[test.node].how in ("start", "instead")
-        return None if beside or test.without is not None else test.node
-    round, here = state.round, state.here
-    if round is None or here is None or test.candidate is None or test.round != round.number:
-        return None
-    # It ran ahead of the verdict that made its candidate the environment.
-    return here.number if round.winner == test.candidate and here.round == round.number else None
+        node = None if beside or test.without is not None else state.nodes[test.node]
+    elif round is not None and here is not None and test.candidate is not None and test.round == round.number:
+        # It ran ahead of the verdict that made its candidate the environment.
+        node = here if round.winner == test.candidate and here.round == round.number else None
+    if node is None or not _is_sound(test):
+        return {}
+    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + (test.outcome == "similar"))
+    return {"nodes": with_node(state.nodes, after)}
 
 
 def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
