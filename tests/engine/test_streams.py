@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
-from ddenv.engine.mcap_file import KINDS, Chosen, Streams, _chosen, definition, header, marker, messages, nanoseconds
+from ddenv.engine.mcap_file import KINDS, Streams, _chosen, definition, header, marker, messages, nanoseconds
 from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Twist, WheelSpeeds
 from ddenv.world import scenario
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Sphere
@@ -66,8 +66,7 @@ def found():
     guess = Estimate(1.0, 2.0, math.pi / 2, 0.4, 0.1, (0.1, 0.2, 0.3))
     streams.hear(Reading(0.1, guess, (1.0, 2.0), Imu(0.5, 0.0, 0.0), None, scan), Twist(0.6, -0.2))
     streams.hear(Reading(0.2, guess), WheelSpeeds({"right": 2.0}))
-    one = Chosen("left", 7, frozenset({"stays", "moves"}), 0, True)
-    return read_back(messages(one, result, streams, subject))
+    return read_back(messages("left", frozenset({"stays", "moves"}), result, streams, subject))
 
 
 def test_models_that_move_have_a_frame_of_their_own_and_what_was_left_out_is_not_there(found):

@@ -12,10 +12,9 @@ from itertools import count, takewhile
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.procedure import Certificate, Leg, Past
+from ddenv.reduction.procedure import Baseline, Certificate, Changed, Leg, Past, Test
 from ddenv.reduction.round import Stacks
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.worlds import evidence
@@ -86,19 +85,25 @@ class Now:
     again: tuple[tuple[int, ...], ...] = ()
 
 
+class Killed(Exception):
+    """There is no driver any more."""
+
+
 class Driver:
     """Makes the tests of `outcome` with so many workers; `order` says which of them end first.
 
-    `facts` are all steps but `Wants`; `steps` counts all.
+    `facts` are what it was asked or told that is no test, each with the method's name first; `steps` counts these and its wants.
+    At a step `interrupt` raises an exception, (step, exception).
     """
 
     def __init__(self, world: World, workers: int = 1, order: int = 0, known: Known | None = None) -> None:
         self.world, self.workers, self.refusals = world, workers, 0
         self.outcome: Callable[[Environment, int], bool | str] = world.outcome
         self.known, self.now = known or Known(), Now((world.whole,))
-        self.facts: list[object] = []
+        self.facts: list[tuple] = []
         self.steps = 0
-        self.made: list[steps.Test] = []
+        self.interrupt: tuple[int, Exception] | None = None
+        self.made: list[Test] = []
         self.vetoed: set[Environment] = set()
         # Each search, with where it began and how many facts were before.
         self.legs: list[tuple[Leg, Now, int]] = []
@@ -158,24 +163,32 @@ class Driver:
         self.legs.append((leg, deepcopy(self.now), len(self.facts)))
         return leg
 
-    def drive(self, procedure, most=None, thrown=None):
-        """Carries it to its end, and returns what it returns; or through `most` steps. First `thrown` is thrown into it."""
-        go = partial(procedure.throw, thrown) if thrown else partial(procedure.send, None)
+    next_leg = leg
+
+    def drive(self, work, most=None):
+        """Carries it to its end, and returns what it returns; None if it was killed, or after `most` steps."""
+        go = partial(next, work)
         while most is None or self.steps < most:
             try:
-                step = go()
+                wanted = go()
             except StopIteration as end:
                 return end.value
-            self.steps += 1
-            answer = None
-            if isinstance(step, steps.Wants):
-                self._work(step.tests)
-            else:
-                self.facts.append(step)
-                self._note(step)
-                answer = self._answer(step)
-            go = partial(procedure.send, answer)
+            except Killed:
+                return None
+            go = partial(next, work)
+            try:
+                self._step()
+                self._work(wanted)
+            except (Changed, Killed) as error:
+                go = partial(work.throw, error)
         return None
+
+    def _step(self, *fact):
+        if self.interrupt is not None and self.steps >= self.interrupt[0]:
+            (_, error), self.interrupt = self.interrupt, None
+            raise error
+        self.steps += 1
+        self.facts += [fact] if fact else []
 
     def _work(self, wanted):
         """Makes tests until some have ended."""
@@ -192,50 +205,19 @@ class Driver:
             self.made.append(test)
             self.known.outcomes[test.environment, test.run] = self.outcome(test.environment, test.run)
 
-    def _note(self, step):
-        now = self.now
-        match step:
-            case steps.BaselineRan():
-                now.of_whole = set(range(step.chose, step.runs))
-            case steps.Judged(verdict="unknown"):
-                self.known.unknown.add((now.round, step.environment))
-            case steps.Similar() | steps.LeftOut():
-                self._reach(step.environment)
-            case steps.RoundEnded():
-                self.known.past[step.number] = step.winner
-            case steps.Certified():
-                first = step.certificate.first_run
-                tests = {test for claim in step.claims for test in claim.claim.rests_on}
-                # The whole world runs where what is left missed f, and then with every seed.
-                there = takewhile(lambda run: (self.world.whole, run) in tests, count())
-                now.of_whole |= {first + run for run in there}
-            case steps.SteppedBack():
-                now.lost.append(now.chain[step.place + 1])
-                now.chain = now.chain[: step.place + 1]
+    def baseline_ran(self, runs, chose):
+        self._step("baseline_ran", runs, chose)
+        self.now.of_whole = set(range(chose, runs))
+        shown = sum(self.shown(self.world.whole, run) is True for run in range(chose, runs))
+        return Baseline(shown, self.world.competes) if shown or chose else None
 
-    def _answer(self, step):
-        match step:
-            case steps.BaselineRan():
-                shown = sum(self.shown(self.world.whole, run) is True for run in range(step.chose, step.runs))
-                competed = self.world.competes
-                return steps.Baseline(shown, competed) if shown or step.chose else None
-            case steps.FailureFixed() | steps.LeftOut():
-                return self.leg()
-            case steps.SteppedBack():
-                return self.leg(step.again)
-            case steps.RoundBegan():
-                return self._begin(step.number, step.round)
-            case steps.Similar():
-                return True
-            case steps.CertificateDue():
-                self.now.certificates += 1
-                number = self.now.certificates
-                terms = Terms(2 / 3, 0.8, error_of(number), self.world.baseline_runs)
-                return Certificate(number, FIRST_FRESH + EACH_CERTIFICATE * number, terms)
-        return None
+    def failure_fixed(self, runs):
+        self._step("failure_fixed", runs)
+        return self.leg()
 
-    def _begin(self, number, round):
+    def round_began(self, number, round):
         """What is known of a round, if it is over."""
+        self._step("round_began", number, round)
         self.now.round, self._round = number, round
         self.now.n_partitions[self.now.chain[-1]] = round.n_partitions
         if number not in self.known.past:
@@ -244,6 +226,52 @@ class Driver:
         if winner is not None:
             self._reach(round.candidates[winner].models | self.legs[-1][0].pinned)
         return Past(winner)
+
+    def judged(self, index, environment, verdict, runs):
+        self._step("judged", index, environment, verdict, runs)
+        if verdict == "unknown":
+            self.known.unknown.add((self.now.round, environment))
+
+    def similar(self, number, index, environment):
+        self._step("similar", number, index, environment)
+        self._reach(environment)
+        return True
+
+    def round_ended(self, number, winner):
+        self._step("round_ended", number, winner)
+        self.known.past[number] = winner
+
+    def search_ended(self, environment):
+        self._step("search_ended", environment)
+
+    def certificate_due(self):
+        self._step("certificate_due")
+        self.now.certificates += 1
+        number = self.now.certificates
+        terms = Terms(2 / 3, 0.8, error_of(number), self.world.baseline_runs)
+        return Certificate(number, FIRST_FRESH + EACH_CERTIFICATE * number, terms)
+
+    def certified(self, made):
+        self._step("certified", made)
+        first = made.certificate.first_run
+        tests = {test for claim in made.claims for test in claim.claim.rests_on}
+        # The whole world runs where what is left missed f, and then with every seed.
+        there = takewhile(lambda run: (self.world.whole, run) in tests, count())
+        self.now.of_whole |= {first + run for run in there}
+
+    def stepped_back(self, place, again, tests):
+        self._step("stepped_back", place, again, tests)
+        self.now.lost.append(self.now.chain[place + 1])
+        self.now.chain = self.now.chain[: place + 1]
+        return self.leg(again)
+
+    def left_out(self, model, environment):
+        self._step("left_out", model, environment)
+        self._reach(environment)
+        return self.leg()
+
+    def checked(self, check):
+        self._step("checked", check)
 
     def _reach(self, environment):
         now = self.now

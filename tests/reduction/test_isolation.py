@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import settle
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction.isolation import MOST_RUNS, Asked, Checked, Passing, isolating, isolation, passes
+from ddenv.reduction.isolation import MOST_RUNS, Asked, Passing, isolating, isolation, passes
 from ddenv.reduction.round import Stacks
 from ddenv.reduction.verdict import standing
 from tests.reduction.driving import Driver, Known, World
@@ -144,7 +144,7 @@ def test_fresh_runs_show_that_what_goes_is_enough_and_each_of_it_needed(world, c
     gone = [stack for stack in stacks.by_first.values() if not stack.isdisjoint(removed)]
     assert removed == Environment.of(model for stack in gone for model in stack)
     assert not any(passing(removed - stack) for stack in gone)
-    passes, *backs = driver.facts[-1].claims
+    passes, *backs = driver.facts[-1][1].claims
     assert passes.claim.verdict == "passes"
     assert [claim.claim.verdict for claim in backs] == ["needed"] * len(gone)
 
@@ -155,7 +155,7 @@ def test_an_isolation_does_not_depend_on_what_ends_first_and_is_taken_up_again(w
     alone, removed, _ = isolated(world, passing, rates)
     together, same, _ = isolated(world, passing, rates, workers=workers, order=1)
     assert (together.facts, same) == (alone.facts, removed)
-    checks = [fact for fact in alone.facts if isinstance(fact, Checked)]
+    checks = [fact[1] for fact in alone.facts if fact[0] == "checked"]
     for known in range(len(checks) + 1):
         again, same, _ = isolated(world, passing, rates, checks[:known], known=Known(dict(alone.known.outcomes)))
         assert (again.made, same) == ([], removed)

@@ -9,24 +9,9 @@ from hypothesis import strategies as st
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import good_enough, settle
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction.procedure import (
-    Certified,
-    Changed,
-    FailureFixed,
-    Judged,
-    LeftOut,
-    Leg,
-    RoundBegan,
-    RoundEnded,
-    SearchEnded,
-    Similar,
-    SteppedBack,
-    judge,
-    last_good,
-    procedure,
-)
+from ddenv.reduction.procedure import Changed, Leg, judge, last_good, procedure
 from ddenv.reduction.verdict import Acceptance
-from tests.reduction.driving import Driver, Known, World
+from tests.reduction.driving import Driver, Killed, Known, World
 from tests.reduction.worlds import ALGORITHMS
 from tests.tiers import examples
 
@@ -79,16 +64,16 @@ def rests_on(world, facts):
     tests = set()
     for fact in facts:
         match fact:
-            case FailureFixed():
-                tests |= {(world.whole, run) for run in range(fact.runs)}
-            case Judged():
-                tests |= {(fact.environment, run) for run in range(fact.runs)}
-            case Certified():
-                first = fact.certificate.first_run
-                named = (test for claim in fact.claims for test in claim.claim.rests_on)
+            case ("failure_fixed", runs):
+                tests |= {(world.whole, run) for run in range(runs)}
+            case ("judged", _, environment, _, runs):
+                tests |= {(environment, run) for run in range(runs)}
+            case ("certified", made):
+                first = made.certificate.first_run
+                named = (test for claim in made.claims for test in claim.claim.rests_on)
                 tests |= {(environment, first + run) for environment, run in named}
-            case SteppedBack():
-                tests |= set(fact.tests)
+            case ("stepped_back", _, _, fresh):
+                tests |= set(fresh)
     # Without a failure no baseline is over.
     return tests or {(world.whole, run) for run in range(world.baseline_runs)}
 
@@ -97,7 +82,8 @@ def rests_on(world, facts):
 def test_driven_again_through_what_is_known_it_comes_to_the_same_end(world, part, workers):
     whole, end = driven(world, workers=workers)
     killed = Driver(world, workers, order=1)
-    killed.drive(begun(killed), most=int(part * whole.steps))
+    killed.interrupt = int(part * whole.steps), Killed()
+    killed.drive(begun(killed))
     resumed, again = driven(world, known=deepcopy(killed.known))
     assert again == end
     assert rounds(resumed.facts) == rounds(whole.facts)
@@ -112,7 +98,7 @@ def test_driven_again_through_what_is_known_it_comes_to_the_same_end(world, part
 
 def rounds(facts):
     """What a round that is known already does not tell again is left out."""
-    return [fact for fact in facts if not isinstance(fact, Judged | Similar | RoundEnded)]
+    return [fact for fact in facts if fact[0] not in ("judged", "similar", "round_ended")]
 
 
 @given(world=worlds)
@@ -130,18 +116,27 @@ def test_where_all_is_known_no_test_is_made(world):
 def test_where_a_decision_ends_a_search_it_goes_on_with_another(world, part, workers):
     whole, _ = driven(world, workers=workers)
     driver = Driver(world, workers)
-    running = begun(driver)
-    driver.drive(running, most=max(1, int(part * whole.steps)))
-    if not driver.legs:
+    driver.interrupt = max(1, int(part * whole.steps)), Changed()
+
+    def next_leg():
+        decided.append(driver.leg())
+        return decided[-1]
+
+    decided, driver.next_leg = [], next_leg
+    try:
+        end = driver.drive(begun(driver))
+    except Changed:
         # The baseline is no search.
+        assert not driver.legs
+    if not decided:
         return
-    leg = driver.leg()
-    other, told = deepcopy(driver), len(driver.facts)
-    end = driver.drive(running, thrown=Changed(leg))
+    leg, now, told = next(one for one in driver.legs if one[0] is decided[0])
+    other = Driver(world, workers)
+    other.now, other.legs = deepcopy(now), [(leg, now, 0)]
     assert other.drive(begun(other, leg)) == end
-    assert driver.facts[told:] == other.facts[told:]
-    began = next(fact for fact in driver.facts[told:] if isinstance(fact, RoundBegan | SearchEnded))
-    assert isinstance(began, SearchEnded) or began.number == leg.first_round
+    assert driver.facts[told:] == other.facts
+    began = next(fact for fact in other.facts if fact[0] in ("round_began", "search_ended"))
+    assert began[0] == "search_ended" or began[1] == leg.first_round
 
 
 drifting = st.builds(
@@ -163,25 +158,24 @@ def test_nothing_that_lost_the_rate_is_taken_again(world):
     chain, lost, of_whole = [world.whole], [], {}
     for fact in driver.facts:
         match fact:
-            case FailureFixed():
-                of_whole |= {run: world.outcome(world.whole, run) for run in range(fact.runs)}
-            case Judged() if any(fact.environment <= one for one in lost):
-                assert (fact.verdict, fact.runs) == ("missed", 0)
-            case Similar() | LeftOut():
-                assert not any(fact.environment <= one for one in lost)
-                chain.append(fact.environment)
-            case Certified():
-                certified, first = fact, fact.certificate.first_run
-                tests = {test for claim in fact.claims for test in claim.claim.rests_on}
+            case ("failure_fixed", times):
+                of_whole |= {run: world.outcome(world.whole, run) for run in range(times)}
+            case ("judged", _, environment, verdict, times) if any(environment <= one for one in lost):
+                assert (verdict, times) == ("missed", 0)
+            case ("similar" | "left_out", *_, environment):
+                assert not any(environment <= one for one in lost)
+                chain.append(environment)
+            case ("certified", certified):
+                first = certified.certificate.first_run
+                tests = {test for claim in certified.claims for test in claim.claim.rests_on}
                 there = takewhile(lambda run, tests=tests: (world.whole, run) in tests, count())
                 runs = {first + run for run in there}
                 of_whole |= {run: world.outcome(world.whole, run) for run in runs}
-            case SteppedBack():
-                assert fact.place == place(
-                    world, chain, certified, estimated_rate(sum(of_whole.values()), len(of_whole))
-                )
-                lost.append(chain[fact.place + 1])
-                del chain[fact.place + 1 :]
+            case ("stepped_back", back, *_):
+                rate = estimated_rate(sum(of_whole.values()), len(of_whole))
+                assert back == place(world, chain, certified, rate)
+                lost.append(chain[back + 1])
+                del chain[back + 1 :]
     assert end is None or end.claims[0].environment == chain[-1]
 
 
@@ -202,9 +196,10 @@ def test_the_worlds_of_these_tests_come_to_all_steps():
     for seed in range(8):
         world = World(tuple(range(5)), Environment.of([0]), Environment.of([2, 4]), "ddmin", seed, 0.8, iterations=0)
         driver, end = driven(world, workers=8)
-        seen |= {type(fact) for fact in driver.facts}
+        seen |= {fact[0] for fact in driver.facts}
         ends |= {claim.claim.verdict for claim in end.claims} if end else set()
-    assert seen >= {RoundBegan, Judged, Similar, RoundEnded, SearchEnded, Certified, SteppedBack, LeftOut}
+    told = {"round_began", "judged", "similar", "round_ended", "search_ended", "certified", "stepped_back", "left_out"}
+    assert seen >= told
     assert ends >= {"kept", "needed"}
 
 
@@ -222,13 +217,13 @@ def certified_alone(world, vetoed=()):
     free = {model: Environment.of([model]) for model in world.whole}
     leg = Leg(1, world.whole, (world.whole,), Environment(), free, Acceptance(1))
     driver.drive(begun(driver, leg), most=2000)
-    return [fact for fact in driver.facts if isinstance(fact, LeftOut)]
+    return [fact[1] for fact in driver.facts if fact[0] == "left_out"]
 
 
 def test_what_is_not_needed_goes_and_a_refused_model_does_not_hide_another():
     world = World(tuple(range(3)), Environment.of([2]), Environment(), "ddmin", 1, rate=1.0)
-    assert certified_alone(world)[0].model == 0
-    assert certified_alone(world, vetoed=[0])[0].model == 1
+    assert certified_alone(world)[0] == 0
+    assert certified_alone(world, vetoed=[0])[0] == 1
     assert certified_alone(world, vetoed=[0, 1]) == []
 
 
@@ -239,10 +234,10 @@ def test_a_candidate_that_the_user_wants_after_all_is_looked_at_again():
     driver.vetoed = {candidates[0]}
     judging = judge(driver, candidates, Acceptance(2), "hand")
     driver.drive(judging, most=3)
-    assert driver.facts == [Judged(1, candidates[1], "dissimilar", 2)]
+    assert driver.facts == [("judged", 1, candidates[1], "dissimilar", 2)]
     driver.vetoed, driver.refusals = set(), 1
     assert driver.drive(judging) == 0
-    assert driver.facts[-1] == Judged(0, candidates[0], "similar", 1)
+    assert driver.facts[-1] == ("judged", 0, candidates[0], "similar", 1)
     # One that is refused after it was found similar is passed over.
     driver.vetoed = set(candidates[:1])
     assert driver.drive(judge(driver, candidates, Acceptance(2), "hand")) == 3

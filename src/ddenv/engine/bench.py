@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
+from typing import NoReturn
 
 import numpy as np
 
-from ddenv.engine.control import Control, Steered, Stopped
+from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, motions_of, result_data, rows_of
 from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
@@ -18,7 +19,7 @@ from ddenv.engine.slicing import audit_is_due, compare
 from ddenv.engine.worker import Broken, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.reduction.procedure import Test
+from ddenv.reduction.procedure import Changed, Test
 from ddenv.reduction.verdict import Acceptance, decided_by, standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
@@ -64,7 +65,7 @@ class Bench:
     def work(self, tests: Sequence[Test]) -> None:
         """Starts as many of the wanted tests as workers are free, and looks around once.
 
-        Raises Stopped, Steered, and UserError if nothing can be simulated or all tests break.
+        Raises Stopped, Changed, and UserError if nothing can be simulated or all tests break.
         """
         if self._start(tests):
             # Other tests may be wanted now.
@@ -229,13 +230,13 @@ class Bench:
     # Looking around.
 
     def tick(self) -> None:
-        """Obeys commands, records finished tests, shows the running robots. Raises as `work`: Steered where the user has changed
+        """Obeys commands, records finished tests, shows the running robots. Raises as `work`: Changed where the user has changed
         something, since the old search must not use a test that ends now.
         """
         self._look(WAIT)
 
-    def wait_for_search(self) -> None:
-        """Raises Steered once a new search may begin, and as `work`."""
+    def wait_for_search(self) -> NoReturn:
+        """Raises Changed once a new search may begin, and as `work`."""
         while True:
             self.tick()
 
@@ -244,7 +245,7 @@ class Bench:
         self._look_around(wait)
         while self._control.holds:
             if self._control.may_search:
-                raise Steered
+                raise Changed
             self._look_around(WAIT)
 
     def _look_around(self, wait: float) -> None:

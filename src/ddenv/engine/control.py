@@ -33,10 +33,6 @@ class Stopped(Exception):
     """The engine was asked to stop."""
 
 
-class Steered(Exception):
-    """The user changed something, so the search has to start again."""
-
-
 # What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log of them.
 NEEDED = 32_000_000
 # The time between two looks, s.

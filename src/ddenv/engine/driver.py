@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 from ddenv.engine.bench import Bench
-from ddenv.engine.control import Control, Steered, Stopped
+from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
 from ddenv.engine.limits import limit_after, note, note_rare
@@ -25,7 +25,7 @@ from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.round import Round, Search, Stacks
+from ddenv.reduction.round import Partition, Round, Search, Stacks
 from ddenv.reduction.verdict import Acceptance
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
@@ -129,24 +129,23 @@ class Driver:
         try:
             self._carry_out(steps.certify(self, leg, chain))
         except steps.Changed:
+            self.next_leg()
             raise Stopped(CHANGED) from None
         self._conclude()
 
-    def _carry_out(self, procedure: Generator[steps.Step, Any, Any]) -> Any:
-        """Drives the procedure to its end; returns what it returns. Whatever the user changes enters here."""
-        answer: object = None
+    def _carry_out(self, work: steps.Work[Any]) -> Any:
+        """To the end; returns what the procedure returns. Whatever the user changes enters here, or in what it asks."""
         changed: steps.Changed | None = None
         while True:
             try:
-                step = procedure.send(answer) if changed is None else procedure.throw(changed)
+                tests = next(work) if changed is None else work.throw(changed)
             except StopIteration as end:
                 return end.value
-            answer = changed = None
+            changed = None
             try:
-                answer = _ANSWERS[type(step)](self, step)
-            except Steered:
-                slice_environment(self._journal)
-                changed = steps.Changed(self._next_leg())
+                self._bench.work(tests)
+            except steps.Changed as change:
+                changed = change
 
     def _first_leg(self) -> steps.Leg:
         """The leg of an engine that starts after the baseline, or at its end."""
@@ -155,8 +154,11 @@ class Driver:
         compare(self._journal, self._journal.state.finished_tests)
         # The user may have gone back before this engine started; then it pauses there.
         if self._journal.state.search_due:
-            with suppress(Steered):
+            with suppress(steps.Changed):
                 self._bench.wait_for_search()
+        return self.next_leg()
+
+    def next_leg(self) -> steps.Leg:
         slice_environment(self._journal)
         return self._next_leg()
 
@@ -267,21 +269,18 @@ class Driver:
 
     # What the procedure finds.
 
-    def _wants(self, step: steps.Wants) -> None:
-        self._bench.work(step.tests)
-
-    def _baseline_ran(self, step: steps.BaselineRan) -> steps.Baseline | None:
+    def baseline_ran(self, runs: int, chose: int) -> steps.Baseline | None:
         journal, whole = self._journal, self._journal.state.environments[0]
-        tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(step.runs))]
+        tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         spec, asked = self._scenario.failure, self._reduction
-        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, step.chose)
+        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose)
         if isinstance(found, str):
             return None
         f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)
         return steps.Baseline(found.failures, any(COMPETES * one.runs >= f.runs for one in others))
 
-    def _failure_fixed(self, step: steps.FailureFixed) -> steps.Leg:
+    def failure_fixed(self, runs: int) -> steps.Leg:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
@@ -289,21 +288,21 @@ class Driver:
         self._control.round_finished()
         return self._first_leg()
 
-    def _round_began(self, step: steps.RoundBegan) -> steps.Past | None:
+    def round_began(self, number: int, round: Round) -> steps.Past | None:
         state, leg = self._journal.state, self._journal.state.leg
-        parts = tuple(map(Environment.of, step.round.partitions))
+        parts = tuple(map(Environment.of, round.partitions))
         assert leg is not None
-        if leg.first_round + len(leg.past) > step.number:
-            past = leg.past[step.number - leg.first_round]
+        if leg.first_round + len(leg.past) > number:
+            past = leg.past[number - leg.first_round]
             if past.digest != digest(parts):
-                raise UserError(OTHER_WAY.format(step.number))
+                raise UserError(OTHER_WAY.format(number))
             self._learn(past.tests, past.evidence_test)
-            self._unknown.update(step.round.candidates[index].models | self._leg.pinned for index in past.unknown)
+            self._unknown.update(round.candidates[index].models | self._leg.pinned for index in past.unknown)
             return steps.Past(past.winner)
-        if state.round is None or state.round.number < step.number:
-            self._announce(step.number, step.round)
+        if state.round is None or state.round.number < number:
+            self._announce(number, round)
         elif state.round.split.parts != parts:
-            raise UserError(OTHER_WAY.format(step.number))
+            raise UserError(OTHER_WAY.format(number))
         # Whoever waits before the first test of a round sees its candidates.
         self._audit_slice()
         return None
@@ -334,46 +333,46 @@ class Driver:
             if verdict := refused.get(one.models | leg.pinned):
                 journal.record(events.Vetoed(number, index, verdict, again=True))
 
-    def _judged(self, step: steps.Judged) -> None:
+    def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
         """Records a verdict, unless an earlier engine has."""
         journal, round = self._journal, self._journal.current
-        if step.verdict == "unknown":
-            self._unknown.add(step.environment)
-        if round.candidates[step.index].verdict:
+        if verdict == "unknown":
+            self._unknown.add(environment)
+        if round.candidates[index].verdict:
             return
-        tests = journal.tests(step.environment, map(self._leg.rule.run, range(step.runs)))
-        journal.record(events.CandidateJudged(round.number, step.index, step.verdict, tests))
+        tests = journal.tests(environment, map(self._leg.rule.run, range(runs)))
+        journal.record(events.CandidateJudged(round.number, index, verdict, tests))
 
-    def _similar(self, step: steps.Similar) -> bool:
+    def similar(self, number: int, index: int, environment: Environment) -> bool:
         """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""
-        journal, index = self._journal, step.index
+        journal = self._journal
         if journal.current.winner == index:
             return True
         if journal.state.accept_mode == "ask" and journal.current.accepted != index:
-            journal.record(events.Waiting(step.number, index))
+            journal.record(events.Waiting(number, index))
             while journal.state.accept_mode == "ask" and journal.state.waiting_candidate == index:
                 self._bench.tick()
             if journal.state.waiting_candidate == index:
-                journal.record(events.Decided(step.number, index, "accept"))
+                journal.record(events.Decided(number, index, "accept"))
             if journal.current.accepted != index:
                 return False
         test = journal.evidence_of(journal.current.candidates[index].tests)
-        journal.record(events.Reduced(step.number, index, journal.number(step.environment), test))
+        journal.record(events.Reduced(number, index, journal.number(environment), test))
         return True
 
-    def _round_ended(self, step: steps.RoundEnded) -> None:
+    def round_ended(self, number: int, winner: int | None) -> None:
         journal = self._journal
         if not journal.current.done:
-            journal.record(events.RoundFinished(step.number))
+            journal.record(events.RoundFinished(number))
             self._control.round_finished()
         assert journal.state.leg is not None
         past = journal.state.leg.past[-1]
         self._learn(past.tests, past.evidence_test)
-        if step.winner is not None and slice_environment(journal):
+        if winner is not None and slice_environment(journal):
             # The search goes on in the slice.
-            raise Steered
+            raise steps.Changed
 
-    def _search_ended(self, step: steps.SearchEnded) -> None:
+    def search_ended(self, environment: Environment) -> None:
         self._audit_slice()
         # Their results count, too.
         self._bench.finish_trials()
@@ -382,7 +381,7 @@ class Driver:
         while tests := slice_audit(self._journal):
             self._bench.work(tests)
 
-    def _certificate_due(self, step: steps.CertificateDue) -> steps.Certificate:
+    def certificate_due(self) -> steps.Certificate:
         """The certificate that this search has already, or a new one; a finished one only if no other is asked for."""
         journal, last = self._journal, self._journal.state.certificate
         if last is None or (self._only_certify is not None and last.claims):
@@ -402,12 +401,12 @@ class Driver:
         terms = terms_of(journal.state, last)
         return steps.Certificate(last.number, last.first_run, terms, self._leg.rule.exact if last.seeds else ())
 
-    def _certified(self, step: steps.Certified) -> None:
+    def certified(self, made: steps.Certified) -> None:
         if not self._certificate.claims:
-            first, journal = step.certificate.first_run, self._journal
-            claims = tuple(self._claim_made(claim, first) for claim in step.claims)
-            rested_on = journal.full_tests((test for one in step.claims for test in one.claim.rests_on), first)
-            chosen = (test for one in step.claims for test in journal.tests(one.environment, step.certificate.exact))
+            first, journal = made.certificate.first_run, self._journal
+            claims = tuple(self._claim_made(claim, first) for claim in made.claims)
+            rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
+            chosen = (test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact))
             journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
 
     @property
@@ -429,18 +428,20 @@ class Driver:
             named.model, number, claim.verdict, shown, sound, *interval, dict(outcomes), claim.bound
         )
 
-    def _stepped_back(self, step: steps.SteppedBack) -> None:
+    def stepped_back(
+        self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]
+    ) -> NoReturn:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
-        node, lost = nodes[step.place].number, nodes[step.place + 1].number
-        journal.record(events.RateLost(node, lost, step.again, journal.full_tests(step.tests)))
+        node, lost = nodes[place].number, nodes[place + 1].number
+        journal.record(events.RateLost(node, lost, again, journal.full_tests(tests)))
         self._bench.wait_for_search()
 
-    def _left_out(self, step: steps.LeftOut) -> None:
+    def left_out(self, model: int, environment: Environment) -> NoReturn:
         journal, first = self._journal, self._certificate.first_run
         runs = range(first, journal.fresh_run)
-        evidence = journal.evidence_of(journal.tests(step.environment, runs, full=True))
-        journal.record(events.LeftOut(step.model, journal.number(step.environment), evidence))
+        evidence = journal.evidence_of(journal.tests(environment, runs, full=True))
+        journal.record(events.LeftOut(model, journal.number(environment), evidence))
         self._bench.wait_for_search()
 
     # The end.
@@ -467,20 +468,3 @@ class Driver:
         # Tests of later candidates are no longer needed.
         self._journal.lose_running()
         self._journal.record(events.Finished(minimal, reason))
-
-
-# Each is recorded, and answered as the step says.
-_ANSWERS: dict[type, Callable[[Driver, Any], object]] = {
-    steps.Wants: Driver._wants,
-    steps.BaselineRan: Driver._baseline_ran,
-    steps.FailureFixed: Driver._failure_fixed,
-    steps.RoundBegan: Driver._round_began,
-    steps.Judged: Driver._judged,
-    steps.Similar: Driver._similar,
-    steps.RoundEnded: Driver._round_ended,
-    steps.SearchEnded: Driver._search_ended,
-    steps.CertificateDue: Driver._certificate_due,
-    steps.Certified: Driver._certified,
-    steps.SteppedBack: Driver._stepped_back,
-    steps.LeftOut: Driver._left_out,
-}

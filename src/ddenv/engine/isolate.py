@@ -13,7 +13,7 @@ from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, anytime_interval
 from ddenv.reduction.evidence import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Each, Passing, isolation
-from ddenv.reduction.procedure import Judged, NamedClaim, Wants
+from ddenv.reduction.procedure import NamedClaim
 from ddenv.reduction.round import Stacks
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import exact_runs
@@ -109,20 +109,15 @@ class _Isolator:
 
     def carry_out(self) -> Environment | None:
         """To the end; returns what has to go so that the robot passes. Raises as `Bench.work`, and Stopped."""
-        procedure = isolation(self, self._asked, self._known_checks())
+        work = isolation(self, self._asked, self._known_checks())
         while True:
             _open(self._journal)
             try:
-                step = next(procedure)
+                tests = next(work)
             except StopIteration as end:
                 removed: Environment | None = end.value
                 return removed
-            if isinstance(step, Wants):
-                self._bench.work(step.tests)
-            elif isinstance(step, Judged):
-                self._judged(step)
-            elif isinstance(step, Checked):
-                self._check(step)
+            self._bench.work(tests)
 
     # What the procedure asks.
 
@@ -144,15 +139,16 @@ class _Isolator:
 
     # What it finds.
 
-    def _judged(self, step: Judged) -> None:
-        journal, number = self._journal, self._journal.number(step.environment)
-        verdict = VERDICTS[step.verdict]
+    def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
+        _open(self._journal)
+        journal, number = self._journal, self._journal.number(environment)
+        verdict = VERDICTS[verdict]
         known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
         if next(known, "") != verdict:
-            tests = journal.tests(step.environment, map(self._asked.rule.run, range(step.runs)), full=True)
+            tests = journal.tests(environment, map(self._asked.rule.run, range(runs)), full=True)
             journal.record(events.RemovalJudged(number, verdict, tests))
 
-    def _check(self, check: Checked) -> None:
+    def checked(self, check: Checked) -> None:
         journal, now = self._journal, _open(self._journal)
         first = now.asked.run + len(now.checks) * now.asked.block
         rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)

@@ -38,7 +38,13 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None.
     """
     if isinstance(result, Broken):
-        unknown = {"distance": None, "end_pose": None, "first_sensed": {}, "first_touched": {}, "cut": False}
+        unknown: dict[str, Any] = {
+            "distance": None,
+            "end_pose": None,
+            "first_sensed": {},
+            "first_touched": {},
+            "cut": False,
+        }
         none = {"simulated_seconds": 0.0, "wall_seconds": 0.0}
         return {"outcome": result.outcome, "failure": result.failure, **unknown, **none}
     outcome, distance = result.outcome, None

@@ -203,8 +203,8 @@ class Pool:
             for slot in self._slots:
                 if slot.worker.memory() > self._memory:
                     slot.worker.kill()
-                    limit = f"{self._memory / GIGABYTE:.3g} GB of memory"
-                    self._lose(slot, f"used more than {limit} (simulation.memory_limit, or fewer --jobs, allows more)")
+                    most = f"{self._memory / GIGABYTE:.3g} GB of memory"
+                    self._lose(slot, f"used more than {most} (simulation.memory_limit, or fewer --jobs, allows more)")
 
     def _listen(self, slot: _Slot) -> None:
         try:

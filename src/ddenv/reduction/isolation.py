@@ -9,15 +9,15 @@ has seen.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Protocol
 
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Claim, Procedure, Wanted, error_of, falls, often
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import ddmin
-from ddenv.reduction.procedure import NamedClaim, Runs, Step, judge, settled
+from ddenv.reduction.procedure import NamedClaim, Runs, Work, judge, settled
 from ddenv.reduction.round import Candidate, Partition, Round, Search, Stacks
 from ddenv.reduction.verdict import Verdict
 
@@ -76,7 +76,7 @@ class Each:
 
 
 @dataclass(frozen=True)
-class Checked(Step):
+class Checked:
     """Fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
 
     removed: Environment
@@ -104,7 +104,12 @@ class Asked:
     block: int
 
 
-def isolation(driver: Runs, asked: Asked, checks: Sequence[Checked] = ()) -> Generator[Step, Any, Environment | None]:
+class Driver(Runs, Protocol):
+    def checked(self, check: Checked) -> None:
+        """Fresh runs have shown this."""
+
+
+def isolation(driver: Driver, asked: Asked, checks: Sequence[Checked] = ()) -> Work[Environment | None]:
     """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
     checks = list(checks)
     while len(checks) < MOST_CHECKS:
@@ -116,7 +121,7 @@ def isolation(driver: Runs, asked: Asked, checks: Sequence[Checked] = ()) -> Gen
         if not removed:
             return None
         checks.append((yield from _check(driver, asked, removed, len(checks))))
-        yield checks[-1]
+        driver.checked(checks[-1])
     return checks[-1].removed if checks[-1].passes else None
 
 
@@ -127,9 +132,7 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
     return NOTHING if asked.whole - smaller in refuted else smaller
 
 
-def _search(
-    driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
-) -> Generator[Step, Any, Environment]:
+def _search(driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]) -> Work[Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     if smaller:
         searching = ddmin(tuple(model for model in asked.suspects if model in smaller))
@@ -149,7 +152,7 @@ def _search(
         winner = None if place is None else candidates[place]
 
 
-def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step, Any, Checked]:
+def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Work[Checked]:
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing, error = asked.whole - removed, error_of(number + 1) / 2.0
     backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}

@@ -1,8 +1,8 @@
 """What ddenv does, from the first run of the whole world to a certified end: one pure coroutine.
 
-It runs nothing itself. Where it needs tests it yields `Wants`, and goes on once some of them have ended. Every other step that
-it yields says what was found; `Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce`
-with a function. A resumed run drives it again through what is known.
+It runs nothing itself. It yields the tests that it needs, and goes on once some of them have ended; all else it asks and tells its
+`Driver`. The engine drives it with workers and a run file, `ddenv.reduce` with a function. A resumed run drives it again through
+what is known.
 
 1. `baseline`: the whole world is run; its failure is f.
 2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice, zip_longest
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
@@ -38,6 +38,8 @@ from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, 
 # rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
 MOST_STEPS_BACK = 5
 
+Result = TypeVar("Result", covariant=True)
+
 
 @dataclass(frozen=True)
 class Test:
@@ -54,25 +56,8 @@ class Test:
     without: int | None = None
 
 
-class Step:
-    """A step of the procedure. The driver answers None unless the step says something else."""
-
-
-@dataclass(frozen=True)
-class Wants(Step):
-    """The tests that are needed next, in the order in which a single worker would make them."""
-
-    tests: tuple[Test, ...]
-
-
-@dataclass(frozen=True)
-class BaselineRan(Step):
-    """The whole world was run so often; the first `chose` of these runs only choose f. The answer is what the `Baseline` shows, or
-    None if there is no failure to reduce.
-    """
-
-    runs: int
-    chose: int = 0
+# Yields the tests that are needed next, in the order in which a single worker would make them, and goes on once some have ended.
+Work = Generator[tuple[Test, ...], None, Result]
 
 
 @dataclass(frozen=True)
@@ -84,95 +69,10 @@ class Baseline:
 
 
 @dataclass(frozen=True)
-class FailureFixed(Step):
-    """The baseline of so many runs is over. The answer is the leg with which the search begins."""
-
-    runs: int
-
-
-@dataclass(frozen=True)
-class RoundBegan(Step):
-    """A round of the search. The answer is None, or what is known of it if it was judged before this driver began."""
-
-    number: int
-    round: Round
-
-
-@dataclass(frozen=True)
 class Past:
-    """The answer to `RoundBegan` where the round is known: its winner's place among the candidates, or None."""
+    """A round that was judged before this driver began: its winner's place among the candidates, or None."""
 
     winner: int | None
-
-
-@dataclass(frozen=True)
-class Judged(Step):
-    """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown". Its first
-    `runs` runs decided; with none, it is part of what lost the rate.
-    """
-
-    index: int
-    environment: Environment
-    verdict: str
-    runs: int
-
-
-@dataclass(frozen=True)
-class Similar(Step):
-    """Candidate number `index` of a round can become the environment. The answer is whether it does."""
-
-    number: int
-    index: int
-    environment: Environment
-
-
-@dataclass(frozen=True)
-class RoundEnded(Step):
-    """A round is over; `winner` is the place of the candidate that became the environment, or None."""
-
-    number: int
-    winner: int | None
-
-
-@dataclass(frozen=True)
-class SearchEnded(Step):
-    """Nothing more can be left out of an environment by the search."""
-
-    environment: Environment
-
-
-@dataclass(frozen=True)
-class CertificateDue(Step):
-    """Fresh runs are due. The answer is the `Certificate` that they are made for."""
-
-
-@dataclass(frozen=True)
-class Certified(Step):
-    """What fresh runs show of what is left, and then of it without each model, up to a claim that ends the certificate."""
-
-    certificate: Certificate
-    claims: tuple[NamedClaim, ...]
-
-
-@dataclass(frozen=True)
-class SteppedBack(Step):
-    """What is left lost the rate. The search goes back to place number `place` of the chain.
-
-    It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on
-    fresh `tests`, as (environment, run). The answer is the next leg.
-    """
-
-    place: int
-    again: tuple[Partition, ...]
-    tests: tuple[tuple[Environment, int], ...]
-
-
-@dataclass(frozen=True)
-class LeftOut(Step):
-    """Without `model` f shows about as often, so the search goes on in `environment`. The answer is the next leg."""
-
-    model: int
-    environment: Environment
 
 
 @dataclass(frozen=True)
@@ -223,6 +123,14 @@ class NamedClaim:
         return tuple(run for environment, run in self.claim.rests_on if environment == self.environment)
 
 
+@dataclass(frozen=True)
+class Certified:
+    """What fresh runs show of what is left, and then of it without each model, up to a claim that ends the certificate."""
+
+    certificate: Certificate
+    claims: tuple[NamedClaim, ...]
+
+
 class Runs(Protocol):
     """The runs of one predicate, as far as they are known: what judges candidates and settles claims asks for."""
 
@@ -243,9 +151,16 @@ class Runs(Protocol):
     def workers(self) -> int:
         """How many tests can be made at the same time."""
 
+    def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
+        """Candidate number `index` is "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown". Its first `runs`
+        runs decided; with none, it is part of what lost the rate.
+        """
+
 
 class Driver(Runs, Protocol):
-    """What the procedure asks. All answers follow from tests that have ended, and from decisions of the user."""
+    """What the procedure asks and tells. All answers follow from tests that have ended, and from decisions of the user. Where one
+    of these, or a slice, ends the search, any method may raise `Changed`; it goes on with `next_leg`.
+    """
 
     def rate(self) -> float:
         """The rate of f in the world in which it was seen, from all of its runs that decisions rest on."""
@@ -253,38 +168,69 @@ class Driver(Runs, Protocol):
     def goes_on(self) -> bool:
         """Whether the search goes on by itself where a claim of its certificate fails."""
 
+    def baseline_ran(self, runs: int, chose: int) -> Baseline | None:
+        """What these runs of the whole world show, of which the first `chose` only choose f; None: no failure to reduce."""
+
+    def failure_fixed(self, runs: int) -> Leg:
+        """The baseline of so many runs is over; returns the leg with which the search begins."""
+
+    def next_leg(self) -> Leg:
+        """The next search, after `Changed`."""
+
     def algorithm(self, leg: Leg) -> Search:
         """The algorithm, before its first round."""
 
+    def round_began(self, number: int, round: Round) -> Past | None:
+        """Returns what is known of the round, if it is over already."""
+
+    def similar(self, number: int, index: int, environment: Environment) -> bool:
+        """Candidate number `index` of a round can become the environment; returns whether it does."""
+
+    def round_ended(self, number: int, winner: int | None) -> None:
+        """`winner` is the place of the candidate that became the environment."""
+
+    def search_ended(self, environment: Environment) -> None:
+        """Nothing more can be left out of an environment by the search."""
+
+    def certificate_due(self) -> Certificate:
+        """The certificate for which fresh runs are made now."""
+
+    def certified(self, made: Certified) -> None:
+        """A certificate is finished."""
+
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]) -> Leg:
+        """What is left lost the rate, by these fresh tests, as (environment, run): the search goes back to place number `place` of
+        the chain, and leaves out the groups `again` first. The environment at `place` + 1 and all its parts are not taken again.
+        """
+
+    def left_out(self, model: int, environment: Environment) -> Leg:
+        """Without `model` f shows about as often, so the search goes on in `environment`."""
+
 
 class Changed(Exception):
-    """Thrown into the procedure by its driver where a decision of the user, or a slice, ends a search: it goes on with `leg`."""
-
-    def __init__(self, leg: Leg) -> None:
-        super().__init__()
-        self.leg = leg
+    """A decision of the user, or a slice, ends a search."""
 
 
 def procedure(
     driver: Driver, whole: Environment, baseline_runs: int, keeps_rate: bool, leg: Leg | None = None
-) -> Generator[Step, Any, Certified | None]:
+) -> Work[Certified | None]:
     """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no failure to reduce."""
     if leg is None and (leg := (yield from baseline(driver, whole, baseline_runs, keeps_rate))) is None:
         return None
     while True:
         try:
             chain = yield from search_on(driver, leg)
-            yield SearchEnded(chain[-1])
+            driver.search_ended(chain[-1])
             certified = yield from certify(driver, leg, chain)
             after = yield from onward(driver, leg, chain, certified)
-        except Changed as change:
-            after = change.leg
+        except Changed:
+            after = driver.next_leg()
         if after is None:
             return certified
         leg = after
 
 
-def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Generator[Step, Any, Leg | None]:
+def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Work[Leg | None]:
     """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing.
 
     Where several failures competed, the most frequent one was lucky in the runs that chose it: as many others give its rate.
@@ -292,8 +238,8 @@ def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) ->
     chose, usual = 0, runs
     while True:
         while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
-            yield Wants(tuple(Test(whole, run, "baseline") for run in missing))
-        found: Baseline | None = yield BaselineRan(runs, chose)
+            yield tuple(Test(whole, run, "baseline") for run in missing)
+        found = driver.baseline_ran(runs, chose)
         if found is None:
             return None
         if keeps_rate and found.failures < FEWEST_SHOWN and runs < LONGEST_BASELINE:
@@ -301,11 +247,10 @@ def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) ->
         elif keeps_rate and found.competed and not chose:
             chose, runs = runs, runs + usual
         else:
-            leg: Leg = yield FailureFixed(runs)
-            return leg
+            return driver.failure_fixed(runs)
 
 
-def search_on(driver: Driver, leg: Leg) -> Generator[Step, Any, tuple[Environment, ...]]:
+def search_on(driver: Driver, leg: Leg) -> Work[tuple[Environment, ...]]:
     """Takes what the algorithm finds, to its end; returns the chain of environments."""
     chain, algorithm, winner, number = leg.chain, driver.algorithm(leg), None, leg.first_round
     while True:
@@ -319,27 +264,24 @@ def search_on(driver: Driver, leg: Leg) -> Generator[Step, Any, tuple[Environmen
         number += 1
 
 
-def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Generator[Step, Any, Candidate | None]:
+def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Work[Candidate | None]:
     """Tests the candidates of a round until one is similar, and accepted; returns it, or None."""
-    past: Past | None = yield RoundBegan(number, round)
+    past = driver.round_began(number, round)
     if past is not None:
         return None if past.winner is None else round.candidates[past.winner]
     environments = [candidate.models | leg.pinned for candidate in round.candidates]
     rule = leg.rule.within(round.runs)
     while True:
         winner = yield from judge(driver, environments, rule, "round", leg.rule)
-        if winner is None:
+        if winner is None or driver.similar(number, winner, environments[winner]):
             break
-        accepted: bool = yield Similar(number, winner, environments[winner])
-        if accepted:
-            break
-    yield RoundEnded(number, winner)
+    driver.round_ended(number, winner)
     return None if winner is None else round.candidates[winner]
 
 
 def judge(
     driver: Runs, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
-) -> Generator[Step, Any, int | None]:
+) -> Work[int | None]:
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
     Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
@@ -359,26 +301,26 @@ def judge(
             if driver.refused(environment):
                 # Part of what lost the rate, unless the user refused it.
                 if not driver.refused_by_user(environment):
-                    yield Judged(judged, environment, "missed", 0)
+                    driver.judged(judged, environment, "missed", 0)
             else:
                 # By these runs alone: more of them may have ended.
                 runs, hits = decided_by(driver.shown, environment, rule)
                 missed = verdict == "dissimilar" and usual is not None and not usual.verdict(hits, runs - hits)
-                yield Judged(judged, environment, "missed" if missed else verdict, runs)
+                driver.judged(judged, environment, "missed" if missed else verdict, runs)
             if verdict == "similar":
                 return judged
             judged += 1
         if not wanted:
             return None
-        yield Wants(tuple(Test(environments[index], run, why, index) for index, run in wanted))
+        yield tuple(Test(environments[index], run, why, index) for index, run in wanted)
 
 
-def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator[Step, Any, Certified]:
+def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
     """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
     left, whole = chain[-1], leg.whole
     while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
-        yield Wants(tuple(Test(left, run, "round") for run in missing))
-    certificate: Certificate = yield CertificateDue()
+        yield tuple(Test(left, run, "round") for run in missing)
+    certificate = driver.certificate_due()
     terms = certificate.terms
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
 
@@ -404,7 +346,7 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
             claim = Claim("not needed" if True in shown else open_verdict)
             made = (*made, NamedClaim(model, rest, claim, certificate.exact))
     certified = Certified(certificate, made)
-    yield certified
+    driver.certified(certified)
     return certified
 
 
@@ -414,7 +356,7 @@ def settled(
     ends: Callable[[NamedClaim], bool],
     first_run: int,
     why: str,
-) -> Generator[Step, Any, tuple[NamedClaim, ...]]:
+) -> Work[tuple[NamedClaim, ...]]:
     """Makes fresh runs until each of `claims` has a verdict, up to one that `ends` them; returns them."""
 
     def fresh(environment: Environment, run: int) -> Shown:
@@ -443,12 +385,10 @@ def settled(
         )
         if not wants:
             return tuple(named)
-        yield Wants(tuple(wants))
+        yield tuple(wants)
 
 
-def onward(
-    driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified
-) -> Generator[Step, Any, Leg | None]:
+def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified) -> Work[Leg | None]:
     """Where the search goes on after a certificate; None if it has come to its end."""
     if not driver.goes_on():
         return None
@@ -459,12 +399,11 @@ def onward(
         return None
     for claim in removals:
         if claim.model is not None and claim.claim.verdict == "not needed" and not driver.refused(claim.environment):
-            after: Leg = yield LeftOut(claim.model, claim.environment)
-            return after
+            return driver.left_out(claim.model, claim.environment)
     return None
 
 
-def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
+def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Work[Leg]:
     """Back to the last environment that is not shown to have lost the rate of all runs of the whole world.
 
     Only runs by the seeds of this certificate count: by others it was taken, or went back to, which favour it.
@@ -485,11 +424,10 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
         return claims[environment]
 
     while not isinstance(place := last_good(chain, judged), int):
-        yield Wants(tuple(Test(environment, first + run, "certify") for environment, run in place))
+        yield tuple(Test(environment, first + run, "certify") for environment, run in place)
     again = tuple(groups_again(chain[place], chain[place + 1], chain[-1]))
     tests = tuple((environment, first + run) for claim in claims.values() for environment, run in claim.rests_on)
-    leg: Leg = yield SteppedBack(place, again, tests)
-    return leg
+    return driver.stepped_back(place, again, tests)
 
 
 def groups_again(good: Environment, bad: Environment, end: Environment) -> list[Partition]:

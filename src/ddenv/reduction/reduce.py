@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count, takewhile
@@ -191,14 +191,14 @@ def reduce(
     kept = keep_rate if keeps_rate else 0.0
     caller = _Caller(names, test, begin, kept, certify_rate, iterations, baseline_runs, on_round)
     # A missing argument is reported before the first test.
-    next(begin(caller.leg()), None)
+    next(begin(caller.next_leg()), None)
     if keeps_rate:
         caller.carry_out(steps.procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
         minimal = all(claim.verdict in ("kept", "needed") for claim in caller.claims)
     else:
         if check:
             caller.carry_out(steps.baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
-        leg = caller.leg()
+        leg = caller.next_leg()
         caller.carry_out(steps.search_on(caller, leg))
         rests = [caller.left - Environment.of((element,)) for element in caller.left]
         minimal = all(standing([rest], caller.shown, leg.rule)[0] == ["dissimilar"] for rest in rests)
@@ -237,6 +237,7 @@ class _Caller:
         # n of the last round in each environment, or of the round that reached it.
         self._n_partitions: dict[Environment, int | None] = {}
         self._lost: list[Environment] = []
+        self._began: list[NamedRound] = []
         self._certificates = 0
 
     # What the procedure asks.
@@ -274,97 +275,94 @@ class _Caller:
 
     # What it finds.
 
-    def carry_out(self, work: Generator[steps.Step, Any, object]) -> None:
+    def carry_out(self, work: steps.Work[object]) -> None:
         """To the end. Raises UserError if the failure never shows in the baseline."""
-        answer: object = None
-        while True:
-            try:
-                step = work.send(answer)
-            except StopIteration:
-                return
-            answer = self._answer(step)
+        for asked, *_ in work:
+            self._tell_rounds()
+            shown = bool(self.test(frozenset(asked.environment.names(self.names))))
+            self.calls[asked.why] += 1
+            self._known[asked.environment, asked.run] = shown
+            if asked.why == "round":
+                self.trials.append(Trial(asked.environment, shown, self.names))
+            elif asked.why == "baseline":
+                self._of_whole.append(shown)
+        self._tell_rounds()
 
-    def _answer(self, step: steps.Step) -> object:
-        match step:
-            case steps.Wants():
-                self._call(step.tests[0])
-            case steps.BaselineRan():
-                return self._failures()
-            case steps.FailureFixed():
-                return self.leg()
-            case steps.RoundBegan():
-                self._begin_round(step.round)
-            case steps.Similar():
-                self._go(*self._chain, step.environment)
-                return True
-            case steps.CertificateDue():
-                return self._certificate()
-            case steps.Certified():
-                self.claims = tuple(self._claim(claim, step.certificate.first_run) for claim in step.claims)
-            case steps.LeftOut():
-                self._go(*self._chain, step.environment)
-                return self.leg()
-            case steps.SteppedBack():
-                self._lost.append(self._chain[step.place + 1])
-                self._go(*self._chain[: step.place + 1])
-                return self.leg(step.again)
-        return None
+    def _tell_rounds(self) -> None:
+        # Not from inside the procedure, so that each exception comes through.
+        while self.on_round is not None and self._began:
+            self.on_round(self._began.pop(0))
 
-    def _call(self, asked: steps.Test) -> None:
-        shown = bool(self.test(frozenset(asked.environment.names(self.names))))
-        self.calls[asked.why] += 1
-        self._known[asked.environment, asked.run] = shown
-        if asked.why == "round":
-            self.trials.append(Trial(asked.environment, shown, self.names))
-        elif asked.why == "baseline":
-            self._of_whole.append(shown)
-
-    def _failures(self) -> steps.Baseline:
+    def baseline_ran(self, runs: int, chose: int) -> steps.Baseline:
         if not any(self._of_whole):
             raise UserError(NOTHING_TO_REDUCE)
         return steps.Baseline(sum(self._of_whole))
 
-    def leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
-        """The next search, from what is left."""
+    def failure_fixed(self, runs: int) -> steps.Leg:
+        return self.next_leg()
+
+    def next_leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
         rate = self.rate() if self.keep_rate else 0.0
         rule = Acceptance(1 + self.iterations, rate, self.keep_rate, len(self._lost))
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
         return steps.Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
 
+    def round_began(self, number: int, round: Round) -> None:
+        self.rounds += 1
+        self._n_partitions[self.left] = round.n_partitions
+        candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
+        all_models = (round.environment, *round.partitions)
+        environment, *parts = (tuple(self.names[model] for model in models) for models in all_models)
+        self._began.append(NamedRound(environment, tuple(parts), candidates))
+
+    def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
+        pass
+
+    def similar(self, number: int, index: int, environment: Environment) -> bool:
+        self._go(*self._chain, environment)
+        return True
+
+    def round_ended(self, number: int, winner: int | None) -> None:
+        pass
+
+    def search_ended(self, environment: Environment) -> None:
+        pass
+
+    def certificate_due(self) -> steps.Certificate:
+        self._certificates += 1
+        error = error_of(self._certificates)
+        terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, at_once=True)
+        return steps.Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+
+    def certified(self, made: steps.Certified) -> None:
+        claims = []
+        for named in made.claims:
+            shown = sum(self._known[named.environment, made.certificate.first_run + run] for run in named.runs)
+            without, claim = None if named.model is None else self.names[named.model], named.claim
+            interval = anytime_interval(shown, len(named.runs))
+            claims.append(RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound))
+        self.claims = tuple(claims)
+
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: object) -> steps.Leg:
+        self._lost.append(self._chain[place + 1])
+        self._go(*self._chain[: place + 1])
+        return self.next_leg(again)
+
+    def left_out(self, model: int, environment: Environment) -> steps.Leg:
+        self._go(*self._chain, environment)
+        return self.next_leg()
+
     @property
     def left(self) -> Environment:
         """The environment that was reached."""
         return self._chain[-1]
-
-    def _begin_round(self, round: Round) -> None:
-        self.rounds += 1
-        self._n_partitions[self.left] = round.n_partitions
-        if self.on_round is not None:
-            candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
-            parts = tuple(map(self._named, round.partitions))
-            self.on_round(NamedRound(self._named(round.environment), parts, candidates))
-
-    def _named(self, models: Partition) -> Names:
-        return tuple(self.names[model] for model in models)
 
     def _go(self, *chain: Environment) -> None:
         """On, or back, along `chain`."""
         self._n_partitions.setdefault(chain[-1], self._n_partitions.get(self.left))
         self._chain = chain
         self.history.append(Step(self.calls.total(), self.left.names(self.names)))
-
-    def _certificate(self) -> steps.Certificate:
-        self._certificates += 1
-        error = error_of(self._certificates)
-        terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, at_once=True)
-        return steps.Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
-
-    def _claim(self, named: steps.NamedClaim, first: int) -> RateClaim:
-        shown = sum(self._known[named.environment, first + run] for run in named.runs)
-        without, claim = None if named.model is None else self.names[named.model], named.claim
-        interval = anytime_interval(shown, len(named.runs))
-        return RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound)
 
 
 def _wrong(what: str, expected: str, found: object) -> UserError:
