@@ -23,7 +23,6 @@ MOST_FAULTS = 3
 @dataclass(frozen=True)
 class Whole:
     """The events of a run file that make sense, from the first one on; `trouble` says what is wrong with the next, "" if none is.
-
     `events` counts them, `state` is what they come to. So many of the tests are `bare`: they have no trajectory, as in a recorded
     run that was made small.
     """
@@ -50,7 +49,10 @@ def whole(file: RunFile, keep: Callable[[Recorded], None] = lambda _: None) -> W
     try:
         for event in file.read():
             state = apply(state, event)
-            bare += _is_bare(file, event)
+            ended = event.event
+            if isinstance(ended, TestFinished) and ended.outcome not in BROKEN:
+                # A trajectory that is there has to be whole.
+                bare += not file.motion(ended.test) or not file.trajectory(ended.test)
             keep(event)
             count += 1
     except UserError as error:
@@ -66,15 +68,11 @@ def rescue(file: RunFile, copy: Path) -> Whole:
     if copy.exists():
         raise UserError(f"{copy}: exists already; choose another name for the copy")
     try:
-        first = next(file.read(most=1), None)
+        first, documents = next(file.read(most=1), None), file.documents("")
     except UserError:
         first = None
     if first is None or not isinstance(first.event, Created):
-        raise UserError(f"{file.path}: nothing can be repaired: its first event is lost")
-    try:
-        documents = file.documents("")
-    except UserError:
-        raise UserError(f"{file.path}: nothing can be repaired: its world and settings cannot be read") from None
+        raise UserError(f"{file.path}: nothing can be repaired: its first event, or its world and settings, are lost")
     try:
         with tempfile.TemporaryDirectory(prefix=f".{copy.name}.", dir=copy.parent) as folder:
             made = Path(folder) / copy.name
@@ -102,14 +100,6 @@ def _fill(file: RunFile, made: Path) -> Whole:
             db.executemany("INSERT INTO command VALUES (?, ?, ?, ?)", map(_row, file.commands()))
         db.execute("COMMIT")
     return found
-
-
-def _is_bare(file: RunFile, event: Recorded) -> bool:
-    """Whether a test has ended without a trajectory. Raises UserError if it has one that is damaged."""
-    if not isinstance(event.event, TestFinished) or event.event.outcome in BROKEN:
-        return False
-    test = event.event.test
-    return not file.motion(test) or not file.trajectory(test)
 
 
 def _row(entry: Recorded | Request) -> tuple[int, float, str, str]:

@@ -47,10 +47,7 @@ def mode_beside(run: Path) -> int:
 
 @contextmanager
 def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) -> Iterator[None]:
-    """Holds the file `lock`.
-
-    Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked.
-    """
+    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked."""
     if fcntl is None:
         raise UserError(f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows")
     try:
@@ -66,9 +63,8 @@ def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) ->
                     raise UserError(taken)
                 time.sleep(0.02)
         except OSError as error:
-            raise UserError(
-                f"{refused}: its folder has no file locks ({error.strerror}), like some network folders; {instead}"
-            ) from None
+            why = f"its folder has no file locks ({error.strerror}), like some network folders"
+            raise UserError(f"{refused}: {why}; {instead}") from None
         yield
     finally:
         os.close(handle)

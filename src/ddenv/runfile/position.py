@@ -18,7 +18,7 @@ Step = Literal["moment", "round", "reduction", "decision"]
 # A state is kept of one in so many events.
 GAP = 256
 # These change nothing that a viewer sees.
-_UNSEEN = (
+_UNSEEN = {
     "command_handled",
     "command_refused",
     "environment_named",
@@ -26,15 +26,14 @@ _UNSEEN = (
     "round_finished",
     "leg_started",
     "comparing",
-)
+}
 _VERDICTS = ("candidate_judged", "trial_judged", "certificate_finished")
 
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """The baseline, a round or a certificate: `kind` with its `number`. It has events from `first` to `last`.
-
-    It begins with `models` and ends with `left` of them. `tests` were finished when it began.
+    """The baseline, a round or a certificate: `kind` with its `number`. It has events from `first` to `last`, begins with `models`
+    and ends with `left` of them. `tests` were finished when it began.
     """
 
     kind: Literal["baseline", "round", "certificate"]
@@ -56,10 +55,9 @@ class Moment:
 
 
 class Position:
-    """Finds the state at any event quickly, from states that it keeps of some of them.
-
-    `read(after, most)` returns events with an id above `after`, as `RunFile.events` does. Each event is noted once, in order:
-    by the one who folds them, or by `catch_up`. Event ids stand for positions; `at` is None at the end, also while it grows.
+    """Finds the state at any event quickly, from states that it keeps of some of them. `read(after, most)` returns events with an
+    id above `after`, as `RunFile.events` does. Each event is noted once, in order: by the one who folds them, or by `catch_up`.
+    Event ids stand for positions; `at` is None at the end, also while it grows.
     """
 
     def __init__(self, read: Callable[[int, int], list[Recorded]]) -> None:
@@ -171,20 +169,17 @@ class Position:
         """Goes to the next of these (`by` 1) or to the one before (-1); False if there is none. After the last comes the end."""
         stops = self.stops(what)
         here = self._ids[-1] if self.at is None else self.at
-        if by < 0:
-            place = bisect_left(stops, here) - 1
-            if self.at is None and what == "round":
-                # From the end, which is in the last chapter, one goes to the chapter before it.
-                place = min(place, len(stops) - 2)
-            if place < 0:
-                return False
+        if by > 0:
+            place, is_end = bisect_right(stops, here), self.at is None
+            self.go(stops[place] if place < len(stops) else None)
+            return not is_end
+        place = bisect_left(stops, here) - 1
+        if self.at is None and what == "round":
+            # From the end, which is in the last chapter, one goes to the chapter before it.
+            place = min(place, len(stops) - 2)
+        if place >= 0:
             self.at = stops[place]
-            return True
-        if self.at is None:
-            return False
-        place = bisect_right(stops, here)
-        self.go(stops[place] if place < len(stops) else None)
-        return True
+        return place >= 0
 
 
 def position_in(events: Sequence[Recorded]) -> Position:

@@ -16,11 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """The start of a search: the number of its first round, the node that it starts from, and what was known then.
-
-    `n_partitions` is None for the scenario's value. `tests` are those that verdicts rested on, for schemas that learn. A candidate
-    has to keep the `rate` of f, 0 if its first run with f decides; the search had gone back so many `steps_back`. The groups
-    `again` are left out first. `past` are its rounds that are over.
+    """The start of a search: the number of its first round, the node that it starts from, and what was known then. `n_partitions`
+    is None for the scenario's value. `tests` are those that verdicts rested on, for schemas that learn. A candidate has to keep the
+    `rate` of f, 0 if its first run with f decides; the search had gone back so many `steps_back`. The groups `again` are left out
+    first. `past` are its rounds that are over.
     """
 
     first_round: int
@@ -39,7 +38,6 @@ class Leg:
 @dataclass(frozen=True, slots=True)
 class PastRound:
     """A round of the current search that is over: a `digest` of its partitions, its winner, and the tests of its verdicts.
-
     `evidence_test` is the run of the winner that guides the next rounds; tests of the candidates `unknown` broke.
     """
 
@@ -109,11 +107,9 @@ def path(nodes: Sequence[Node], number: int | None) -> tuple[Node, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What fresh runs show of the environment of `node`; number 1 is the run's first certificate.
-
-    Its terms are those of `CertificateStarted`, and `first_run` is the number of its first run. `claims` are empty while its tests
-    are made. `past`: a search began since. `branch`: the environment is in a branch whose f is another failure, so that the rate
-    where that branch begins stands for the whole world's.
+    """What fresh runs show of the environment of `node`; number 1 is the run's first certificate. Its terms are those of
+    `CertificateStarted`, and `first_run` is the number of its first run. `claims` are empty while its tests are made. `past`: a
+    search began since. `branch`: f is another failure there, so the rate where that branch begins stands for the whole world's.
     """
 
     number: int
@@ -133,7 +129,6 @@ class Certificate:
 @dataclass(frozen=True, slots=True)
 class Claim:
     """One claim of a certificate, as in `ClaimMade`: about what is left, or, if `without` is a model, about that without it.
-
     `verdict`: what is left is "kept" (it keeps the rate), "lost", or "exact" (its rate was only measured); a model is "needed"
     (without it f is rare enough), "helps" (f is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide,
     "unknown" if they broke. A claim that `is_exact` is about these runs of the search, and about no rate.
@@ -176,9 +171,8 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class Removal:
-    """The whole world without `models` was tried.
-
-    `verdict` is "" while it is open, then "passes", "fails" or "unknown" (its tests broke), by the `tests` with these ids.
+    """The whole world without `models` was tried. `verdict` is "" while it is open, then "passes", "fails" or "unknown" (its tests
+    broke), by the `tests` with these ids.
     """
 
     models: tuple[str, ...]
@@ -189,10 +183,9 @@ class Removal:
 
 @dataclass(frozen=True, slots=True)
 class Returned:
-    """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back.
-
-    `verdict`: the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not
-    decide, "unknown" if they broke.
+    """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back. `verdict`:
+    the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not decide,
+    "unknown" if they broke.
     """
 
     back: str | None
@@ -214,10 +207,8 @@ class Check:
 @dataclass(frozen=True, slots=True)
 class Isolation:
     """A search for the fewest models that have to go from the whole world so that the robot reaches its goal, as it was `asked`.
-
-    `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: the last word is
-    spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: the user
-    gave it up, or ended it by another decision.
+    `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: `found` is the removal
+    after which the robot passes, None if there is none. `broken_off`: the user gave it up, or ended it by another decision.
     """
 
     asked: e.IsolationStarted
@@ -238,10 +229,9 @@ class NumberTried:
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """How far numbers may change in the environment that was asked for, as `runs` and values that are `impossible` show.
-
-    The last call is as it was `asked`, after the first `before_call` runs, and `earlier` runs in other environments. `ended`: the
-    search is over; `broken_off`: a decision of the user ended it.
+    """How far numbers may change in the environment that was asked for, as `runs` and values that are `impossible` show. The last
+    call is as it was `asked`, after the first `before_call` runs, and `earlier` runs in other environments. `ended`: the search is
+    over; `broken_off`: a decision of the user ended it.
     """
 
     asked: e.MarginsStarted
@@ -266,12 +256,9 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """What the tests were computed with: the same ones give the same bits only by the same software on the same processor.
-
-    `now` is what the last engine computes with, `proven` what gave the same bits as the tests before it.
-
-    Both are lists in words, such as "ddenv 0.1.0, drake 1.51.1, Python 3.11.7, Intel Xeon"; "" before the first engine. `mixed`
-    has a sentence for each time that the user went on although the bits differ.
+    """What the tests were computed with: only the same software on the same processor gives the same bits. `now` is what the last
+    engine computes with, `proven` what gave the same bits as the tests before it, both in words, "" before the first engine.
+    `mixed` has a sentence for each time that the user went on although the bits differ.
     """
 
     now: str = ""

@@ -100,10 +100,7 @@ class Live:
 
 
 def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
-    """Creates a run file atomically, with `created` as its first event.
-
-    Raises UserError if it exists or cannot be written.
-    """
+    """Creates a run file atomically, with `created` as its first event. Raises UserError if it exists or cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
@@ -133,9 +130,8 @@ def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
 
 
 def _forget(path: Path) -> None:
-    """Removes what a killed run of this name has left, if its file is gone: SQLite would add it to the new file.
-
-    Raises UserError while an engine still works on the deleted file.
+    """Removes what a killed run of this name has left, if its file is gone: SQLite would add it to the new file. Raises UserError
+    while an engine still works on the deleted file.
     """
     logs = [log for ending in LOGS if (log := path.with_name(f"{path.name}{ending}")).exists()]
     if not logs or path.exists():
@@ -157,7 +153,11 @@ class RunFile:
 
     def __init__(self, path: Path, untouched: bool = False, wait: float = VIEWER_WAIT) -> None:
         self.path = path
-        self.address = _address(path, untouched)
+        self.address = path.resolve().as_uri()
+        log = path.with_name(f"{path.name}-wal")
+        # Read-only if the folder is not writable and there is no write-ahead log to merge.
+        if untouched or not (log.exists() or os.access(path.parent, os.W_OK)):
+            self.address += "?immutable=1"
         self._owned: tuple[int, int] | None = None
         self._logs: dict[Path, tuple[int, int]] = {}
         self._wait: Callable[[NoRoom], bool] | None = None
@@ -166,14 +166,6 @@ class RunFile:
         try:
             self._db = sqlite3.connect(self.address, uri=True, isolation_level=None, timeout=wait)
             self._db.execute("PRAGMA trusted_schema = OFF")
-        except sqlite3.Error as error:
-            raise UserError(f"{path}: cannot be read: {error}") from None
-        self._check()
-
-    def _check(self) -> None:
-        """Raises UserError unless the open file is a readable run file."""
-        path = self.path
-        try:
             application = self._db.execute("PRAGMA application_id").fetchone()[0]
             version = self._db.execute("PRAGMA user_version").fetchone()[0]
         except sqlite3.OperationalError as error:
@@ -181,18 +173,16 @@ class RunFile:
         except sqlite3.Error as error:
             from zipfile import is_zipfile
 
+            what = f"is not a ddenv run file ({error})"
             if is_zipfile(path):
-                raise UserError(
-                    f"{path}: is a ZIP file; unpack it first and name the run in it, FOLDER/run.ddenv"
-                ) from None
-            raise UserError(f"{path}: is not a ddenv run file ({error})") from None
+                what = "is a ZIP file; unpack it first and name the run in it, FOLDER/run.ddenv"
+            raise UserError(f"{path}: {what}") from None
         if application != APPLICATION_ID:
             raise UserError(f"{path}: is not a ddenv run file")
         if not OLDEST_VERSION <= version <= SCHEMA_VERSION:
             which = "a newer ddenv" if version > SCHEMA_VERSION else "a ddenv from before its first release"
-            raise UserError(
-                f"{path}: was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
-            )
+            reads = f"this one reads format {SCHEMA_VERSION}"
+            raise UserError(f"{path}: was written by {which} (format {version}); {reads}")
         # A view or trigger in place of a table could run forever.
         if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
             raise UserError(f"{path}: damaged run file: its tables are not those of a run file")
@@ -282,12 +272,11 @@ class RunFile:
                 raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
         return found
 
-    # The methods below are for the engine alone.
+    # For the engine alone.
 
     def own(self, wait: Callable[[NoRoom], bool] | None = None) -> None:
-        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event.
-
-        Where the disk has no room for an event, `wait` is called; it returns whether to try again.
+        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event. Where the disk has no room
+        for an event, `wait` is called; it returns whether to try again.
         """
         self._owned, self._wait = _identity(self.path), wait
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
@@ -301,43 +290,30 @@ class RunFile:
     def append(
         self, event: Event, motions: Motions | None = None, command: int | None = None, number: int | None = None
     ) -> Recorded:
-        """Records one event, with the trajectories of its test, in one transaction; `command` is the number of what caused it.
-
-        The trajectories of a run that is no test need a `number`, which is negative.
-
-        Raises UserError if the run file was deleted or replaced meanwhile: SQLite would go on to write what nobody can read.
+        """Records one event, with the trajectories of its test, in one transaction; `command` is the number of what caused it. The
+        trajectories of a run that is no test need a `number`, which is negative. Raises UserError if the run file was deleted or
+        replaced meanwhile: SQLite would go on to write what nobody can read.
         """
-        while True:
+        from ddenv.runfile.events import Implied, TestFinished
+
+        test = event.test if isinstance(event, TestFinished | Implied) else number
+        new = Recorded(0, time.time(), event, command)
+        while not new.id:
             try:
-                return self._append(event, motions, command, number)
+                with self._writing() as db:
+                    db.execute("BEGIN IMMEDIATE")
+                    id = _insert(db, "event", new.kind, new.data, new.time)
+                    rows = [(test, model, samples) for model, samples in (motions or {}).items() if test is not None]
+                    db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
+                    db.execute("COMMIT")
+                new = replace(new, id=id)
             except NoRoom as full:
                 if self._wait is None or not self._wait(full):
                     raise
-
-    def _append(self, event: Event, motions: Motions | None, command: int | None, number: int | None) -> Recorded:
-        from ddenv.runfile.events import Implied, TestFinished
-
-        new = Recorded(0, time.time(), event, command)
-        with self._writing() as db:
-            db.execute("BEGIN IMMEDIATE")
-            new = replace(new, id=_insert(db, "event", new.kind, new.data, new.time))
-            test = event.test if isinstance(event, TestFinished | Implied) else number
-            if motions and test is not None:
-                rows = [(test, model, samples) for model, samples in motions.items()]
-                db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
-            db.execute("COMMIT")
         if not self._logs:
             logs = [self.path.with_name(f"{self.path.name}{ending}") for ending in LOGS]
             self._logs = {log: _identity(log) for log in logs if log.exists()}
         return new
-
-    def _take_log(self) -> None:
-        """Merges the log into the file, wherever it is now, and removes it: SQLite would add it to another file of this name."""
-        with suppress(sqlite3.Error):
-            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        for log, identity in self._logs.items():
-            if _identity(log) == identity:
-                log.unlink(missing_ok=True)
 
     def set_live(self, running: list[Live]) -> None:
         """Replaces the table of running tests."""
@@ -367,11 +343,15 @@ class RunFile:
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         if self._owned is not None and (now := _identity(self.path)) != self._owned:
-            self._take_log()
+            # The log goes into the file, wherever that is now, and away: SQLite would add it to another file of this name.
+            with suppress(sqlite3.Error):
+                self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            for log, identity in self._logs.items():
+                if _identity(log) == identity:
+                    log.unlink(missing_ok=True)
             what = "deleted or moved" if now == NOWHERE else "replaced by another file"
-            raise UserError(
-                f"{self.path}: the run file was {what} while an engine worked on it; nothing more is written"
-            )
+            said = f"the run file was {what} while an engine worked on it; nothing more is written"
+            raise UserError(f"{self.path}: {said}")
         try:
             yield self._db
         except sqlite3.Error as error:
@@ -382,9 +362,8 @@ class RunFile:
 
 
 def _unreadable(path: Path, error: Exception) -> UserError:
-    if "locked" in str(error):
-        return UserError(f"{path}: cannot be read now: {error} by another program; try again")
-    return UserError(f"{path}: damaged run file: {error}")
+    locked = f"cannot be read now: {error} by another program; try again"
+    return UserError(f"{path}: {locked if 'locked' in str(error) else f'damaged run file: {error}'}")
 
 
 def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
@@ -406,13 +385,11 @@ def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
 
 
 def _object(id: Any, data: Any) -> dict[str, Any]:
-    try:
+    with suppress(ValueError, TypeError, RecursionError):
         content = json.loads(data)
-    except (ValueError, TypeError, RecursionError):
-        raise UserError(f"damaged run file: entry {id} is not JSON") from None
-    if not isinstance(content, dict):
-        raise UserError(f"damaged run file: entry {id} is not a JSON object")
-    return content
+        if isinstance(content, dict):
+            return content
+    raise UserError(f"damaged run file: entry {id} is not a JSON object")
 
 
 def _moment(value: Any) -> float:
@@ -436,15 +413,6 @@ def _identity(path: Path) -> tuple[int, int]:
     except OSError:
         return NOWHERE
     return found.st_dev, found.st_ino
-
-
-def _address(path: Path, untouched: bool) -> str:
-    """SQLite's URI of the file; read-only if the folder is not writable and there is no write-ahead log to merge."""
-    address = path.resolve().as_uri()
-    if untouched:
-        return f"{address}?immutable=1"
-    settled = not path.with_name(f"{path.name}-wal").exists()
-    return f"{address}?immutable=1" if settled and not os.access(path.parent, os.W_OK) else address
 
 
 def _floats(samples: object, path: Path) -> array[float]:

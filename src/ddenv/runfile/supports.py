@@ -27,18 +27,14 @@ def drops_without(state: RunState, models: frozenset[str]) -> Names:
 
 def stacks_of(state: RunState, environment: Names) -> tuple[Names, ...]:
     """The models of `environment` in groups that stay or go together: what is welded, and stacks if the run keeps them whole."""
-    return stacks(environment, _kept(state))
+    whole = read(state.scenario, SETTINGS["keep_supports"])
+    return stacks(environment, (*state.welds, *state.supports) if whole else state.welds)
 
 
 def stack_with(state: RunState, environment: Names, name: str | None) -> Names:
     """The models that go together with a model, itself included; none for None."""
-    if name is None or not _kept(state):
-        return () if name is None else (name,)
-    return next((stack for stack in stacks_of(state, environment) if name in stack), (name,))
-
-
-def _kept(state: RunState) -> Pairs:
-    return (*state.welds, *state.supports) if read(state.scenario, SETTINGS["keep_supports"]) else state.welds
+    found = (stack for stack in stacks_of(state, environment) if name in stack)
+    return () if name is None else next(found, (name,))
 
 
 def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) -> Names:
@@ -48,12 +44,8 @@ def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) ->
     """
     keep = tuple(keep)
     kept, there = frozenset(keep), frozenset(environment)
-    falling = {
-        upper
-        for upper, lower in supports
-        if upper in kept and lower not in kept and (lower in there or upper not in there)
-    }
-    new = falling
+    held = [(upper, lower) for upper, lower in supports if upper in kept and lower not in kept]
+    new = falling = {upper for upper, lower in held if lower in there or upper not in there}
     while new:
         new = {upper for upper, lower in supports if lower in new and upper in kept} - falling
         falling |= new

@@ -17,10 +17,8 @@ def purpose(state: RunState, test: Test) -> str:
     row = made_for(state, test)
     if row is not None:
         return f"{f'round {test.round} · ' if isinstance(row, Candidate) else ''}{row.label}"
-    if test.phase == "round" and test.candidate is None:
-        return "what is left, with a chosen seed"
     if test.phase == "round":
-        return f"round {test.round}"
+        return "what is left, with a chosen seed" if test.candidate is None else f"round {test.round}"
     if test.phase == "audit":
         return "an audit of the slice"
     if test.removal is not None:
@@ -36,9 +34,8 @@ def purpose(state: RunState, test: Test) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a viewer wants the scene to show: the moment of the event `at`, None for the present, and a row of the table then.
-
-    A candidate is one of round number `round`; without one, and without a try, the scene follows the run.
+    """What a viewer wants the scene to show: the moment of the event `at`, None for the present, and a row of the table then. A
+    candidate is one of round number `round`; without one, and without a try, the scene follows the run.
     """
 
     at: int | None = None
