@@ -2,7 +2,6 @@
 
 import tempfile
 from pathlib import Path
-from zlib import crc32
 
 import pytest
 from hypothesis import example, given
@@ -85,28 +84,6 @@ def test_any_number_of_workers_comes_to_the_same_verdicts(salt, needed, fewer, r
         path = sliced_run(Path(folder), **method)
         drive(path, FakePool(oracle, workers, seed))
         assert decided(path)[0] == expected
-
-
-def breaks(salt, *names):
-    """Shows f with all of the names; some worlds cannot be simulated."""
-
-    def oracle(keep, seed):
-        if crc32(f"{salt} {sorted(keep)}".encode()) % 5 == 0 and len(keep) < len(MODELS) // 2:
-            return "error"
-        return needs(*names)(keep, seed)
-
-    return oracle
-
-
-@pytest.mark.fuzz
-@given(salt=st.integers(0, 99), seed=st.integers(0, 9))
-@examples(0.2)
-def test_worlds_that_break_ahead_of_time_break_no_run(salt, seed):
-    with tempfile.TemporaryDirectory() as folder:
-        alone, together = sliced_run(Path(folder), **METHODS[1]), sliced_run(Path(folder), **METHODS[1])
-        drive(alone, FakePool(breaks(salt, *MODELS[3:5]), 1))
-        drive(together, FakePool(breaks(salt, *MODELS[3:5]), 64, seed))
-        assert decided(together)[0] == decided(alone)[0]
 
 
 @pytest.mark.fuzz

@@ -56,7 +56,9 @@ def test_f_is_the_end_that_most_runs_share():
 def test_runs_that_broke_are_not_in_the_rate():
     found = ran("error", stuck(1), "pass", stuck(1), "error")
     assert (found.failures, found.runs, found.broken, found.rate) == (2, 3, 2, pytest.approx(2 / 3))
+    assert (found.miss_chance, found.iterations_95) == (pytest.approx((1 / 3) ** 4), 2)
     assert "all 1 baseline runs (1 more broke" in ran("error", "pass")
+    assert ran("error", "error") == "no baseline run finished: broken"
 
 
 def test_the_way_there_decides_where_the_oracle_asks_for_it():

@@ -19,7 +19,7 @@ from ddenv.words.claims import missing
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, engine, new_run
 from tests.engine.killing import Killed, killed, resumed, story
 from tests.engine.oracles import needs
-from tests.engine.reading import models_in, send, state_of, told
+from tests.engine.reading import models_in, state_of, told
 from tests.tiers import examples
 
 METHODS = [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep", "growth": "steady", "skip": "implied"}]
@@ -143,14 +143,6 @@ def test_a_model_that_certificates_show_as_needless_is_left_out(tmp_path):
     assert [node.how for node in state.path][-1] == "certified"
 
 
-def test_a_rate_that_stays_undecided_is_not_called_minimal(tmp_path):
-    state = drive(kept(tmp_path), FakePool(at_rates(1, ({"wall", "beam"}, 1.0), ({"wall"}, 0.8)), 2))
-    found = claims(state)
-    if set(state.environment) == {"wall", "beam"}:
-        assert state.minimal == (found["beam"].verdict == "needed")
-    assert state.minimal or "not shown" in state.reason
-
-
 def breaks_without(*names):
     def oracle(keep, seed):
         return "similar" if set(names) <= keep else "error"
@@ -213,13 +205,6 @@ def test_a_certificate_can_be_made_again_with_more_runs(tmp_path):
     assert not state.minimal
 
 
-def test_a_certificate_is_made_again_where_tests_broke_for_good(tmp_path):
-    path = kept(tmp_path)
-    drive(path, FakePool(breaks_without("wall"), 2))
-    state = certified_again(path, needs("wall"), 10)
-    assert (state.status, state.minimal, len(state.certificates)) == ("finished", True, 2)
-
-
 def test_a_few_broken_fresh_runs_leave_a_finished_run_as_it_is(tmp_path):
     def oracle(keep, seed):
         return "error" if seed == FIRST_FRESH_RUN + 3 else needs("wall")(keep, seed)
@@ -238,21 +223,6 @@ def test_a_failure_that_no_fresh_run_shows_needs_nothing_and_proves_nothing(tmp_
     assert state.status == "finished"
     assert not state.minimal
     assert not any(claim.verdict in ("kept", "needed", "not needed") for claim in state.certificates[-1].claims)
-
-
-def test_fresh_runs_of_an_earlier_environment_are_read_back_as_such(tmp_path):
-    """The user adopts a try that is no part of the environment before it; its rate is too low, and earlier ones run again."""
-    oracle = at_rates(3, ({"wall", "beam"}, 1.0), ({"wall", "ball"}, 0.3))
-    path = kept(tmp_path)
-    drive(path, FakePool(oracle, 1))
-    send(path, "try", models=["wall", "ball"])
-    state = drive(path, FakePool(oracle, 1))
-    for trial in (one for one in state.trials if one.verdict == "similar"):
-        send(path, "adopt", trial=trial.number)
-        state = drive(path, FakePool(oracle, 1))
-    for test in state.tests:
-        if test.phase == "certify" and test.is_finished:
-            assert (oracle(models_in(state, test.id), test.seed) == "similar") == (test.outcome == "similar")
 
 
 def test_the_budget_counts_the_tests_of_the_certificate(tmp_path):

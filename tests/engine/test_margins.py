@@ -22,7 +22,6 @@ from ddenv.runs.playback import played
 from ddenv.runs.subject import load_parts, read_parts
 from ddenv.words.margins import lines
 from ddenv.world.load import load_scenario
-from ddenv.world.sdf.numbers import changed
 from tests.engine.fake import FakePool, drive, engine, new_run
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs
@@ -237,13 +236,6 @@ def test_what_is_wrong_is_said_in_one_line(path):
     ]
     with pytest.raises(UserError, match=r"there is no number 'wal\.y' \(did you mean wall\.y\?\)"):
         work(path, fake(), globs=["wal.y"])
-
-
-def test_the_part_of_the_world_that_runs_is_what_is_exported(path):
-    with RunFile(path) as file:
-        scenario, world, _ = read_parts(file)
-    _, after = changed(scenario, world, {"wall.y": 0.25})
-    assert after.text == world.text.replace(b"<pose>2 0 1.05 0 0 0</pose>", b"<pose>2 0.25 1.05 0 0 0</pose>")
 
 
 @pytest.mark.programs

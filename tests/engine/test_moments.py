@@ -167,17 +167,6 @@ def test_what_is_unpinned_is_not_called_minimal_before_it_was_left_out(tmp_path)
     assert [node.environment for node in state.nodes if node.minimal] == [("wall",)]
 
 
-@pytest.mark.parametrize(("sent", "kept"), [(2, 2), ("2", 1)])
-def test_a_setting_that_is_sent_as_text_is_refused(tmp_path, sent, kept):
-    def guide():
-        yield from until(lambda state: state.round is not None)
-        yield "change", {"settings": {"iterations": sent}}
-
-    state = guided(new_run(tmp_path), needs("wall"), guide())
-    assert state.scenario["reduction"]["iterations"] == kept
-    assert ("iterations" in state.refusal[1]) == (kept == 1), state.refusal
-
-
 def test_trials_keep_to_the_budget(tmp_path):
     def guide():
         yield from until(lambda state: state.tests_done >= 4)

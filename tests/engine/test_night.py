@@ -79,7 +79,7 @@ def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_t
 def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path, monkeypatch, capsys, undisturbed):
     path = new_run(tmp_path)
     looks = []
-    original = RunFile._append
+    original = RunFile.append
 
     def full_for_a_while(file, event, *values):
         if isinstance(event, TestFinished) and event.test == 3 and len(looks) < 4:
@@ -100,7 +100,7 @@ def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path,
         return again
 
     original_wait = DiskSpace.wait
-    monkeypatch.setattr(RunFile, "_append", full_for_a_while)
+    monkeypatch.setattr(RunFile, "append", full_for_a_while)
     monkeypatch.setattr(DiskSpace, "wait", waits)
     disk(monkeypatch, lambda: 10 * NEEDED)
     assert story(watched(path)) == undisturbed
@@ -114,11 +114,11 @@ def test_an_engine_that_waits_for_room_can_be_ended(tmp_path, monkeypatch):
     terminated = threading.Event()
     disk(monkeypatch, lambda: 10 * NEEDED)
 
-    def full(file, *event):
+    def full(*_):
         terminated.set()
         raise NoRoom(f"{path}: cannot be written: full")
 
-    monkeypatch.setattr(RunFile, "_append", full)
+    monkeypatch.setattr("ddenv.runfile.store._insert", full)
     with pytest.raises(UserError, match="cannot be written"):
         watched(path, terminated)
 

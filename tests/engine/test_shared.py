@@ -82,14 +82,6 @@ def test_a_run_does_not_learn_of_itself(made):
     assert known(made) == {}
 
 
-def test_what_was_taken_over_can_be_taken_over_again(tmp_path, made, fresh):
-    shutil.copy(fresh, third := tmp_path / "third.ddenv")
-    share(fresh, FakePool(needs("wall", "beam"), 1))
-    made.write_text("gone")
-    share(third, pool := FakePool(needs("wall", "beam"), 1))
-    assert pool.made == []
-
-
 def test_tests_of_other_seeds_are_made(tmp_path, made):
     share(new_run(tmp_path, seed=100, **METHOD), pool := FakePool(needs("wall", "beam"), 1))
     assert min(seed for _, seed in pool.made) == 100

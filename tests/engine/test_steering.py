@@ -35,17 +35,6 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     assert [one.kind for one in state.decisions] == ["pin"]
 
 
-def test_what_is_unpinned_can_go_again(tmp_path):
-    def guide():
-        yield from until(lambda state: state.round is not None)
-        yield "pin", {"models": numbers("ball", "beam")}
-        yield from until(lambda state: state.round.split.pinned)
-        yield "unpin", {"models": numbers("ball")}
-
-    state = guided(new_run(tmp_path), needs("wall"), guide())
-    assert set(state.environment) == {"wall", "beam"}
-
-
 def test_all_pinned_is_the_end(tmp_path):
     def guide():
         yield from until(lambda state: state.round is not None)
@@ -82,18 +71,6 @@ def test_a_selection_by_hand_is_tested_and_adopted(tmp_path, jobs):
     assert len(state.trials[0].tests) == 4
     *_, adopted, last = state.nodes
     assert (adopted.how, last.how, last.parent) == ("adopted", "reduced", adopted.number)
-
-
-def test_no_test_is_made_twice_for_a_trial(tmp_path):
-    def guide():
-        yield from until(lambda state: state.round is not None)
-        yield "try", {"models": numbers("wall", "beam")}
-
-    path = new_run(tmp_path)
-    pool = Guided(path, needs("wall", "beam"), guide(), 2)
-    state = drive(path, pool)
-    assert set(state.environment) == {"wall", "beam"}
-    assert len(pool.made) == len(set(pool.made))
 
 
 def test_another_failure_is_taken_for_as_good(tmp_path):
@@ -152,26 +129,6 @@ def test_a_veto_is_taken_back(tmp_path):
     assert {one.kind for one in state.decisions} == {"veto", "unveto"}
 
 
-def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
-    def guide():
-        state = yield from until(lambda state: state.round is not None and state.round.n_partitions == 3)
-        for one in state.round.candidates:
-            if "ball" not in one.models:
-                yield "veto", {"round": state.round.number, "candidate": one.index}
-        state = yield from until(
-            lambda now: (
-                now.round.number > state.round.number and any(c.verdict == "vetoed" for c in now.round.candidates)
-            )
-        )
-        one = next(one for one in state.round.candidates if one.verdict == "vetoed")
-        yield "unveto", {"round": state.round.number, "candidate": one.index}
-
-    path = new_run(tmp_path)
-    state = guided(path, needs("wall", "beam"), guide())
-    assert {"wall", "beam"} <= set(state.environment)
-    assert state.status == "finished"
-
-
 @pytest.mark.parametrize(
     ("kind", "data", "why"),
     [
@@ -191,6 +148,7 @@ def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
         ("change", {"settings": {"pair": "timesg/random"}}, "no partitioning 'timesg'"),
         ("change", {"settings": {"algorithm": "x"}}, "no algorithm 'x'"),
         ("change", {"settings": {"iterations": -1}}, "iterations"),
+        ("change", {"settings": {"iterations": "2"}}, "iterations"),
         ("change", {"settings": {"iterations": 1}}, "already"),
         ("unveto", {"round": 1, "candidate": 0}, "neither vetoed, rejected nor undone"),
         ("unveto", {"round": 9, "candidate": 0}, "round is over"),
