@@ -81,20 +81,6 @@ def test_partitions_are_disjoint_not_empty_and_cover_the_environment(algorithm, 
             )
 
 
-@every_search
-@given(world=worlds, salt=st.integers(0, 10**6))
-@examples(0.1)
-def test_the_environment_only_ever_becomes_a_winner(algorithm, pair, world, salt):
-    count, _, seed = world
-    known = evidence(count, seed)
-    left = Environment.whole(count)
-    kept, rounds = run(known, any_oracle(salt), pair, algorithm)
-    for round, winner in rounds:
-        assert Environment.of(round.environment) == left
-        left = left if winner is None else winner.models
-    assert kept == left
-
-
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_a_world_that_f_does_not_need_is_left_empty(algorithm):
     assert run(evidence(9, 1), lambda _: True, algorithm=algorithm)[0] == NOTHING

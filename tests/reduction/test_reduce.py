@@ -87,11 +87,6 @@ def test_a_failure_that_shows_in_four_of_five_runs_is_never_lost_and_minimal_is_
     assert not found.minimal or found.kept == ("b", "g")
 
 
-def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs():
-    ends = [ddenv.reduce(ELEMENTS, four_of_five(salt), iterations=12, **ALL).kept for salt in range(12)]
-    assert ends.count(("b", "g")) >= 11
-
-
 @pytest.mark.parametrize("options", [{}, {"iterations": 3}, {"iterations": 3, "accept_rate": "first"}])
 def test_a_world_that_does_not_fail_is_refused(options):
     with pytest.raises(ddenv.UserError, match="does not show with all elements"):
@@ -242,12 +237,6 @@ def test_where_a_certificate_follows_a_search_needs_fewer_tests():
     assert kept.search_tests < first.search_tests
 
 
-def test_partitions_alone_do_not_promise_what_they_did_not_test():
-    found = ddenv.reduce(ELEMENTS, needs("a", "h"), candidates="partitions", **ALL)
-    assert found.kept == ELEMENTS
-    assert not found.minimal
-
-
 def test_without_a_check_the_first_test_is_already_a_smaller_one():
     made = []
     ddenv.reduce(ELEMENTS, lambda kept: bool(made.append(kept)) or kept >= {"a"}, check=False, algorithm="ddmin")
@@ -259,14 +248,6 @@ def test_rounds_are_reported_before_they_are_tested():
     found = ddenv.reduce(ELEMENTS, needs("b"), on_round=reported.append, **ALL)
     assert len(reported) == found.rounds
     assert reported[0].environment == ELEMENTS
-
-
-def test_what_the_test_raises_comes_through():
-    def broken(kept):
-        raise RuntimeError("no robot")
-
-    with pytest.raises(RuntimeError, match="no robot"):
-        ddenv.reduce(ELEMENTS, broken, algorithm="ddmin")
 
 
 WRONG = {
@@ -297,21 +278,15 @@ WRONG = {
     "baseline_runs": ({"baseline_runs": 0}, "baseline_runs: expected a whole number from 1 to 1000, found 0"),
     "prior": ({"prior": "near"}, "prior: 'near' is not allowed"),
     "delta": ({"delta": 0}, "delta: expected a number, more than 0"),
-    "half an iteration": ({"iterations": 1.5}, "iterations: expected a whole number from 0 to 1000, found 1.5"),
-    "iterations in words": ({"iterations": "2"}, "iterations: expected a whole number from 0 to 1000, found '2'"),
-    "no n_partitions": ({"n_partitions": None}, "n_partitions: expected a whole number from 2 to 100000, found None"),
-    "a seed below zero": ({"seed": -1}, "seed: expected a whole number from 0 to 2147483647, found -1"),
     "no seed": ({"seed": None}, "seed: expected a whole number from 0 to 2147483647, found None"),
     "positions in a list": (
         {"positions": [(0, 0, 0)] * 8},
         "positions: expected a mapping from names to values, found list",
     ),
-    "a place in digits": ({"positions": POSITIONS | {"a": "123"}}, "positions['a']: expected x, y, z m, found '123'"),
     "a place beyond all bounds": (
         {"positions": POSITIONS | {"a": (1e200, 0, 0)}},
         "positions['a']: expected x, y, z m",
     ),
-    "times in a list": ({"first_sensed": ["a"]}, "first_sensed: expected a mapping from names to values, found list"),
     "a time before the beginning": ({"first_sensed": {"a": -1e6}}, "first_sensed['a']: expected a time in s"),
     "a time beyond all numbers": ({"first_sensed": {"a": 10**400}}, "first_sensed['a']: expected a time in s"),
     "a complex trajectory": ({"trajectory": TRAJECTORY + 1j}, "trajectory: expected finite numbers"),
@@ -346,22 +321,15 @@ def test_numbers_of_numpy_are_numbers():
     assert ddenv.reduce(ELEMENTS, needs("b"), prioritization="timestep", **numbers, **facts).kept == ("b",)
 
 
+@pytest.mark.parametrize("error", [RuntimeError, StopIteration])
 @pytest.mark.parametrize("where", ["test", "on_round"])
-def test_also_the_end_of_an_iterator_comes_through(where):
-    def over(*_):
-        raise StopIteration
+def test_whatever_is_raised_comes_through_also_the_end_of_an_iterator(where, error):
+    def raises(*_):
+        raise error
 
-    calls = {"test": needs("b"), "on_round": None} | {where: over}
-    with pytest.raises(StopIteration):
+    calls = {"test": needs("b"), "on_round": None} | {where: raises}
+    with pytest.raises(error):
         ddenv.reduce(ELEMENTS, algorithm="ddmin", **calls)
-
-
-def test_what_a_model_is_like_reaches_the_schemas():
-    """A slippery model far away: the learner finds it in fewer tests when it knows the models' traits."""
-    traits = {name: ddenv.Traits(1.0, 0.01 if name == "h" else 1.0) for name in ELEMENTS}
-    known = ALL | {"traits": traits, "touched": ["a"]}
-    found = ddenv.reduce(ELEMENTS, needs("a"), partitioning="learner", **known)
-    assert found.kept == ("a",)
 
 
 def test_the_library_needs_neither_drake_nor_a_screen():

@@ -151,13 +151,6 @@ def test_rounds_that_make_no_sense_are_told(changed):
 # Tests.
 
 
-def test_when_models_were_first_sensed_and_touched_is_kept():
-    times = {"first_sensed": [[5, 0.0], [0, 1.25]], "first_touched": [[5, 3]]}
-    test = state_after(started(), finished(**times)).tests[0]
-    assert test.first_sensed == (("box 5", 0.0), ("box 0", 1.25))
-    assert test.first_touched == (("box 5", 3.0),)
-
-
 @pytest.mark.parametrize("key", ["first_sensed", "first_touched"])
 @pytest.mark.parametrize(
     "pair",
@@ -193,11 +186,6 @@ def test_the_tests_of_the_last_certificate_are_found_whenever_they_were_made(ste
             where = {"round": None, "candidate": None, "run": run, "seed": run}
             state = with_event(state, "test_started", test=len(state.tests) + 1, phase=step, **where)
     assert state.confirm_tests == tuple(one for one in state.tests if one.phase == "certify" and one.run >= first)
-
-
-def test_an_outcome_that_nobody_knows_is_told():
-    with pytest.raises(UserError, match=r"outcome: should be 'similar', .*, found 'splendid'"):
-        read_back((started()[0], started()[1] | {"environment": 0}), finished(outcome="splendid"))
 
 
 def test_baseline_runs_count_as_what_they_turned_out_to_be():
@@ -286,9 +274,3 @@ def test_what_is_counted_along_the_way_is_what_the_tests_say(steps):
 def test_events_change_fields_that_a_state_has(steps):
     names = {field.name for field in fields(RunState)}
     assert all(vars(state).keys() == names for state in grown(steps))
-
-
-def test_a_state_cannot_be_changed():
-    state = state_after()
-    with pytest.raises(AttributeError):
-        state.status = "running"

@@ -52,12 +52,6 @@ def test_earlier_ones_stay_and_later_ones_have_the_change(length, places):
         assert hash(earlier) == hash(PersistentTuple.of(was))
 
 
-def test_unequal_items_are_unequal():
-    assert numbers(3) != numbers(4)
-    assert numbers(3) != numbers(3).changed(-1, 7)
-    assert numbers(3) == numbers(3).changed(-1, 7).changed(2, 2)
-
-
 def test_a_change_copies_one_chunk():
     before = numbers(10 * CHUNK)
     after = before.changed(3 * CHUNK + 1, -1)

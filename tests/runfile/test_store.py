@@ -194,15 +194,8 @@ def test_one_engine_a_run(path):
 
 
 def test_partition_letters_go_on_after_z():
-    assert [partition_letter(index) for index in (0, 25, 26, 51, 52, 701, 702)] == [
-        "A",
-        "Z",
-        "AA",
-        "AZ",
-        "BA",
-        "ZZ",
-        "AAA",
-    ]
+    places = (0, 25, 26, 51, 52, 701, 702)
+    assert list(map(partition_letter, places)) == ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]
 
 
 kinds = st.sampled_from(
@@ -222,16 +215,14 @@ def test_events_that_make_no_sense_are_told_in_one_line(entries):
         assert "damaged run file" in str(error)
 
 
-def test_a_view_in_the_place_of_a_table_is_refused(path):
-    numbers = "WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM n)"
-    endless = f"{numbers} SELECT id, 0 AS time, '' AS kind, '' AS data FROM n"
-    _sql(path, "DROP TABLE event", f"CREATE VIEW event AS {endless}")
-    with pytest.raises(UserError, match="its tables are not those of a run file"):
-        RunFile(path)
+NUMBERS = "WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM n)"
+VIEW = f"CREATE VIEW event AS {NUMBERS} SELECT id, 0 AS time, '' AS kind, '' AS data FROM n"
+TRIGGER = "CREATE TRIGGER t AFTER INSERT ON command BEGIN DELETE FROM event; END"
 
 
-def test_a_trigger_is_refused(path):
-    _sql(path, "CREATE TRIGGER t AFTER INSERT ON command BEGIN DELETE FROM event; END")
+@pytest.mark.parametrize("statements", [("DROP TABLE event", VIEW), (TRIGGER,)], ids=["view", "trigger"])
+def test_a_view_in_the_place_of_a_table_and_a_trigger_are_refused(path, statements):
+    _sql(path, *statements)
     with pytest.raises(UserError, match="its tables are not those of a run file"):
         RunFile(path)
 
