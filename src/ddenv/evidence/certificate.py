@@ -198,17 +198,17 @@ class Settling:
                 return Claim("", wanted.bound, tuple(self._tests), self._broken, *missing)
             self._tests += wanted.tests
             self._broken += known.count("broken")
-            try:
-                if self._broken > max(MOST_BROKEN, len(self._tests) // 10):
-                    self._end("unknown", wanted.bound)
-                else:
+            ended: tuple[Verdict, float | None] | None = None
+            if self._broken > max(MOST_BROKEN, len(self._tests) // 10):
+                ended = "unknown", wanted.bound
+            else:
+                try:
                     self._wanted = self._procedure.send(known)
-            except StopIteration as end:
-                self._end(*end.value)
+                except StopIteration as end:
+                    ended = end.value
+            if ended is not None:
+                self._settled = Claim(*ended, tuple(self._tests), self._broken)
         return self._settled
-
-    def _end(self, verdict: Verdict, bound: float | None) -> None:
-        self._settled = Claim(verdict, bound, tuple(self._tests), self._broken)
 
 
 def settle(procedure: Procedure, shown: Callable[[Environment, int], Shown], ahead: int = 1) -> Claim:
@@ -223,23 +223,26 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     `REFUTED`.
     """
     if left == whole:
-        return (yield from _of_whole(left, max(1, terms.at_least)))
+        # It keeps its own rate, if f shows in it at all.
+        shown = 0
+        for run in range(max(1, terms.at_least)):
+            shown += (yield Wanted(((whole, run),), (whole,)))[0] is True
+        return ("kept", 1.0) if shown else ("not shown", None)
     # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
     assumed, sound, bound, run = Pairs(), Pairs(), 0.0, 0
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
-    mine: Shown
-    theirs: Shown
+    mine: Shown = True
     while run < MOST_PAIRS or hits:
         shows_often = run < ALONE_FIRST or assumed.both + assumed.first >= ALONE_SHARE * run
         alone = shows_often and run < MOST_PAIRS and not terms.at_once
+        theirs: Shown = None
         if hits and not alone:
             mine = True
             (theirs,) = yield Wanted(((whole, hits.pop(0)),), (whole,), bound)
             assumed, sound = replace(assumed, both=assumed.both - 1), replace(sound, first=sound.first - 1)
         elif alone:
             (mine,) = yield Wanted(((left, run),), (left,), bound)
-            theirs = None
             if mine is True:
                 hits.append(run)
                 assumed, sound = assumed.after(True, True), sound.after(True, False)
@@ -259,15 +262,6 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
         if sound.below(terms.keep_rate) >= REFUTED:
             return "lost", bound
     return "not shown", bound
-
-
-def _of_whole(whole: Environment, runs: int) -> Procedure:
-    """The whole world keeps its own rate, if f shows in it at all."""
-    shown = 0
-    for run in range(runs):
-        (mine,) = yield Wanted(((whole, run),), (whole,))
-        shown += mine is True
-    return ("kept", 1.0) if shown else ("not shown", None)
 
 
 def falls(
@@ -337,11 +331,8 @@ def certificate_tests(
     `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known.
     """
     # A damaged run file may ask for nothing, or for all.
-    rate, certify_rate, seen = (
-        min(max(rate, 0.0), 1.0),
-        min(max(certify_rate, 0.01), 0.99),
-        min(max(0, seen), MOST_PAIRS),
-    )
+    rate, certify_rate = min(max(rate, 0.0), 1.0), min(max(certify_rate, 0.01), 0.99)
+    seen = min(max(0, seen), MOST_PAIRS)
     rates = [rate, *(wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ())]
     ends = [_expected(each, certify_rate, left, at_least) for each in rates]
     # What is not known of the rate and chance within the certificate are independent factors.

@@ -22,9 +22,8 @@ from ddenv.text import percent
 def is_minimal(certificate: Certificate) -> bool:
     """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
     claims = certificate.claims
-    if not claims or (claims[0].verdict != "kept" and not certificate.seeds):
-        return False
-    return all(claim.verdict == "needed" for claim in claims[1:])
+    kept = bool(claims) and (claims[0].verdict == "kept" or bool(certificate.seeds))
+    return kept and all(claim.verdict == "needed" for claim in claims[1:])
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
@@ -220,7 +219,19 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     # A finished certificate need not have run the whole world.
     if certificate.node != first and (not (claims or certificate.seeds) or (first, None) in tests):
         keys.append((first, None))
-    found = [_of(key, tests.get(key, []), claims.get(key[1]) if key[0] == certificate.node else None) for key in keys]
+    found = []
+    for node, without in keys:
+        of = tests.get((node, without), [])
+        running = tuple(test for test in of if test.outcome == "running")
+        claim = claims.get(without) if node == certificate.node else None
+        if claim is not None:
+            shows = claim.shown, claim.runs, claim.low, claim.high, claim.outcomes
+            found.append(FreshRuns(node, without, *shows, running, claim, bound=claim.bound))
+            continue
+        counts = Counter(test.outcome for test in of if test.is_finished)
+        outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
+        runs, shown = counts.total() - sum(counts[outcome] for outcome in BROKEN), counts["similar"]
+        found.append(FreshRuns(node, without, shown, runs, *anytime_interval(shown, runs), outcomes, running))
     bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
     left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))
     return tuple(
@@ -232,15 +243,3 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
         )
         for number, one in enumerate(found)
     )
-
-
-def _of(key: tuple[int, str | None], tests: list[Test], claim: Claim | None) -> FreshRuns:
-    running = tuple(test for test in tests if test.outcome == "running")
-    if claim is not None:
-        return FreshRuns(
-            *key, claim.shown, claim.runs, claim.low, claim.high, claim.outcomes, running, claim, bound=claim.bound
-        )
-    counts = Counter(test.outcome for test in tests if test.is_finished)
-    outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
-    runs, shown = counts.total() - sum(counts[outcome] for outcome in BROKEN), counts["similar"]
-    return FreshRuns(*key, shown, runs, *anytime_interval(shown, runs), outcomes, running)

@@ -90,12 +90,13 @@ class Known:
 
     def values(self, rule: Rule) -> list[Value]:
         """All values that were tried, the lowest first."""
-        judged = {
-            value: Value(value, rule.verdict(found), tuple(found), tuple(self.failures.get(value, ())))
+        judged = [
+            Value(value, rule.verdict(found), tuple(found), tuple(self.failures.get(value, ())))
             for value, found in self.outcomes.items()
-        }
-        judged |= {value: Value(value, "impossible", why=why) for value, why in self.impossible.items()}
-        return [judged[value] for value in sorted(judged)]
+            if value not in self.impossible
+        ]
+        judged += [Value(value, "impossible", why=why) for value, why in self.impossible.items()]
+        return sorted(judged, key=lambda one: one.value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,16 +203,14 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
         if run.run >= FIRST_FIX_RUN:
             fresh.setdefault((run.name, run.value), {})[run.run] = run.outcome == "pass"
     found = []
-    for asked, value in (
-        (one.asked, value) for one in margins_of(margins) for side in one.sides for value in side.tried
-    ):
-        if value.verdict == "goal":
-            made = fresh.get((asked.name, value.value), {})
-            reached, runs = sum(made.values()), len(made)
-            # A run that broke counts against it.
-            shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
-            share = abs(value.value - asked.now) / asked.scale
-            found.append(Fix(asked.name, value.value, share, reached, runs, shown if runs >= FIX_RUNS else None))
+    tried = ((one.asked, value) for one in margins_of(margins) for side in one.sides for value in side.tried)
+    for asked, value in ((asked, one.value) for asked, one in tried if one.verdict == "goal"):
+        made = fresh.get((asked.name, value), {})
+        reached, runs = sum(made.values()), len(made)
+        # A run that broke counts against it.
+        shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
+        share = abs(value - asked.now) / asked.scale
+        found.append(Fix(asked.name, value, share, reached, runs, shown if runs >= FIX_RUNS else None))
     return tuple(sorted(found, key=lambda one: (one.share, one.name)))
 
 
@@ -268,25 +267,18 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
         if by_value[value].verdict in ("goal", "impossible"):
             break
     near = sorted(tried, key=lambda one: abs(one.value - asked.now))
-    return next(
-        filter(None, (_between(asked, up, near, limit) for limit in (("goal", "other", "impossible"), ("goal",)))), None
-    )
-
-
-def _between(asked: NumberAsked, up: bool, near: list[Value], limit: tuple[str, ...]) -> float | None:
-    """A value between the nearest one whose verdict is in `limit` and the one before it; None if that is near enough. `near` has
-    the values that were tried, the nearest to the present one first.
-    """
-    place = next((place for place, one in enumerate(near) if one.verdict in limit), None)
-    if place is None or (place and near[place - 1].verdict == "undecided"):
-        return None
-    high = abs(near[place].value - asked.now)
-    low = abs(near[place - 1].value - asked.now) if place else 0.0
-    if high - low <= max(asked.resolution, NEAR * high):
-        return None
-    # Far apart, the middle is that of their ratio.
-    middle = _at(asked, up, math.sqrt(low * high) if low > 0.0 and high > 2.0 * low else (low + high) / 2.0)
-    return None if any(one.value == middle for one in near) else middle
+    # Between the nearest one where f is gone, or where the goal is reached, and the one before it, until that is near enough.
+    for limit in (("goal", "other", "impossible"), ("goal",)):
+        place = next((place for place, one in enumerate(near) if one.verdict in limit), None)
+        if place is None or (place and near[place - 1].verdict == "undecided"):
+            continue
+        high = abs(near[place].value - asked.now)
+        low = abs(near[place - 1].value - asked.now) if place else 0.0
+        # Far apart, the middle is that of their ratio.
+        middle = _at(asked, up, math.sqrt(low * high) if low > 0.0 and high > 2.0 * low else (low + high) / 2.0)
+        if high - low > max(asked.resolution, NEAR * high) and middle not in by_value:
+            return middle
+    return None
 
 
 def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER) -> Iterator[tuple[float, int]]:

@@ -44,16 +44,14 @@ def anytime_interval(successes: int, trials: int, error: float = 0.05) -> tuple[
         at_rate = (successes and successes * math.log(rate)) + (misses and misses * math.log(1.0 - rate))
         return mixed - at_rate < math.log(1.0 / error)
 
-    def edge(inside: float, outside: float) -> float:
-        if is_likely(outside):
-            return outside
+    def edge(outside: float) -> float:
+        inside = outside if is_likely(outside) else successes / max(1, trials)
         for _ in range(30):
             middle = (inside + outside) / 2.0
             inside, outside = (middle, outside) if is_likely(middle) else (inside, middle)
         return inside
 
-    middle = successes / trials if trials else 0.5
-    return edge(middle, 0.0), edge(middle, 1.0)
+    return edge(0.0), edge(1.0)
 
 
 def miss_chance(rate: float, iterations: int) -> float:

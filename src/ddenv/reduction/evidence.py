@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -80,6 +80,10 @@ class Evidence:
             raise Lacking(what)
         return value
 
+    def names(self, models: Iterable[int]) -> Names:
+        """The names of models given by their numbers."""
+        return tuple(map(self.elements.__getitem__, models))
+
     def places(self, models: Names) -> Floats:
         """The positions of `models`, shape (len(models), 3), m. Raises Lacking."""
         positions = self.need("positions")
@@ -88,9 +92,8 @@ class Evidence:
     def centroids(self, partitions: Sequence[Names]) -> Floats:
         """The mean position of each partition, shape (len(partitions), 3), m. Raises Lacking."""
         places = self.places(tuple(name for partition in partitions for name in partition))
-        sizes = np.array([len(partition) for partition in partitions])
-        firsts = np.cumsum(sizes) - sizes
-        return np.asarray(np.add.reduceat(places, firsts, axis=0) / sizes[:, None])
+        sizes = np.array(list(map(len, partitions)))
+        return np.asarray(np.add.reduceat(places, np.cumsum(sizes) - sizes, axis=0) / sizes[:, None])
 
     def nearest(self, models: Names) -> Floats:
         """For each of `models`, how near the robot's path comes to it (m) and when (s): shape (len(models), 2). Raises Lacking.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 from ddenv import schemas
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
-from ddenv.reduction.evidence import Evidence, Lacking, Names, spatial_prior
+from ddenv.reduction.evidence import Evidence, Lacking, spatial_prior
 from ddenv.reduction.round import Candidate, Partition, Search
 
 # The prior without any positions (Wang et al. 2021).
@@ -60,11 +61,11 @@ def make_guide(
 
     def split_now(environment: Partition, n: int) -> list[Partition]:
         known = evidence()
-        names = _names(known, environment)
+        names = known.names(environment)
         with _told("partitioning", partitioning):
             partitions = [tuple(part) for part in split(names, n, known)]
         models = [name for part in partitions for name in part]
-        if not all(partitions) or len(models) != len(names) or set(models) != set(names):
+        if not all(partitions) or Counter(models) != Counter(names):
             raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
         numbers = {name: number for number, name in enumerate(known.elements)}
         return [tuple(map(numbers.__getitem__, part)) for part in partitions]
@@ -72,7 +73,7 @@ def make_guide(
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
         known = evidence()
         with _told("prioritization", prioritization):
-            scores = [float(score) for score in rank([_names(known, part) for part in partitions], known)]
+            scores = [float(score) for score in rank([known.names(part) for part in partitions], known)]
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
             expected = f"a score for each of {len(partitions)} partitions"
             raise UserError(f"prioritization '{prioritization}': expected {expected}")
@@ -80,7 +81,7 @@ def make_guide(
 
     def chances_now(environment: Partition) -> Floats:
         known = evidence()
-        names = _names(known, environment)
+        names = known.names(environment)
         if prior == "uniform" or known.positions is None or known.failure_position is None:
             return np.full(len(names), UNIFORM)
         return spatial_prior(names, known)
@@ -92,10 +93,6 @@ def search(algorithm: str, elements: Iterable[int], guide: Guide) -> Search:
     """The algorithm `algorithm`, before its first round. Raises UserError for an unknown name."""
     searching: Search = schemas.load("algorithm", algorithm)(tuple(elements), guide)
     return searching
-
-
-def _names(known: Evidence, models: Partition) -> Names:
-    return tuple(map(known.elements.__getitem__, models))
 
 
 def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:

@@ -134,10 +134,8 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
 
 def _search(driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]) -> Work[Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
-    if smaller:
-        searching = ddmin(tuple(model for model in asked.suspects if model in smaller))
-    else:
-        searching = isolating(asked.suspects, asked.size)
+    within = tuple(model for model in asked.suspects if model in smaller)
+    searching = ddmin(within) if smaller else isolating(asked.suspects, asked.size)
     algorithm, winner = asked.stacks.expand(searching), None
     while True:
         try:
@@ -214,10 +212,8 @@ def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
         (shown,) = yield Wanted(((world, runs),), (world,))
         reached, runs, broken = reached + (shown is True), runs + 1, broken + (shown == "broken")
         # A run that broke counts against what is claimed.
-        fails, passing = (
-            leans_to(reached, missed, rule.wanted, rule.rather_than, rule.error)
-            for missed in (runs - reached - broken, runs - reached)
-        )
+        terms = rule.wanted, rule.rather_than, rule.error
+        fails, passing = (leans_to(reached, runs - reached - less, *terms) for less in (broken, 0))
         found = True if passing else False if fails is False else None
     for run in range(runs, at_least if found else 0):
         yield Wanted(((world, run),), (world,))

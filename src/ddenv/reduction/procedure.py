@@ -215,19 +215,16 @@ def procedure(
     driver: Driver, whole: Environment, baseline_runs: int, keeps_rate: bool, leg: Leg | None = None
 ) -> Work[Certified | None]:
     """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no failure to reduce."""
-    if leg is None and (leg := (yield from baseline(driver, whole, baseline_runs, keeps_rate))) is None:
-        return None
-    while True:
+    leg, certified = leg or (yield from baseline(driver, whole, baseline_runs, keeps_rate)), None
+    while leg is not None:
         try:
             chain = yield from search_on(driver, leg)
             driver.search_ended(chain[-1])
             certified = yield from certify(driver, leg, chain)
-            after = yield from onward(driver, leg, chain, certified)
+            leg = yield from onward(driver, leg, chain, certified)
         except Changed:
-            after = driver.next_leg()
-        if after is None:
-            return certified
-        leg = after
+            leg = driver.next_leg()
+    return certified
 
 
 def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Work[Leg | None]:
@@ -368,10 +365,9 @@ def settled(
         # Each open claim has work for a worker.
         while not (named and ends(named[-1])) and sum(not one.claim.verdict for one in named) < driver.workers:
             if len(named) == len(opened):
-                if (more := next(claims, None)) is None:
-                    break
-                model, environment, procedure = more
-                opened.append((model, environment, Settling(procedure)))
+                opened += [(model, world, Settling(procedure)) for model, world, procedure in islice(claims, 1)]
+            if len(named) == len(opened):
+                break
             model, environment, settling = opened[len(named)]
             named.append(NamedClaim(model, environment, settling.claim(fresh, driver.workers)))
         # Of each pair the larger world first: its run may imply the other one.

@@ -149,14 +149,10 @@ def reduce(
     """
     names = _names(elements)
     accept_rate = accept_rate or ("kept" if iterations else "first")
-    variants = {
-        "candidates": candidates,
-        "complement_order": complement_order,
-        "growth": growth,
-        "skip": skip,
-        "prior": prior,
-    }
-    _check(**variants, accept_rate=accept_rate, keep_rate=keep_rate, certify_rate=certify_rate, delta=delta)
+    variants = {"candidates": candidates, "complement_order": complement_order, "growth": growth, "skip": skip}
+    _check(
+        **variants, prior=prior, accept_rate=accept_rate, keep_rate=keep_rate, certify_rate=certify_rate, delta=delta
+    )
     _check(iterations=iterations, n_partitions=n_partitions, seed=seed, baseline_runs=baseline_runs)
     path = _trajectory(trajectory)
     failure = _place(path[-1, 1:4] if failure_pose is None and path is not None else failure_pose)
@@ -183,6 +179,7 @@ def reduce(
             rate=lambda: leg.rule.rate or caller.share_shown,
             runs=lambda: leg.rule.misses,
             proves=leg.rule.proves,
+            prior=prior,
             **variants,
         )
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
@@ -202,7 +199,7 @@ def reduce(
         caller.carry_out(steps.search_on(caller, leg))
         rests = [caller.left - Environment.of((element,)) for element in caller.left]
         minimal = all(standing([rest], caller.shown, leg.rule)[0] == ["dissimilar"] for rest in rests)
-    tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
+    tests = [caller.calls[why] for why in ("baseline", "round", "certify")]
     return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
 
 
@@ -257,9 +254,7 @@ class _Caller:
         return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
 
     def rate(self) -> float:
-        """From the baseline, and from fresh calls up to the first not made: they are made only where what is left missed the
-        failure.
-        """
+        # From the baseline, and from fresh calls up to the first not made: only where what is left missed f they are made.
         shown = list(self._of_whole)
         for number in range(1, self._certificates + 1):
             first = FIRST_FRESH + number * EACH_CERTIFICATE
@@ -316,18 +311,14 @@ class _Caller:
         environment, *parts = (tuple(self.names[model] for model in models) for models in all_models)
         self._began.append(NamedRound(environment, tuple(parts), candidates))
 
-    def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
+    def judged(self, *_: object) -> None:
         pass
+
+    round_ended = search_ended = judged
 
     def similar(self, number: int, index: int, environment: Environment) -> bool:
         self._go(*self._chain, environment)
         return True
-
-    def round_ended(self, number: int, winner: int | None) -> None:
-        pass
-
-    def search_ended(self, environment: Environment) -> None:
-        pass
 
     def certificate_due(self) -> steps.Certificate:
         self._certificates += 1
@@ -355,7 +346,6 @@ class _Caller:
 
     @property
     def left(self) -> Environment:
-        """The environment that was reached."""
         return self._chain[-1]
 
     def _go(self, *chain: Environment) -> None:
@@ -410,11 +400,7 @@ def _trajectory(trajectory: Floats | None) -> Floats | None:
 
 
 def _each(
-    what: str,
-    values: Mapping[str, Any] | None,
-    names: Names | None,
-    expected: str,
-    read: Callable[[Any], Value | None],
+    what: str, values: Mapping[str, Any] | None, names: Names | None, expected: str, read: Callable[[Any], Value | None]
 ) -> dict[str, Value] | None:
     """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError where it makes nothing."""
     if values is None:

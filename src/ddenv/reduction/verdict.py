@@ -25,11 +25,9 @@ class Rule(Protocol):
 
     def verdict(self, shown: int, missed: int) -> Verdict:
         """The verdict after `shown` runs that showed what is looked for and `missed` that did not; "" while it is open."""
-        ...
 
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -83,18 +81,13 @@ def _by_bayes(rate: float, keep_rate: float, steps_back: int, shown: int, missed
     # Nearer to the rate that must be kept, the stricter the rule is.
     lower = kept * (0.5, 0.65, 0.8)[min(steps_back, 2)] * keep_rate / 0.8
     priors = (0.5, 0.1, 0.4) if steps_back == 0 else (0.5, 0.25, 0.25)
-    weights = [
-        prior * candidate**shown * (1.0 - candidate) ** missed
-        for prior, candidate in zip(priors, (kept, lower, SPURIOUS), strict=True)
-    ]
+    rates = zip(priors, (kept, lower, SPURIOUS), strict=True)
+    weights = [prior * candidate**shown * (1.0 - candidate) ** missed for prior, candidate in rates]
     keeps = weights[0] / sum(weights)
-    if keeps >= (0.85 if steps_back == 0 else 0.94):
+    is_open = shown + missed < MOST_RUNS
+    if keeps >= (0.85 if steps_back == 0 else 0.94) or (keeps > 0.5 and not is_open):
         return "similar"
-    if keeps <= 0.03:
-        return "dissimilar"
-    if shown + missed < MOST_RUNS:
-        return ""
-    return "similar" if keeps > 0.5 else "dissimilar"
+    return "" if is_open and keeps > 0.03 else "dissimilar"
 
 
 def standing(
