@@ -77,18 +77,13 @@ class Bench:
         """Starts tests on free workers. Returns whether one was implied, and so needs none."""
         # A step is one test, the next in order.
         free = self._pool.idle if self._control.speculates() else int(self._busy == 0)
-        for test in tests if free and self._control.may_start() else ():
-            if self._key(test) in self._started:
-                continue
-            implied = self._make(test)
-            if implied is None:
+        for test in (test for test in tests if self._key(test) not in self._started):
+            if not free or not self._control.may_start() or (implied := self._make(test)) is None:
                 return False
             self._control.started()
             if implied:
                 return True
             free -= 1
-            if not free or not self._control.may_start():
-                return False
         return False
 
     @property
@@ -114,24 +109,13 @@ class Bench:
         # All candidates meet the same noise.
         reduction, number = Reduction.model_validate(state.scenario["reduction"]), len(state.tests) + 1
         seed = seed_of(reduction, wanted.run)
-        round = state.round.number if state.round is not None and wanted.why == "round" else None
-        started = TestStarted(
-            number,
-            environment,
-            wanted.run,
-            seed,
-            wanted.why,
-            round,
-            wanted.candidate if wanted.why == "round" else None,
-            trial,
-            wanted.without,
-            source,
-        )
+        of_round = state.round is not None and wanted.why == "round"
+        round, candidate = (journal.current.number, wanted.candidate) if of_round else (None, None)
+        start = number, environment, wanted.run, seed, wanted.why, round, candidate, trial, wanted.without
         if implied and source is not None:
-            place = {name: getattr(started, name) for name in Implied.__dataclass_fields__ if name != "by"}
-            journal.record(Implied(by=source, **place), {ROBOT: source})
+            journal.record(Implied(*start, by=source), {ROBOT: source})
             return True
-        journal.record(started)
+        journal.record(TestStarted(*start, source))
         self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
         full = full or (source is not None and journal.is_full(state.tests[source - 1].phase))
@@ -193,17 +177,16 @@ class Bench:
     def finish_trials(self) -> None:
         """Obeys the last commands, and makes the tests that the user asked for. Raises as `work`."""
         self._control.poll()
-        while self._control.holds or (self._journal.state.failures and self._open_trials()):
+        while self._control.holds or self._open_trials():
             self.tick()
 
     def _open_trials(self) -> list[Trial]:
-        """The tries without a verdict, oldest first."""
-        return [trial for trial in self._journal.state.trials if not trial.verdict]
+        """The tries without a verdict, oldest first; they are made once f is known."""
+        state = self._journal.state
+        return [trial for trial in state.trials if not trial.verdict] if state.failures else []
 
     def _serve_trials(self) -> None:
         """Judges tries, and starts their tests, also while the rounds are paused. Raises Stopped if the budget is used up."""
-        if not self._journal.state.failures:
-            return
         for trial in self._open_trials():
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)

@@ -82,9 +82,7 @@ class Driver:
         # Unknown names are refused before a robot runs.
         self.algorithm(steps.Leg(1, NOTHING, (NOTHING,), NOTHING, {}, Acceptance(1)))
         self._settle()
-        leg: steps.Leg | None = None
-        if journal.state.baseline is not None:
-            leg = self._first_leg()
+        leg = None if journal.state.baseline is None else self._first_leg()
         whole, keeps_rate = journal.state.environments[0], reduction.accept_rate == "kept"
         procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg)
         if self._carry_out(procedure) is None:
@@ -177,8 +175,7 @@ class Driver:
         environment = journal.state.nodes[leg.node].environment
         self._leg = self._leg_of(leg, environment)
         self._bench.rule = self._leg.rule
-        self._trials.clear()
-        self._unknown.clear()
+        self._trials, self._unknown = {}, set()
         self._learn(leg.tests, leg.evidence_test)
         return self._leg
 
@@ -203,11 +200,8 @@ class Driver:
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
         asked, exact = self._reduction, exact_runs(journal.state)
-        rule = (
-            Acceptance(len(exact), exact=exact)
-            if exact
-            else Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
-        )
+        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
+        rule = Acceptance(len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         return steps.Leg(leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again)
 
@@ -311,6 +305,7 @@ class Driver:
         journal, leg = self._journal, self._leg
         # These schemas score by distance in m, which is useful to show.
         shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
+        scores = [float(f"{score:.3f}") if shown else None for score in round.scores]
         environment = Environment.of(round.environment) | leg.pinned
         journal.record(
             events.RoundStarted(
@@ -318,10 +313,7 @@ class Driver:
                 round.n_partitions,
                 journal.number(environment),
                 tuple(tuple(sorted(part)) for part in round.partitions),
-                tuple(
-                    (one.kind, one.partition, float(f"{round.scores[one.partition]:.3f}") if shown else None)
-                    for one in round.candidates
-                ),
+                tuple((one.kind, one.partition, scores[one.partition]) for one in round.candidates),
                 leg.pinned & environment,
             )
         )
@@ -411,10 +403,9 @@ class Driver:
 
     @property
     def _certificate(self) -> Certificate:
-        last = self._journal.state.certificate
-        if last is None:
+        if self._journal.state.certificate is None:
             raise Stopped(CHANGED)
-        return last
+        return self._journal.state.certificate
 
     def _claim_made(self, named: steps.NamedClaim, first: int) -> events.ClaimMade:
         journal, runs = self._journal, named.exact or [first + run for run in named.runs]

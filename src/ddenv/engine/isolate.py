@@ -72,22 +72,13 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     gone = {first: left.isdisjoint(stack) for first, stack in stacks.items()}
     suspects = sorted(stacks, key=lambda first: (gone[first], min(distance[model] for model in stacks[first])))
     chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
-    journal.record(
-        events.IsolationStarted(
-            isolation=len(state.isolations) + 1,
-            run=FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block,
-            block=max(FRESH_RUNS, 2 * least),
-            wanted=rule.wanted,
-            rather_than=rule.rather_than,
-            keep_rate=reduction.keep_rate,
-            error=ERROR,
-            at_least=least,
-            suspects=tuple(suspects),
-            size=sum(not gone[first] for first in suspects),
-            before=before,
-            chosen=chosen,
-        )
+    number, first = (
+        len(state.isolations) + 1,
+        FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block,
     )
+    terms = rule.wanted, rule.rather_than, reduction.keep_rate, ERROR, least
+    size, block = sum(not gone[one] for one in suspects), max(FRESH_RUNS, 2 * least)
+    journal.record(events.IsolationStarted(number, first, block, *terms, tuple(suspects), size, before, chosen))
 
 
 def _free(journal: Journal) -> Stacks:

@@ -111,14 +111,10 @@ def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> 
 
 def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> Outcomes:
     """The outcomes of all failed tests so far, judged by `failures`."""
-    outcomes: dict[int, str] = {}
-    distances: dict[int, float] = {}
-    for test in state.tests:
-        if test.outcome not in ("similar", "other"):
-            continue
-        judged = nearest([judge_trajectory(rows_of(file, test.id), failure) for failure in failures])
-        outcomes[test.id], distances[test.id] = judged.outcome, judged.distance
-    return Outcomes(outcomes, distances)
+    judged = {}
+    for test in (test.id for test in state.tests if test.outcome in ("similar", "other")):
+        judged[test] = nearest([judge_trajectory(rows_of(file, test), failure) for failure in failures])
+    return _outcomes(judged)
 
 
 def rows_of(file: RunFile, test: int) -> np.ndarray:
@@ -172,25 +168,25 @@ def fix_failure(
     sound = [test for test in tests if test.outcome not in BROKEN and test.run >= chose]
     similar = sum(test.id in shown for test in sound)
     rate = similar / len(sound)
-    low, high = wilson_interval(similar, len(sound))
     return BaselineFinished(
-        runs=len(sound),
-        broken=sum(test.outcome in BROKEN and test.run >= chose for test in tests),
-        failures=similar,
-        rate=rate,
-        low=low,
-        high=high,
+        len(sound),
+        similar,
+        rate,
+        *wilson_interval(similar, len(sound)),
         failure_test=failing[f].id,
         position=failures[f].position,
         miss_chance=miss_chance(rate, iterations),
         iterations_95=iterations_needed(rate),
+        judged=_outcomes(judged),
+        broken=sum(test.outcome in BROKEN and test.run >= chose for test in tests),
         seen=tuple(seen),
         chose=chose,
-        judged=Outcomes(
-            {id: judgement.outcome for id, judgement in judged.items()},
-            {id: judgement.distance for id, judgement in judged.items()},
-        ),
     )
+
+
+def _outcomes(judged: Mapping[int, Judgement]) -> Outcomes:
+    outcomes = {test: judgement.outcome for test, judgement in judged.items()}
+    return Outcomes(outcomes, {test: judgement.distance for test, judgement in judged.items()})
 
 
 def _no_failure(tests: Sequence[Test]) -> str:

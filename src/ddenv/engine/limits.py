@@ -41,15 +41,8 @@ RARE = 0.7
 MOST_LATE = 3
 # So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
 MOST_DEATHS, LAST = 3, 3000
-NOWHERE = (
-    events.AcceptModeChanged,
-    events.Comparing,
-    events.SupportsStarted,
-    events.LegStarted,
-    events.EnvironmentNamed,
-    events.TestStarted,
-    events.TestLost,
-)
+NOWHERE = {"accept_mode_changed", "comparing", "supports_started", "leg_started", "environment_named"}
+NOWHERE |= {"test_started", "test_lost"}
 HELPS = "try fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
 
 
@@ -82,7 +75,7 @@ def check_crash_loop(journal: Journal) -> None:
     for event in journal.file.events(max(0, last - LAST)):
         if isinstance(event.event, events.EngineStarted):
             deaths += 1
-        elif not isinstance(event.event, NOWHERE):
+        elif event.kind not in NOWHERE:
             deaths, place = 0, event.id
     if deaths >= MOST_DEATHS:
         raise UserError(
@@ -110,19 +103,13 @@ def note_rare(journal: Journal) -> None:
     asked = Reduction.model_validate(state.scenario["reduction"])
     if base is None or base.rate >= RARE or asked.accept_rate != "kept":
         return
-    kept, exact = (
-        between(low, high)
-        for low, _, high in (
-            rough_run(len(state.elements), each, base.rate).tests
-            for each in (asked, asked.model_copy(update={"accept_rate": "exact"}))
-        )
+    ways = asked, asked.model_copy(update={"accept_rate": "exact"})
+    tests = (rough_run(len(state.elements), way, base.rate).tests for way in ways)
+    kept, exact = (between(low, high) for low, _, high in tests)
+    words = (
+        f"f shows in {base.failures} of {count(base.runs, 'run')}: keeping its rate takes about {kept} tests; reducing "
     )
-    note(
-        journal,
-        "rare",
-        f"f shows in {base.failures} of {count(base.runs, 'run')}: keeping its rate takes about {kept} tests; reducing the "
-        f"failing runs themselves takes about {exact} (accept_rate exact, --exact)",
-    )
+    note(journal, "rare", f"{words}the failing runs themselves takes about {exact} (accept_rate exact, --exact)")
 
 
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
@@ -143,6 +130,5 @@ def give_up_if_late(journal: Journal, late: str) -> None:
     """After a test that was too `late`, in words. Raises UserError if several runs of the whole world were, and none has ended."""
     state = journal.state
     if state.baseline is None and state.tests_done == state.tally["timeout"] >= MOST_LATE:
-        raise UserError(
-            f"{count(state.tally['timeout'], 'run')} of the whole world {late}, and none has ended; {HELPS}"
-        )
+        late = f"{count(state.tally['timeout'], 'run')} of the whole world {late}"
+        raise UserError(f"{late}, and none has ended; {HELPS}")

@@ -50,9 +50,8 @@ def refusal(state: RunState, where: object) -> str:
         return f"f is not known yet, so there are no margins; run it first: ddenv resume {where}"
     if state.margining is None and (state.status not in ("finished", "stopped") or state.isolating is not None):
         return f"its search has not finished; finish it first: ddenv resume {where}"
-    if (
-        state.baseline.rate if certificate is None else certificate.claims[0].shown / certificate.claims[0].runs
-    ) < known.RAREST:
+    left = None if certificate is None else certificate.claims[0]
+    if (state.baseline.rate if left is None else left.shown / left.runs) < known.RAREST:
         return "f shows too rarely in what is left to say where it disappears; reduce a failure that shows more often (--failure)"
     return "" if state.environment else "nothing is left, so there is no model with a margin"
 
@@ -88,19 +87,12 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
     certificate, rate = current(journal.state), journal.rate_of_whole()
     if certificate is not None:
         rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
-    journal.record(
-        events.MarginsStarted(
-            numbers=tuple(events.NumberAsked(**asdict(one)) for one in numbers),
-            environment=journal.number(journal.environment),
-            rate=rate,
-            # Two numbers may be changed together at the end.
-            error=known.error_each(rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1)))),
-            budget=budget,
-            certified=certificate is not None,
-            status="stopped" if stood[0] == "stopped" else "finished",
-            before=stood[1],
-        )
-    )
+    asked = tuple(events.NumberAsked(**asdict(one)) for one in numbers)
+    # Two numbers may be changed together at the end.
+    error = known.error_each(rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1))))
+    status, environment = "stopped" if stood[0] == "stopped" else "finished", journal.number(journal.environment)
+    certified = certificate is not None
+    journal.record(events.MarginsStarted(asked, environment, rate, error, budget, certified, status, stood[1]))
 
 
 class _Search:
@@ -190,10 +182,10 @@ class _Search:
         name, value, run = one
         self._submitted += 1
         self._running[self._submitted] = one
+        seed, limit = seed_of(self._parts[0].reduction, run), wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
-        seed, full = seed_of(self._parts[0].reduction, run), run >= known.FIRST_FIX_RUN
-        limit = wall_limit(self._journal.state)
-        self._pool.submit(self._submitted, Run(self._kept, seed, full, limit, self._changes(name, value)))
+        test = Run(self._kept, seed, run >= known.FIRST_FIX_RUN, limit, self._changes(name, value))
+        self._pool.submit(self._submitted, test)
         self._control.started()
 
     def _record(self, one: Wanted, result: RunResult | Broken) -> None:

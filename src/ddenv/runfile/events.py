@@ -120,9 +120,8 @@ class SupportsStarted(Event):
 
 
 class Supports(Event):
-    """The first model of each pair rests on the second once the whole world has settled; `why` that is unknown.
-
-    The first model of each tie would move by itself without the second; None if that is unknown.
+    """The first model of each pair rests on the second once the whole world has settled; `why` that is unknown. The first model of
+    each tie would move by itself without the second; None if that is unknown.
     """
 
     pairs: tuple[Pair, ...]
@@ -153,10 +152,9 @@ class EnvironmentNamed(Event):
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Run number `run` of an environment, with a seed of its own.
-
-    `phase` says what for: the baseline, a `candidate` of a round, the user's `trial` ("hand"), an audit of a slice, a certificate
-    ("certify": with a fresh seed, `without` a model if it is given) or an isolation.
+    """Run number `run` of an environment, with a seed of its own. `phase` says what for: the baseline, a `candidate` of a round,
+    the user's `trial` ("hand"), an audit of a slice, a certificate ("certify": with a fresh seed, `without` a model if it is given)
+    or an isolation.
     """
 
     test: Number
@@ -220,9 +218,8 @@ class Outcomes:
 
 @dataclass(frozen=True, slots=True)
 class SeenFailure:
-    """A failure that runs of the whole world showed: in `runs` of them, and `test` is the one in their middle.
-
-    `kinds` say how the robot failed, the most frequent one first. `position` is where `test` ended, x, y, z m.
+    """A failure that runs of the whole world showed: in `runs` of them, and `test` is the one in their middle. `kinds` say how the
+    robot failed, the most frequent one first. `position` is where `test` ended, x, y, z m.
     """
 
     test: Number
@@ -271,10 +268,8 @@ class BaselineFinished(Event):
 
 
 class LegStarted(Event):
-    """A search starts from the current environment, with round number `round`.
-
-    Its first round has `n_partitions`, None for the scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f
-    decides.
+    """A search starts from the current environment, with round number `round`. Its first round has `n_partitions`, None for the
+    scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f decides.
     """
 
     round: Number
@@ -296,9 +291,8 @@ class RoundStarted(Event):
 
 
 class Forecast(Event):
-    """How many more tests of candidates a search of so many models takes, low, likely and high, when `tests_done` were finished.
-
-    In one case of ten fewer than the low number are left, in one of ten more than the high one.
+    """How many more tests of candidates a search of so many models takes, low, likely and high, when `tests_done` were finished. In
+    one case of ten fewer than the low number are left, in one of ten more than the high one.
     """
 
     round: Number
@@ -412,9 +406,8 @@ class CertificateFinished(Event):
 
 
 class RateLost(Event):
-    """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is not taken again.
-
-    The groups `again` are left out at once, or in halves.
+    """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is not taken again. The groups
+    `again` are left out at once, or in halves.
     """
 
     node: Natural
@@ -500,9 +493,8 @@ class IsolationGivenUp(Event):
 
 @dataclass(frozen=True, slots=True)
 class NumberAsked:
-    """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try.
-
-    A change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.
+    """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try. A
+    change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.
     Numbers that are changed `together`, in %, have each a name, the present value and that at 100 %.
     """
 
@@ -518,7 +510,6 @@ class NumberAsked:
 
 class MarginsStarted(Event):
     """A search for how far each of the `numbers` may change in an environment where f shows at `rate`, with at most `budget` runs.
-
     Each verdict on a value is wrong with a probability of at most `error`. `certified`: fresh runs have shown the rate. `status`
     and `before` are how the reduction stood, and why.
     """

@@ -269,11 +269,8 @@ def waiting(state: RunState, event: e.Waiting, _: float) -> Changes:
 def decided(state: RunState, event: e.Decided, at: float) -> Changes:
     candidate, accepts = tried(state, event), event.decision == "accept"
     words = f"{'accepted' if accepts else 'rejected'} {_described(state, candidate)}"
-    changes = {
-        "status": "paused" if state.paused else "running",
-        "waiting_candidate": None,
-        **decision(state, at, event.decision, words),
-    }
+    status = "paused" if state.paused else "running"
+    changes = {"status": status, "waiting_candidate": None, **decision(state, at, event.decision, words)}
     if accepts:
         return changes | {"round": replace(current(state), accepted=candidate.index)}
     rejected = replace(candidate, verdict="rejected")

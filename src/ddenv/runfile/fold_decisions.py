@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ddenv.environment import Environment
 from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
-from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal
+from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.text import count, first_of, plain, truncated
@@ -98,12 +98,11 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
     }
     state = state.changed(**changes)
     nodes = with_node(state.nodes, replace(node, rejected=False, lost_rate=False))
-    if event.rejected is None:
-        words = f"went to {place(node)}"
-    else:
+    kind, words = "go_back", f"went to {place(node)}"
+    if event.rejected is not None:
         last = nodes[event.rejected]
         nodes = with_node(nodes, replace(last, rejected=True))
-        words = f"took back {last.what}: {count(len(node.environment), 'model')} again"
+        kind, words = "undo", f"took back {last.what}: {count(len(node.environment), 'model')} again"
         changes |= refused(state, state.environments[last.id], "undone", None)
     gone = state.pinned.difference(node.environment)
     words += _unpinned(state, gone)
@@ -119,7 +118,7 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
         "nodes": nodes,
         "pinned": state.pinned - gone,
         **at_node(state, node),
-        **decision(state, at, "undo" if event.rejected is not None else "go_back", words),
+        **decision(state, at, kind, words),
     }
 
 
@@ -222,22 +221,15 @@ def refused(state: RunState, environment: Environment, verdict: str, round: int 
 
 def failures_at(state: RunState, number: int) -> tuple[int, ...]:
     """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
-    accepted: list[int] = []
-    node, first = state.nodes[number], origin(state, number)
-    while node.parent is not None and node.number != first.number:
-        if node.how == "accepted" and node.evidence_test is not None:
-            accepted.append(node.evidence_test)
-        node = state.nodes[node.parent]
-    f = () if first.evidence_test is None else (first.evidence_test,)
-    return (*f, *reversed(accepted))
+    way, first = path(state.nodes, number), origin(state, number)
+    counted = (node for node in way[way.index(first) :] if node is first or node.how == "accepted")
+    return tuple(node.evidence_test for node in counted if node.evidence_test is not None)
 
 
 def origin(state: RunState, number: int) -> Node:
     """Where f in a node was seen first: the whole world, or the start of a branch that reduces another failure."""
-    node = state.nodes[number]
-    while node.how != "instead" and node.parent is not None:
-        node = state.nodes[node.parent]
-    return node
+    way = path(state.nodes, number)
+    return next((node for node in reversed(way) if node.how == "instead"), way[0])
 
 
 def exact_runs(state: RunState) -> tuple[int, ...]:
@@ -258,16 +250,14 @@ def rested_on(state: RunState) -> tuple[Test, ...]:
 def left_round(state: RunState) -> Changes:
     """The current search and its round are over."""
     past = tuple(replace(certificate, past=True) for certificate in state.certificates)
-    changes: Changes = {
+    return {
         "confirming": False,
         "certificates": past,
         "isolations": without_open(state),
         "margins": None if state.margins is None else replace(state.margins, broken_off=not state.margins.ended),
+        "round": None if state.round is None else replace(state.round, done=True),
         **waits_no_more(state),
     }
-    if state.round is not None and not state.round.done:
-        changes["round"] = replace(state.round, done=True)
-    return changes
 
 
 def without_open(state: RunState) -> tuple[Isolation, ...]:

@@ -15,10 +15,9 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True)
 class PersistentTuple(Sequence[Item]):
-    """An immutable sequence: `added` and `changed` return a new one that shares all unchanged chunks.
-
-    A slice is a plain tuple. It equals other ones with equal items, but no plain tuple. All chunks but the last hold
-    `CHUNK` items, so equal items are always in equal chunks.
+    """An immutable sequence: `added` and `changed` return a new one that shares all unchanged chunks. A slice is a plain tuple. It
+    equals other ones with equal items, but no plain tuple. All chunks but the last hold `CHUNK` items, so equal items are always in
+    equal chunks.
     """
 
     chunks: tuple[tuple[Item, ...], ...] = ()
@@ -37,7 +36,7 @@ class PersistentTuple(Sequence[Item]):
 
     def changed(self, index: int, item: Item) -> PersistentTuple[Item]:
         """One with `item` at `index`, which may be negative. Raises IndexError if there is no such index."""
-        number, place = divmod(self._position(index), CHUNK)
+        number, place = divmod(range(len(self))[index], CHUNK)
         # Joined slices would be copied twice.
         chunk, chunks = list(self.chunks[number]), list(self.chunks)
         chunk[place] = item
@@ -63,7 +62,7 @@ class PersistentTuple(Sequence[Item]):
     def __getitem__(self, index: int | slice) -> Item | tuple[Item, ...]:
         if isinstance(index, slice):
             return tuple(self[place] for place in range(*index.indices(len(self))))
-        number, place = divmod(self._position(index), CHUNK)
+        number, place = divmod(range(len(self))[index], CHUNK)
         return self.chunks[number][place]
 
     def __iter__(self) -> Iterator[Item]:
@@ -71,11 +70,3 @@ class PersistentTuple(Sequence[Item]):
 
     def __reversed__(self) -> Iterator[Item]:
         return chain.from_iterable(map(reversed, reversed(self.chunks)))
-
-    def _position(self, index: int) -> int:
-        """`index` counted from the beginning. Raises IndexError if there is no such index."""
-        length = len(self)
-        position = index + length if index < 0 else index
-        if not 0 <= position < length:
-            raise IndexError(index)
-        return position

@@ -70,10 +70,8 @@ def read(kind: Any, text: str) -> Any:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
     where = "".join(f"{part if str(part).isidentifier() else ascii(part)[:40]}: " for part in first["loc"][1:])
-    words = (
-        _PLAINLY.get(first["type"]) or f"{first['msg'].removeprefix('Input ')}, found {reprlib.repr(first['input'])}"
-    )
-    raise Invalid(f"{where}{words}")
+    found = f"{first['msg'].removeprefix('Input ')}, found {reprlib.repr(first['input'])}"
+    raise Invalid(f"{where}{_PLAINLY.get(first['type'], found)}")
 
 
 _PLAINLY = {

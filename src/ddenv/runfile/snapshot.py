@@ -49,16 +49,13 @@ class Snapshot:
         """The state's status, or "starting" or "lost" if the engine's lock says so."""
         if self.engine == "starting":
             return "starting"
-        if self.state.ended or self.behind or self.past or self.engine == "alive" or self.state.status == "created":
-            return self.state.status
-        return "lost"
+        known = self.state.ended or self.behind or self.past or self.state.status == "created"
+        return self.state.status if known or self.engine == "alive" else "lost"
 
     @property
     def running(self) -> tuple[Test, ...]:
         """The tests that run now, in the order they were started; none when no engine is there to run them."""
-        if self.engine != "alive" and not self.past:
-            return ()
-        return self.state.running_tests
+        return self.state.running_tests if self.engine == "alive" or self.past else ()
 
     @property
     def focus(self) -> Candidate | None:
@@ -70,10 +67,8 @@ class Snapshot:
             return None
         if self.state.waiting_candidate is not None:
             return current.candidates[self.state.waiting_candidate]
-        for test in self.running:
-            if test.phase == "round" and test.round == current.number and test.candidate is not None:
-                return current.candidates[test.candidate]
-        return None
+        of_round = (test for test in self.running if test.phase == "round" and test.round == current.number)
+        return next((current.candidates[test.candidate] for test in of_round if test.candidate is not None), None)
 
     def seconds(self, test: int) -> float | None:
         """How far a running test is, simulated s."""

@@ -9,22 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import (
-    Certificate,
-    Decision,
-    Isolation,
-    Leg,
-    Margins,
-    Node,
-    Physics,
-    Point,
-    Refusal,
-    Removal,
-    path,
-)
+from ddenv.runfile.progress import Isolation, Margins, Node, Physics, path
 
 if TYPE_CHECKING:
     from ddenv.runfile.events import BaselineFinished, Forecast, Place
+    from ddenv.runfile.progress import Certificate, Decision, Leg, Point, Refusal, Removal
 
 # The first of each two models rests on the second, or is tied to it.
 Pairs = tuple[tuple[str, str], ...]
@@ -219,14 +208,12 @@ class RunState:
     @property
     def certificate(self) -> Certificate | None:
         """The last certificate, if it is one of the current environment and no search began since."""
-        last = self.certificates[-1] if self.certificates else None
-        return last if last is not None and last.node == self.node and not last.past else None
+        return next((one for one in self.certificates[-1:] if one.node == self.node and not one.past), None)
 
     @property
     def isolating(self) -> Isolation | None:
         """The isolation that has no result yet, if there is one: an engine goes on with it."""
-        last = self.isolations[-1] if self.isolations else None
-        return None if last is None or last.ended or last.broken_off else last
+        return next((one for one in self.isolations[-1:] if not (one.ended or one.broken_off)), None)
 
     @property
     def isolated(self) -> Isolation | None:
@@ -253,9 +240,8 @@ class RunState:
     def running_tests(self) -> tuple[Test, ...]:
         """The running tests, in the order they were started."""
         # They are among the last ones, so the search starts from the end.
-        return tuple(
-            islice((test for test in reversed(self.tests) if test.outcome == "running"), self.tally["running"])
-        )[::-1]
+        running = (test for test in reversed(self.tests) if test.outcome == "running")
+        return tuple(islice(running, self.tally["running"]))[::-1]
 
     def outcomes(self) -> dict[str, int]:
         """Finished tests by outcome, in the order of `OUTCOMES`."""
@@ -281,9 +267,8 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One round: `partitions` in the order they are tried, and without how many parts f was `missed`.
-
-    `winner` is the index of the candidate that became the environment, `accepted` that of one that the user accepted, or None.
+    """One round: `partitions` in the order they are tried, and without how many parts f was `missed`. `winner` is the index of the
+    candidate that became the environment, `accepted` that of one that the user accepted, or None.
     """
 
     number: int
@@ -307,7 +292,6 @@ class Round:
 @dataclass(frozen=True, slots=True)
 class Split:
     """An environment and its disjoint parts, shared by all candidates of a round; by name, and as `whole` and `parts` by number.
-
     `pinned` models of the environment are in no part, but in every candidate. `letters` has the number of each part's letter: a
     part that was one in the round before keeps its letter.
     """
@@ -367,9 +351,8 @@ class Candidate:
     @property
     def size(self) -> int:
         """How many models it has."""
-        part = len(self.split.partitions[self.partition])
-        whole = len(self.split.environment)
-        return part + len(self.split.pinned) if self.kind == "partition" else whole - part
+        split, part = self.split, len(self.split.partitions[self.partition])
+        return part + len(split.pinned) if self.kind == "partition" else len(split.environment) - part
 
     @property
     def label(self) -> str:
@@ -380,9 +363,8 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it was tried in `node`.
-
-    `verdict` and `tests` are as in a candidate. `adopted`: it became the environment.
+    """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it was tried in `node`. `verdict`
+    and `tests` are as in a candidate. `adopted`: it became the environment.
     """
 
     number: int
@@ -457,9 +439,5 @@ def spent(state: RunState, until: float) -> float:
 
 def partition_letter(index: int) -> str:
     """A, B, ... Z, AA, AB, ... for partition 0, 1, ..."""
-    letters = ""
-    index += 1
-    while index:
-        index, rest = divmod(index - 1, 26)
-        letters = chr(ord("A") + rest) + letters
-    return letters
+    before, rest = divmod(index, 26)
+    return (partition_letter(before - 1) if before else "") + chr(ord("A") + rest)

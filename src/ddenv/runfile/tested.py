@@ -76,9 +76,7 @@ def pointed(moment: Moment) -> Candidate | None:
     from ddenv.runfile.events import Implied, OfCandidate, TestFinished, TestLost, TestStarted
 
     state, event = moment.after, moment.recorded.event
-    if state.round is None:
-        return None
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         row = made_for(state, state.tests[event.test - 1])
         return row if isinstance(row, Candidate) else None
-    return state.round.candidates[event.candidate] if isinstance(event, OfCandidate) else None
+    return state.round.candidates[event.candidate] if state.round and isinstance(event, OfCandidate) else None

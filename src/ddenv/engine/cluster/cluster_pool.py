@@ -251,7 +251,8 @@ class ClusterPool:
 
     def _attached(self, client: Client) -> None:
         self._client = client
-        self._client.subscribe_topic(self._topic, self._noted)
+        # The progress of running tests; it comes in Dask's own thread.
+        self._client.subscribe_topic(self._topic, lambda event: self._progress.update({event[1]["test"]: event[1]}))
         with warnings.catch_warnings():
             # A world with meshes is large, and goes out once.
             warnings.simplefilter("ignore")
@@ -265,10 +266,8 @@ class ClusterPool:
         self._client = self._sent = None
         for address in list(self._workers):
             self._gone(address)
-        self._news.append(
-            f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. To continue without it, stop the run "
-            "and resume it with --cluster here"
-        )
+        without = "To continue without it, stop the run and resume it with --cluster here"
+        self._news.append(f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. {without}")
 
     def _there(self, threads: Mapping[str, int]) -> None:
         gone = [address for address in self._workers if address not in threads]
@@ -296,10 +295,6 @@ class ClusterPool:
     def _wait_again(self, asked: Asked) -> None:
         self._progress.pop(asked.test, None)
         self._waiting = sorted([*self._waiting, asked], key=lambda one: one.test)
-
-    def _noted(self, event: tuple[float, Mapping[str, Any]]) -> None:
-        """A running test's progress; comes in Dask's own thread."""
-        self._progress[event[1]["test"]] = event[1]
 
     # Tests.
 
@@ -378,14 +373,13 @@ class ClusterPool:
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         """As `Pool.settle`, in the process here once that has made the run to compare with."""
-        asked: list[Callable[[], Start | Broken | None]] = []
+        asked: Callable[[], Start | Broken | None] | None = None
 
         def found() -> Start | Broken | None:
-            if self._home is None or self._reference is None:
-                return None
-            if not asked:
-                asked.append(self._home.settle(elements))
-            return asked[0]()
+            nonlocal asked
+            if asked is None and self._home is not None and self._reference is not None:
+                asked = self._home.settle(elements)
+            return None if asked is None else asked()
 
         return found
 
