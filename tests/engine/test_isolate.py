@@ -2,7 +2,6 @@
 
 import tempfile
 from contextlib import suppress
-from itertools import permutations
 from pathlib import Path
 from zlib import crc32
 
@@ -119,20 +118,6 @@ def test_killed_and_resumed_it_comes_to_the_same_end(after, jobs):
     assert removed(state) == removed(once)
     assert state.isolated.checks[-1].claims == once.isolated.checks[-1].claims
     assert (state.reason, state.minimal) == (once.reason, once.minimal)
-
-
-def test_a_world_that_passes_a_few_times_does_not_pass(tmp_path):
-    """Without the lucky model it passes with the first three seeds, and not again."""
-    verdicts = []
-    for lucky, *others in permutations(ELEMENTS[:3]):
-
-        def oracle(keep, seed, lucky=lucky, others=frozenset(others)):
-            return "similar" if others <= keep and not (lucky not in keep and seed < 3) else "pass"
-
-        state = work(reduced(tmp_path, needs(lucky, *others)), FakePool(oracle, 2))
-        assert lucky not in removed(state)
-        verdicts.append(tried(state).get(frozenset({lucky})))
-    assert "fails" in verdicts
 
 
 def test_what_only_the_seeds_of_the_search_let_pass_is_refuted_by_fresh_runs(tmp_path):

@@ -26,22 +26,7 @@ def parts(**simulation):
     return scenario, *load_parts(scenario)
 
 
-def test_a_run_that_starts_again_has_all_of_its_time():
-    told = []
-
-    class Again:
-        def run(self, keep, seed, progress, full):
-            for time_s in (0.0, 1.0, 0.0, 1.0):
-                progress(time_s, (0.0,) * 7, {})
-                time.sleep(PERIOD)
-
-    answered(Run(EVERYTHING, 1, True, 60.0), Again(), told.append)
-    assert [moment.time for moment in told] == [0.0, 1.0, 0.0, 1.0]
-    begun = [moment.begun for moment in told]
-    assert 0.0 < begun[0] == begun[1] < begun[2] == begun[3]
-
-
-def test_models_that_moved_are_told_while_a_test_runs():
+def test_models_that_moved_are_told_and_a_run_that_starts_again_has_all_of_its_time():
     told = []
     start, later = (1.0, 2.0, 0.1, 1.0, 0.0, 0.0, 0.0), (1.5, 2.0, 0.1, 1.0, 0.0, 0.0, 0.0)
 
@@ -52,8 +37,11 @@ def test_models_that_moved_are_told_while_a_test_runs():
                 time.sleep(PERIOD)
 
     answered(Run(EVERYTHING, 1, True, 60.0), Pushing(), told.append)
-    # A run that starts again has its models where they started, again.
+    # It has its models where they started, again.
     assert [moment.models for moment in told] == [{}, {}, {"ball": later}, {}]
+    assert [moment.time for moment in told] == [0.0, 1.0, 2.0, 0.0]
+    begun = [moment.begun for moment in told]
+    assert 0.0 < begun[0] == begun[1] == begun[2] < begun[3]
 
 
 @pytest.fixture

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from ddenv.runfile.events import SlicesRefuted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY
-from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.fake import drive
 from tests.engine.guided import Guided, at_once, until  # noqa: F401
 from tests.engine.killing import Killed, kill_after, killed, resumed
-from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.engine.reading import events, models_in, state_of
 from tests.engine.test_repeating import another_drake
@@ -33,16 +32,6 @@ def worlds_of(state):
 def journey(state):
     """The environments of a run in their order, and how it ended."""
     return [(node.how, node.environment) for node in state.nodes], state.minimal, state.reason
-
-
-def test_who_took_part_is_recorded_with_each_test(tmp_path):
-    path, pool = new_run(tmp_path, budget=3), FakePool(needs("wall"), 1)
-    pool.took_part = lambda keep, seed: keep & {"wall", "ball"} | {"ground_plane"} if seed else None
-    with pytest.raises(Exception, match="budget"):
-        drive(path, pool)
-    state = state_of(path)
-    took_part = [test.took_part and set(test.took_part.names(state.elements)) for test in state.tests]
-    assert took_part == [None, {"wall", "ball"}, {"wall", "ball"}]
 
 
 @given(made_by=SIMULATORS, accept=st.sampled_from(["first", "kept"]), seed=st.integers(0, 9))

@@ -65,13 +65,6 @@ def test_what_the_reduction_left_goes_first_and_then_twice_as_many():
     assert search(isolating((), 3), lambda _: True) == (NOTHING, [])
 
 
-def test_a_stack_goes_or_stays_as_a_whole():
-    stacks = Stacks.of(map(Environment.of, ([0], [1, 2, 3], [4, 5])))
-    removed, tried = search(stacks.expand(isolating(stacks.representatives, 1)), hits([Environment.of((2, 9))]))
-    assert removed == Environment.of((1, 2, 3))
-    assert all(each & stack in (NOTHING, stack) for each in tried for stack in stacks.by_first.values())
-
-
 @pytest.mark.parametrize(("reached", "runs"), [(0, 5), (3, 10), (8, 10), (55, 60)])
 def test_one_run_that_reaches_the_goal_does_not_pass(reached, runs):
     rule = Passing.of(reached, runs)

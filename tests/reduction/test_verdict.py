@@ -99,18 +99,6 @@ def test_candidates_that_are_judged_need_not_be_looked_at_again(rates, salt, rul
     assert standing(range(judged, count), shown, rule, first=judged)[0] == whole[judged:]
 
 
-@given(salt=salts, rule=rules, broken=st.integers(0, 3))
-def test_a_broken_run_that_decides_leaves_a_candidate_unknown_and_the_next_one_may_win(salt, rule, broken):
-    hits = outcomes([1.0, 1.0], salt)
-    runs, _ = decided_by(lambda *_: True, 0, rule)
-
-    def shown(candidate, run):
-        return "broken" if (candidate, run) == (0, broken) else hits(candidate, run)
-
-    verdicts, _ = standing([0, 1], shown, rule)
-    assert verdicts == (["unknown", "similar"] if broken < runs else ["similar"])
-
-
 def test_no_more_is_looked_at_than_workers_can_do():
     seen = []
 

@@ -132,7 +132,6 @@ def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
 
 
 def _give_up(file: RunFile) -> int:
-    """Ends the isolation that is open."""
     file.own()
     journal = Journal(file)
     if journal.state.isolating is not None:

@@ -88,7 +88,6 @@ class Bench:
 
     @property
     def _busy(self) -> int:
-        """How many tests are running."""
         return self._pool.busy + len(self._taken)
 
     def _key(self, test: Test) -> tuple[Environment, int, bool]:
@@ -224,7 +223,6 @@ class Bench:
             self.tick()
 
     def _look(self, wait: float) -> None:
-        """As `tick`; waits at most `wait` s for a test to finish."""
         self._look_around(wait)
         while self._control.holds:
             if self._control.may_search:

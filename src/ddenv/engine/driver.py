@@ -161,7 +161,6 @@ class Driver:
         return self._next_leg()
 
     def _next_leg(self) -> steps.Leg:
-        """The current search, or a new one where one is due."""
         journal = self._journal
         if journal.state.leg is None or journal.state.search_due:
             self._check_repeats()
@@ -234,12 +233,7 @@ class Driver:
             *split_pair(asked.pair),
             # Only rounds use it, after the first similar run.
             lambda: replace(self._evidence, trials=tuple(self._trials.values())),
-            prior=asked.prior,
             n_partitions=leg.n_partitions or asked.n_partitions,
-            candidates=asked.candidates,
-            complement_order=asked.complement_order,
-            growth=asked.growth,
-            skip=asked.skip,
             rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
             runs=lambda: leg.rule.misses,
             # The algorithm knows one model of each stack.
@@ -247,6 +241,7 @@ class Driver:
                 leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
             ),
             proves=leg.rule.proves,
+            **{name: getattr(asked, name) for name in ("prior", "candidates", "complement_order", "growth", "skip")},
         )
         searched = partial(search, asked.algorithm, guide=guide)
         return self._stacks.expand(tried_again(self._stacks.representatives, leg.again, searched))
@@ -438,7 +433,6 @@ class Driver:
     # The end.
 
     def _conclude(self) -> None:
-        """Ends the run with what its certificate shows."""
         journal = self._journal
         certificate = current(journal.state)
         if certificate is None or journal.state.search_due:

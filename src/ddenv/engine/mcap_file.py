@@ -268,7 +268,6 @@ def _wheels(seconds: float, joints: Sequence[str], speeds: Sequence[float]) -> M
 
 
 def _markers(models: Iterable[tuple[Model, str, str, Color]]) -> Message:
-    """A marker for each shape of models; each with its name, its frame, and the colour of shapes without one of their own."""
     drawn: list[Message | None] = []
     for model, name, frame, color in models:
         origin = Pose() if frame == MAP else model.links[0].pose.inverse()

@@ -152,7 +152,6 @@ class Pool:
         self._start(Job(test, replace(run, limit=limit), limit + self._margin))
 
     def _start(self, job: Job) -> _Slot:
-        """Starts a job on an idle worker, one that has prepared if possible."""
         slot = min((slot for slot in self._slots if slot.job is None), key=lambda slot: not slot.ready)
         slot.job, slot.result = job, None
         self._hand_over(slot)
@@ -176,7 +175,6 @@ class Pool:
         return ended
 
     def _ended(self) -> list[tuple[int, RunResult | Broken]]:
-        """Takes the results of tests, in the order of their numbers."""
         ended = []
         for slot in self._slots:
             if slot.job is not None and slot.job.test is not None and isinstance(slot.result, RunResult | Broken):

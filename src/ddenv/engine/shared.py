@@ -100,17 +100,14 @@ def result_of(place: Place) -> RunResult | None:
     trajectory = motions.pop(ROBOT, None)
     if trajectory is None or not len(trajectory):
         return None
+    same = ("failure", "simulated_seconds", "wall_seconds", "seed", "cut")
     return RunResult(
         outcome="pass" if test.outcome == "pass" else "failed",
-        failure=test.failure,
         trajectory=trajectory,
         motions=motions,
-        simulated_seconds=test.simulated_seconds,
-        wall_seconds=test.wall_seconds,
-        seed=test.seed,
         first_sensed=dict(test.first_sensed),
         first_touched=dict(test.first_touched),
-        cut=test.cut,
         took_part=None if test.took_part is None else frozenset(test.took_part.names(place.elements)),
         taken=place.path.stem,
+        **{name: getattr(test, name) for name in same},
     )

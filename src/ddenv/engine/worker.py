@@ -333,7 +333,6 @@ class WorkerProcess:
 
 
 def _family(pid: int) -> Iterator[int]:
-    """A process and all that it has started."""
     yield pid
     with suppress(OSError, ValueError):
         for thread in (PROC / str(pid) / "task").iterdir():

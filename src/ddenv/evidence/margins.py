@@ -251,7 +251,6 @@ def steps(asked: NumberAsked, up: bool) -> tuple[float, ...]:
 
 
 def _at(asked: NumberAsked, up: bool, distance: float) -> float:
-    """The value at this distance, in few digits."""
     value = asked.now + math.copysign(float(f"{distance:.2g}"), 1.0 if up else -1.0)
     return min(asked.high, max(asked.low, float(f"{value:.9g}")))
 

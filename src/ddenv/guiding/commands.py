@@ -391,12 +391,12 @@ class Pin(Asked):
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
-        state, names = now.state, _names_of(now.state, self.models)
+        names, kept = _names_of(now.state, self.models), frozenset(now.state.environment)
         if not names:
             return NO_MODELS
-        if gone := [name for name in names if name not in state.environment]:
+        if gone := [name for name in names if name not in kept]:
             return f"{named(gone[:1])} is removed already: go back (h) to an environment that has it, then pin it"
-        return "" if self.new(state) else "pinned already"
+        return "" if self.new(now.state) else "pinned already"
 
     def words(self, state: RunState) -> Words:
         return Words("pin", f"pinned, so that it always stays: {named(self.new(state))}. {new_search(state)}")

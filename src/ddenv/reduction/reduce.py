@@ -199,7 +199,7 @@ def reduce(
         caller.carry_out(steps.search_on(caller, leg))
         rests = [caller.left - Environment.of((element,)) for element in caller.left]
         minimal = all(standing([rest], caller.shown, leg.rule)[0] == ["dissimilar"] for rest in rests)
-    tests = [caller.calls[why] for why in ("baseline", "round", "certify")]
+    tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
     return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
 
 
@@ -349,7 +349,6 @@ class _Caller:
         return self._chain[-1]
 
     def _go(self, *chain: Environment) -> None:
-        """On, or back, along `chain`."""
         self._n_partitions.setdefault(chain[-1], self._n_partitions.get(self.left))
         self._chain = chain
         self.history.append(Step(self.calls.total(), self.left.names(self.names)))
@@ -384,7 +383,6 @@ def _names(elements: Iterable[str]) -> Names:
 
 
 def _trajectory(trajectory: Floats | None) -> Floats | None:
-    """The trajectory, shape (N, 5). Raises UserError."""
     if trajectory is None:
         return None
     try:

@@ -47,7 +47,6 @@ def _name(state: RunState, model: int | None) -> str | None:
 
 
 def _check_tests(state: RunState, tests: Sequence[int]) -> None:
-    """The tests that it rests on have to be there."""
     if max(tests, default=0) > len(state.tests):
         raise ValueError(tests)
 

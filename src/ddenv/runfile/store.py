@@ -166,6 +166,14 @@ class RunFile:
         try:
             self._db = sqlite3.connect(self.address, uri=True, isolation_level=None, timeout=wait)
             self._db.execute("PRAGMA trusted_schema = OFF")
+        except sqlite3.Error as error:
+            raise UserError(f"{path}: cannot be read: {error}") from None
+        self._check()
+
+    def _check(self) -> None:
+        """Raises UserError unless the open file is a readable run file."""
+        path = self.path
+        try:
             application = self._db.execute("PRAGMA application_id").fetchone()[0]
             version = self._db.execute("PRAGMA user_version").fetchone()[0]
         except sqlite3.OperationalError as error:
@@ -407,7 +415,6 @@ def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any],
 
 
 def _identity(path: Path) -> tuple[int, int]:
-    """Device and number of the file that a path names now."""
     try:
         found = os.stat(path)  # noqa: PTH116  (at each write, and twice as fast)
     except OSError:

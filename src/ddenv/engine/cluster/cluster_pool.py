@@ -196,7 +196,6 @@ class ClusterPool:
 
     @property
     def _tests(self) -> list[int]:
-        """The tests that workers make."""
         asked = (asked for worker in self._workers.values() for asked, _ in worker.asked.values())
         return [each.test for each in asked if each is not None]
 
