@@ -91,29 +91,30 @@ class Link:
 
     def _follow(self) -> None:
         while not self._closed.is_set():
-            if self._client is not None:
-                self._attached(self._client)
-                why = self._watch()
+            if (client := self._client) is not None:
+                self._attached(client)
+                why = self._watch(client)
                 if self._closed.is_set():
                     return
                 self._lost(why)
                 self._end()
-            self._closed.wait(AGAIN)
+            if self._closed.wait(AGAIN):
+                return
             try:
                 self._connect()
             except Exception:
                 # It is not there yet.
                 self._end()
 
-    def _watch(self) -> str:
+    def _watch(self, client: Client) -> str:
         """Tells who is there, as often as that changes, until the scheduler is lost; returns why."""
-        before, comm = None, self._client.scheduler_comm
+        before, comm = None, client.scheduler_comm
         while not self._closed.wait(PERIOD):
             # Dask connects again by itself, but has forgotten what it was asked.
-            if self._client.status != "running" or self._client.scheduler_comm is not comm:
+            if client.status != "running" or client.scheduler_comm is not comm:
                 return "the connection broke"
             try:
-                threads = dict(self._client.ncores())
+                threads = dict(client.ncores())
             except Exception as error:
                 return reason_of(error)
             if threads != before:
