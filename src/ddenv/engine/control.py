@@ -178,24 +178,21 @@ class Control:
         """Obeys a command exactly once, even if the engine is killed: its event holds the command's number."""
         self._journal.command = request.id
         try:
-            if why := self._why_not(request):
+            command: c.Command | None = None
+            try:
+                command = c.parse(request.kind, request.data)
+                why = c.refusal(command, c.Situation(self._journal.state))
+            except UserError as error:
+                why = str(error)
+            if why or command is None:
                 self._journal.record(events.CommandRefused(why))
+            else:
+                self._do(command)
         finally:
             # A stop raises an exception, and must not be read again.
             self._journal.command = None
             if self._journal.state.last_command < request.id:
                 self._handled(request)
-
-    def _why_not(self, request: Request) -> str:
-        """Obeys a command, or returns why it is not possible now."""
-        try:
-            command = c.parse(request.kind, request.data)
-        except UserError as error:
-            return str(error)
-        why = c.refusal(command, c.Situation(self._journal.state))
-        if not why:
-            self._do(command)
-        return why
 
     def _handled(self, request: Request) -> None:
         self._journal.command = request.id

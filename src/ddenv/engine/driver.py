@@ -31,7 +31,7 @@ from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
 from ddenv.runfile.fold_decisions import exact_runs
-from ddenv.runfile.progress import Certificate, Leg, Node
+from ddenv.runfile.progress import Certificate, Node
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
@@ -164,16 +164,24 @@ class Driver:
         journal = self._journal
         if journal.state.leg is None or journal.state.search_due:
             self._check_repeats()
-            state = journal.state
-            first = 1 if state.round is None else state.round.number + 1
-            rate = journal.rate_of_whole() if state.scenario["reduction"]["accept_rate"] == "kept" else 0.0
-            journal.record(events.LegStarted(first, state.nodes[state.node].n_partitions, rate))
+            before = journal.state
+            first = 1 if before.round is None else before.round.number + 1
+            rate = journal.rate_of_whole() if before.scenario["reduction"]["accept_rate"] == "kept" else 0.0
+            journal.record(events.LegStarted(first, before.nodes[before.node].n_partitions, rate))
         leg = journal.state.leg
         assert leg is not None
         self._reduction = Reduction.model_validate(leg.settings)
-        environment = journal.state.nodes[leg.node].environment
-        self._leg = self._leg_of(leg, environment)
-        self._bench.rule = self._leg.rule
+        # It may leave out whole stacks, and none with a model that is pinned.
+        state, asked, exact = journal.state, self._reduction, exact_runs(journal.state)
+        together = Stacks.of(map(journal.models, stacks_of(state, state.nodes[leg.node].environment)))
+        stays = journal.models(leg.pinned)
+        stays |= together.of_any(stays)
+        free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
+        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
+        rule = self._bench.rule = Acceptance(len(exact), exact=exact) if exact else rule
+        chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
+        search = leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again
+        self._leg = steps.Leg(*search)
         self._trials, self._unknown = {}, set()
         self._learn(leg.tests, leg.evidence_test)
         return self._leg
@@ -190,19 +198,6 @@ class Driver:
                 f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of the whole world, replayed "
                 f"with seed {test.seed}, differs; keep its rate: --accept-rate kept"
             )
-
-    def _leg_of(self, leg: Leg, environment: tuple[str, ...]) -> steps.Leg:
-        """A search of `environment`. It may leave out whole stacks, and none with a model that is pinned."""
-        journal, state = self._journal, self._journal.state
-        together = Stacks.of(map(journal.models, stacks_of(state, environment)))
-        stays = journal.models(leg.pinned)
-        stays |= together.of_any(stays)
-        free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        asked, exact = self._reduction, exact_runs(journal.state)
-        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
-        rule = Acceptance(len(exact), exact=exact) if exact else rule
-        chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
-        return steps.Leg(leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again)
 
     def _nodes(self, node: int) -> tuple[Node, ...]:
         """The way to a node, from where the same failures counted as f as now."""

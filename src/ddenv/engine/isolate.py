@@ -50,10 +50,9 @@ def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, 
 
 def _open(journal: Journal) -> Isolation:
     """The isolation that is under way. Raises Stopped if a decision of the user has ended it."""
-    now = journal.state.isolating
-    if now is None:
+    if journal.state.isolating is None:
         raise Stopped(CHANGED)
-    return now
+    return journal.state.isolating
 
 
 def _begin(world: World, journal: Journal, at_least: int | None, before: str) -> None:

@@ -143,9 +143,8 @@ def subject_in(run: Path, folder: Path | None) -> Subject:
     """The world of a run; the user's own controller or simulator is that in `folder`, if given. Raises UserError."""
     with RunFile(run) as file:
         subject = read_subject(file)
-    if folder is None:
-        return subject
-    return replace(subject, scenario=subject.scenario.model_copy(update={"folder": folder.absolute()}))
+    update = {} if folder is None else {"folder": folder.absolute()}
+    return replace(subject, scenario=subject.scenario.model_copy(update=update))
 
 
 def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool) -> Reproduction:

@@ -83,9 +83,7 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
 
 
 def audit_is_due(state: RunState, phase: str = "") -> bool:
-    """Whether the next implied test has to be simulated: the first one, then one in `audit`; during the `phase` of a certificate
-    every one, while that is cheap.
-    """
+    """Whether the next implied test has to be simulated: one in `audit`; in the `phase` of a certificate each, while cheap."""
     if phase == CERTIFY:
         made = [test for test in state.finished_tests if test.implied_by is None]
         audits = sum(test.simulated_seconds for test in made if test.audits is not None and test.phase == CERTIFY)

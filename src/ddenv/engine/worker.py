@@ -250,9 +250,7 @@ class WorkerProcess:
 
     @property
     def pid(self) -> int:
-        pid = self._process.pid
-        assert pid is not None
-        return pid
+        return self._process.pid or 0
 
     @property
     def handles(self) -> list[Connection | int]:
@@ -318,9 +316,8 @@ class WorkerProcess:
 
     def _end(self) -> None:
         self._process.join()
-        self._line.close()
-        self._output.close()
-        self._process.close()
+        for each in (self._line, self._output, self._process):
+            each.close()
 
     def memory(self) -> int:
         """The memory in use by it and by what it has started, without what they share with others, bytes; 0 if unknown."""

@@ -63,13 +63,12 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
 
 
 def _split(environment: Partition, n: int, guide: Guide) -> list[Partition]:
-    if n == len(environment):
-        return one_model_partitions(environment)
-    partitions = guide.split(environment, n)
+    singles = one_model_partitions(environment)
+    partitions = singles if n == len(environment) else guide.split(environment, n)
     if guide.growth == "steady":
         return _halved(partitions, n, guide)
     # A split that leaves all models together does not count (paper, section III-B).
-    return partitions if len(partitions) > 1 else one_model_partitions(environment)
+    return partitions if len(partitions) > 1 else singles
 
 
 def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition]:

@@ -117,9 +117,8 @@ class Learner:
 
     def _classified(self, samples: Floats) -> Floats:
         """The classifier's probability for each of `samples` (K, F), shape (K,); one half before it has learnt anything."""
-        if self._classifier is None:
-            return np.full(len(samples), 0.5)
-        return np.asarray(self._classifier.predict_proba(samples)[:, 1])
+        known = self._classifier
+        return np.full(len(samples), 0.5) if known is None else np.asarray(known.predict_proba(samples)[:, 1])
 
 
 def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, float]:

@@ -120,10 +120,9 @@ def isolation_found(state: RunState, event: e.IsolationFinished) -> Changes:
 
 def _open(state: RunState) -> Isolation:
     """The isolation that is under way. Raises ValueError if there is none."""
-    last = state.isolating
-    if last is None:
+    if state.isolating is None:
         raise ValueError("no isolation")
-    return last
+    return state.isolating
 
 
 # Margins.

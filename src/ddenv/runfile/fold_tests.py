@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from ddenv.runfile.persistent import PersistentTuple
@@ -187,12 +188,8 @@ def _noted(state: RunState, test: Test) -> Changes:
 
 def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
     """The tests that were made for the same candidate, try or environment as `test`."""
-    made_for = _made_for(test)
-    return tuple(other.id for other in state.tests if _made_for(other) == made_for)
-
-
-def _made_for(test: Test) -> tuple[object, ...]:
-    return test.phase, test.round, test.candidate, test.trial, test.removal, test.node, test.without
+    made_for = attrgetter("phase", "round", "candidate", "trial", "removal", "node", "without")
+    return tuple(other.id for other in state.tests if made_for(other) == made_for(test))
 
 
 def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:

@@ -103,13 +103,13 @@ class Position:
 
     def _add_to_chapter(self, kind: str, before: RunState, after: RunState) -> None:
         id, models, last = after.revision, len(after.environment), self.chapters[-1] if self.chapters else None
+        begun = id, id, models, models, after.tests_done
         if kind == "round_started" and after.round is not None:
-            self.chapters.append(Chapter("round", after.round.number, id, id, models, models, after.tests_done))
+            self.chapters.append(Chapter("round", after.round.number, *begun))
         elif kind == "certificate_started":
-            number = after.certificates[-1].number
-            self.chapters.append(Chapter("certificate", number, id, id, models, models, after.tests_done))
+            self.chapters.append(Chapter("certificate", after.certificates[-1].number, *begun))
         elif last is None:
-            self.chapters.append(Chapter("baseline", 0, id, id, models, models, 0))
+            self.chapters.append(Chapter("baseline", 0, *begun))
         elif kind not in _UNSEEN and _goes_on(last, after):
             self.chapters[-1] = replace(last, last=id, left=models)
 
