@@ -168,20 +168,10 @@ def fix_failure(
     sound = [test for test in tests if test.outcome not in BROKEN and test.run >= chose]
     similar = sum(test.id in shown for test in sound)
     rate = similar / len(sound)
-    return BaselineFinished(
-        len(sound),
-        similar,
-        rate,
-        *wilson_interval(similar, len(sound)),
-        failure_test=failing[f].id,
-        position=failures[f].position,
-        miss_chance=miss_chance(rate, iterations),
-        iterations_95=iterations_needed(rate),
-        judged=_outcomes(judged),
-        broken=sum(test.outcome in BROKEN and test.run >= chose for test in tests),
-        seen=tuple(seen),
-        chose=chose,
-    )
+    broken = sum(test.outcome in BROKEN and test.run >= chose for test in tests)
+    shows = len(sound), similar, rate, *wilson_interval(similar, len(sound)), failing[f].id, failures[f].position
+    chance, needed = miss_chance(rate, iterations), iterations_needed(rate)
+    return BaselineFinished(*shows, chance, needed, _outcomes(judged), broken, seen=tuple(seen), chose=chose)
 
 
 def _outcomes(judged: Mapping[int, Judgement]) -> Outcomes:

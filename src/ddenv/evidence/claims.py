@@ -234,12 +234,8 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
         found.append(FreshRuns(node, without, shown, runs, *anytime_interval(shown, runs), outcomes, running))
     bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
     left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))
-    return tuple(
-        replace(
-            one,
-            is_left=number == 0,
-            bound=one.bound if one.claim or one.node != certificate.node else bounds.get(one.without),
-            is_chosen=one.node == first != certificate.node and whole_runs < left_runs,
-        )
-        for number, one in enumerate(found)
-    )
+    for place, one in enumerate(found):
+        bound = one.bound if one.claim or one.node != certificate.node else bounds.get(one.without)
+        is_chosen = one.node == first != certificate.node and whole_runs < left_runs
+        found[place] = replace(one, is_left=place == 0, bound=bound, is_chosen=is_chosen)
+    return tuple(found)

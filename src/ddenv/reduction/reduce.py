@@ -158,17 +158,11 @@ def reduce(
     failure = _place(path[-1, 1:4] if failure_pose is None and path is not None else failure_pose)
     if failure is None and failure_pose is not None:
         raise _wrong("failure_pose", PLACE, failure_pose)
-    known = Evidence(
-        names,
-        _each("positions", positions, names, PLACE, _place),
-        path,
-        failure,
-        _each("first_sensed", first_sensed, None, "a time in s", _time),
-        None if touched is None else frozenset(touched),
-        _each("traits", traits, names, "ddenv.Traits", lambda value: value if isinstance(value, Traits) else None),
-        delta=float(delta),
-        seed=int(seed),
-    )
+    places = _each("positions", positions, names, PLACE, _place)
+    times = _each("first_sensed", first_sensed, None, "a time in s", _time)
+    felt = None if touched is None else frozenset(touched)
+    alike = _each("traits", traits, names, "ddenv.Traits", lambda value: value if isinstance(value, Traits) else None)
+    known = Evidence(names, places, path, failure, times, felt, alike, delta=float(delta), seed=int(seed))
 
     def begin(leg: steps.Leg) -> Search:
         guide = make_guide(

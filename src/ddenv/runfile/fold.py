@@ -134,15 +134,12 @@ def engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
 
 
 def finished(state: RunState, event: e.Finished, at: float) -> Changes:
-    size, here = len(state.environment), state.nodes[state.node]
+    size, here = len(state.environment), replace(state.nodes[state.node], minimal=event.minimal)
     point = Point(state.tests_done, size, min(size, state.lower_bound))
-    return {
-        **_ended(state, "finished", event.reason, at),
-        "minimal": event.minimal,
-        "nodes": with_node(state.nodes, replace(here, minimal=event.minimal)),
-        # A run that is resumed at its end finishes again.
-        "history": state.history if state.history[-1] == point else (*state.history, point),
-    }
+    # A run that is resumed at its end finishes again.
+    history = state.history if state.history[-1] == point else (*state.history, point)
+    more = {"minimal": event.minimal, "nodes": with_node(state.nodes, here), "history": history}
+    return _ended(state, "finished", event.reason, at) | more
 
 
 def paused(state: RunState, _: e.Paused, __: float) -> Changes:
@@ -175,12 +172,8 @@ def supports(state: RunState, event: e.Supports, _: float) -> Changes:
     def named(pairs: Iterable[e.Pair]) -> tuple[tuple[str, str], ...]:
         return tuple((state.elements[first], state.elements[second]) for first, second in pairs)
 
-    return {
-        "settling": False,
-        "unsettled": event.why,
-        "supports": named(event.pairs),
-        "ties": None if event.ties is None else named(event.ties),
-    }
+    ties = None if event.ties is None else named(event.ties)
+    return {"settling": False, "unsettled": event.why, "supports": named(event.pairs), "ties": ties}
 
 
 def environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> Changes:
@@ -213,25 +206,17 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     had = {} if before is None else dict(zip(before.parts, before.letters, strict=True))
     kept = {had[part] for part in parts if part in had}
     free = (number for number in itertools.count() if number not in kept)
-    split = Split(
-        whole.names(state.elements),
-        tuple(tuple(map(state.elements.__getitem__, part)) for part in event.partitions),
-        event.pinned.names(state.elements),
-        whole,
-        parts,
-        event.pinned,
-        tuple(had[part] if part in had else next(free) for part in parts),
-    )
+    letters = tuple(had[part] if part in had else next(free) for part in parts)
+    names = tuple(tuple(map(state.elements.__getitem__, part)) for part in event.partitions)
+    always = event.pinned.names(state.elements)
+    split = Split(whole.names(state.elements), names, always, whole, parts, event.pinned, letters)
     candidates = PersistentTuple.of(
         Candidate(index, kind, partition, split, distance)
         for index, (kind, partition, distance) in enumerate(event.candidates)
     )
     here = replace(state.nodes[state.node], n_partitions=event.n_partitions)
-    return {
-        **waits_no_more(state),
-        "round": Round(event.round, event.n_partitions, split, candidates),
-        "nodes": with_node(state.nodes, here),
-    }
+    round = Round(event.round, event.n_partitions, split, candidates)
+    return {**waits_no_more(state), "round": round, "nodes": with_node(state.nodes, here)}
 
 
 def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
@@ -290,15 +275,13 @@ def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes
     round = current(state)
     changes: Changes = {"round": replace(round, done=True), "rounds_done": round.number}
     if state.leg is not None:
-        last = len(round.candidates) if round.winner is None else round.winner + 1
+        last, evidence = len(round.candidates), None
+        if round.winner is not None:
+            last, evidence = round.winner + 1, state.evidence_test
         judged = [one for one in round.candidates[:last] if one.verdict in JUDGED]
-        past = PastRound(
-            digest(round.split.parts),
-            round.winner,
-            None if round.winner is None else state.evidence_test,
-            tuple(dict.fromkeys(test for one in judged for test in one.tests)),
-            tuple(one.index for one in judged if one.verdict == "unknown"),
-        )
+        tests = tuple(dict.fromkeys(test for one in judged for test in one.tests))
+        unknown = tuple(one.index for one in judged if one.verdict == "unknown")
+        past = PastRound(digest(round.split.parts), round.winner, evidence, tests, unknown)
         changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
     return changes
 

@@ -52,12 +52,9 @@ def trial_judged(state: RunState, event: e.TrialJudged, _: float) -> Changes:
 
 def adopted(state: RunState, event: e.Adopted, at: float) -> Changes:
     trial = replace(state.trials[event.trial - 1], adopted=True)
-    words = f"adopted {trial.label}: {count(trial.size, 'model')}"
-    return {
-        **with_trial(state, trial),
-        **arrived(state, event.environment, event.evidence_test, at, "adopted", trial.label, trial.tests),
-        **decision(state, at, "adopt", words),
-    }
+    said = decision(state, at, "adopt", f"adopted {trial.label}: {count(trial.size, 'model')}")
+    there = arrived(state, event.environment, event.evidence_test, at, "adopted", trial.label, trial.tests)
+    return with_trial(state, trial) | there | said
 
 
 def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Changes:
@@ -137,18 +134,9 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
     """A search starts from the current environment."""
     if state.evidence_test is None:
         raise ValueError("f is not known")
-    leg = Leg(
-        first_round=event.round,
-        node=state.node,
-        n_partitions=event.n_partitions,
-        pinned=state.pinned,
-        evidence_test=state.evidence_test,
-        settings=state.scenario["reduction"],
-        rate=event.rate,
-        steps_back=state.steps_back,
-        tests=tuple(test for test in state.judged if state.tests[test - 1].is_finished),
-        again=state.again,
-    )
+    start = event.round, state.node, event.n_partitions, state.pinned, state.evidence_test, state.scenario["reduction"]
+    tests = tuple(test for test in state.judged if state.tests[test - 1].is_finished)
+    leg = Leg(*start, event.rate, state.steps_back, tests, state.again)
     return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
 
 

@@ -113,15 +113,11 @@ def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> C
     judged = state.changed(**changes)
     rated = (test.id for test in judged.tests if test.phase == "baseline" and test.run >= event.chose)
     runs, shown = seen(judged.tests, rated)
-    return {
-        **changes,
-        "baseline": event,
-        "evidence_test": first,
-        "failures": (first,),
-        "nodes": with_node(state.nodes, replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown)),
-        "history": (*state.history, Point(judged.tests_done, len(state.environment))),
-        "status": state.status if state.paused else "running",
-    }
+    whole = replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown)
+    history = (*state.history, Point(judged.tests_done, len(state.environment)))
+    status = state.status if state.paused else "running"
+    changes |= {"baseline": event, "evidence_test": first, "failures": (first,), "history": history, "status": status}
+    return changes | {"nodes": with_node(state.nodes, whole)}
 
 
 # Their outcomes.
