@@ -171,8 +171,6 @@ class Bench:
         same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
         return None if same else result
 
-    # Tries of the user.
-
     def finish_trials(self) -> None:
         """Obeys the last commands, and makes the tests that the user asked for. Raises as `work`."""
         self._control.poll()
@@ -208,8 +206,6 @@ class Bench:
         if self._busy == 0:
             raise Stopped(f"the budget of {count(state.budget, 'test')} is used up")
         return True
-
-    # Looking around.
 
     def tick(self) -> None:
         """Obeys commands, records finished tests, shows the running robots. Raises as `work`: Changed where the user has changed

@@ -109,8 +109,6 @@ class _Isolator:
                 return removed
             self._bench.work(tests)
 
-    # What the procedure asks.
-
     refusals = 0
 
     @property
@@ -126,8 +124,6 @@ class _Isolator:
         return False
 
     refused_by_user = refused
-
-    # What it finds.
 
     def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
         _open(self._journal)

@@ -89,8 +89,6 @@ class Journal:
         last = self.state.certificates[-1:]
         return broken.phase != CERTIFY or any(claim.verdict == "unknown" for one in last for claim in one.claims)
 
-    # Environments.
-
     def models(self, names: Iterable[str]) -> Environment:
         """The environment of those of these models that are elements."""
         return Environment.of(self._number_of[name] for name in names if name in self._number_of)
@@ -141,8 +139,6 @@ class Journal:
         """Whether the user refused it, or it is part of what lost the rate of what counts as f now."""
         lost = (lost for failures, lost in self.state.lost if failures == self.state.failures)
         return self.is_refused_by_user(environment) or any(environment <= one for one in lost)
-
-    # Tests.
 
     def test(self, environment: Environment, run: int, full: bool = False) -> Test | None:
         """The finished test of a run; None if it has to be made. With `full` only a run to its end counts."""

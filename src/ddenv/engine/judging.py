@@ -188,9 +188,6 @@ def _no_failure(tests: Sequence[Test]) -> str:
     return f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce"
 
 
-# What the schemas see.
-
-
 def trajectory_of(rows: np.ndarray) -> np.ndarray:
     """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to (N, 5)."""
     return np.column_stack([rows[:, :4], headings(rows[:, 4:])])

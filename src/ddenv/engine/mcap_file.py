@@ -170,9 +170,6 @@ def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
             return
 
 
-# The messages.
-
-
 def messages(run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Subject) -> Iterator[Row]:
     """What is still, what moved, and what the robot sensed and did in a run of these models."""
     goal, removable, base = subject.scenario.goal, frozenset(subject.elements), f"{run}/base_link"
@@ -276,9 +273,6 @@ def _markers(models: Iterable[tuple[Model, str, str, Color]]) -> Message:
             own = item.color if isinstance(item, Visual) else None
             drawn.append(marker(len(drawn) + 1, frame, name, origin @ item.pose, item.shape, own or color))
     return {"markers": [one for one in drawn if one]}
-
-
-# The parts of messages.
 
 
 def nanoseconds(seconds: float) -> int:

@@ -231,8 +231,6 @@ class _Caller:
         self._began: list[NamedRound] = []
         self._certificates = 0
 
-    # What the procedure asks.
-
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         return self._known.get((environment, run))
 
@@ -261,8 +259,6 @@ class _Caller:
 
     def algorithm(self, leg: steps.Leg) -> Search:
         return self.begin(leg)
-
-    # What it finds.
 
     def carry_out(self, work: steps.Work[object]) -> None:
         """To the end. Raises UserError if the failure never shows in the baseline."""

@@ -75,9 +75,6 @@ def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
     return arrived(state, event.environment, event.evidence_test, at, how, what, runs) | said
 
 
-# Isolation.
-
-
 def isolation_started(state: RunState, event: e.IsolationStarted, _: float) -> Changes:
     sound = 0 < event.rather_than < event.wanted < 1
     if event.isolation != len(state.isolations) + 1 or not sound or state.baseline is None:
@@ -125,9 +122,6 @@ def _open(state: RunState) -> Isolation:
     return state.isolating
 
 
-# Margins.
-
-
 def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Changes:
     """Numbers that were asked for before keep their runs, as long as they are about the same models."""
     names = tuple(asked.name for asked in event.numbers)
@@ -160,9 +154,6 @@ def open_margins(state: RunState) -> Margins:
     if state.margining is None:
         raise ValueError("no search for margins")
     return state.margining
-
-
-# Slices.
 
 
 def sliced(state: RunState, event: e.Sliced, at: float) -> Changes:

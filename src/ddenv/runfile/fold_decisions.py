@@ -140,9 +140,6 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
     return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
 
 
-# What several events do.
-
-
 def arrived(
     state: RunState,
     number: int,

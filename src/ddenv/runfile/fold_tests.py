@@ -120,9 +120,6 @@ def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> C
     return changes | {"nodes": with_node(state.nodes, whole)}
 
 
-# Their outcomes.
-
-
 def with_outcomes(state: RunState, judged: e.Outcomes) -> Changes:
     """The outcomes of tests, updated after f was fixed or another failure began to count as f."""
     for test, outcome in judged.outcomes.items():
@@ -162,9 +159,6 @@ def rested_upon(before: RunState, event: e.Event) -> Changes:
     return {"rests_on": before.rests_on | sum(1 << test for test in new), "judged": judged}
 
 
-# How often f showed in each environment that the run reached.
-
-
 def _noted(state: RunState, test: Test) -> Changes:
     """The nodes, with a finished test entered where it ran the whole environment of one."""
     node: Node | None = None
@@ -201,9 +195,6 @@ def counted_again(nodes: Sequence[Node], tests: Sequence[Test]) -> tuple[Node, .
 
 def _is_sound(test: Test) -> bool:
     return test.is_finished and test.outcome not in BROKEN
-
-
-# What other files of the fold change, too.
 
 
 def with_node(nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:

@@ -73,8 +73,6 @@ class Position:
         # The moments between two kept states that were visited last.
         self._near: list[Moment] = []
 
-    # As the run grows.
-
     def note(self, kind: str, before: RunState, after: RunState) -> None:
         """Notes an event of this kind between two states. One that was noted already is ignored."""
         id = after.revision
@@ -112,8 +110,6 @@ class Position:
             self.chapters.append(Chapter("baseline", 0, *begun))
         elif kind not in _UNSEEN and _goes_on(last, after):
             self.chapters[-1] = replace(last, last=id, left=models)
-
-    # Where it is.
 
     @property
     def now(self) -> RunState:
@@ -157,8 +153,6 @@ class Position:
     def start_of(self, test: int) -> Moment | None:
         """The moment in which a test started; None if there is no such test."""
         return self.moment(self._starts[test - 1]) if 0 < test <= len(self._starts) else None
-
-    # Moves.
 
     def go(self, id: int | None) -> None:
         """Goes to the last event up to `id`, or to the end."""

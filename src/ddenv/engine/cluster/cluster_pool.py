@@ -296,8 +296,6 @@ class ClusterPool:
         self._progress.pop(asked.test, None)
         self._waiting = sorted([*self._waiting, asked], key=lambda one: one.test)
 
-    # Tests.
-
     def _send(self) -> None:
         """Hands tests to the workers with the most free threads, in the order of the algorithm."""
         while self._waiting and self._client is not None:
@@ -368,8 +366,6 @@ class ClusterPool:
 
     def _leave_out(self, worker: _Worker, why: str) -> None:
         self._news.append(f"worker {worker.name} is not used: {why}")
-
-    # As of `Pool`.
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         """As `Pool.settle`, in the process here once that has made the run to compare with."""
