@@ -247,9 +247,8 @@ class Driver:
     def certificate_due(self):
         self._step("certificate_due")
         self.now.certificates += 1
-        number = self.now.certificates
-        terms = Terms(2 / 3, 0.8, error_of(number), self.world.baseline_runs)
-        return Certificate(number, FIRST_FRESH + EACH_CERTIFICATE * number, terms)
+        terms = Terms(2 / 3, 0.8, error_of(self.now.certificates), self.world.baseline_runs)
+        return Certificate(FIRST_FRESH + EACH_CERTIFICATE * self.now.certificates, terms)
 
     def certified(self, made):
         self._step("certified", made)

@@ -381,7 +381,7 @@ class Driver:
             journal.record(started)
             last = journal.state.certificates[-1]
         terms = terms_of(journal.state, last)
-        return steps.Certificate(last.number, last.first_run, terms, self._leg.rule.exact if last.seeds else ())
+        return steps.Certificate(last.first_run, terms, self._leg.rule.exact if last.seeds else ())
 
     def certified(self, made: steps.Certified) -> None:
         if not self._certificate.claims:

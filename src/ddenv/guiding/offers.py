@@ -148,19 +148,9 @@ def _any(state: RunState, models: Collection[str]) -> bool:
 
 
 # What the footer calls a command where the action's usual words do not fit.
-_FOOTER: dict[type, str] = {
-    c.StartEngine: "start",
-    c.Pause: "pause",
-    c.Resume: "resume",
-    c.Accept: "accept",
-    c.Adopt: "adopt",
-    c.AcceptOther: "count as f",
-    c.Reject: "reject",
-    c.Veto: "veto",
-    c.Unveto: "take back",
-    c.Undo: "undo",
-    c.Stop: "stop",
-}
+_USUAL = (c.Pause, c.Resume, c.Accept, c.Adopt, c.Reject, c.Veto, c.Undo, c.Stop)
+_FOOTER: dict[type, str] = {kind: kind.__name__.lower() for kind in _USUAL}
+_FOOTER |= {c.StartEngine: "start", c.AcceptOther: "count as f", c.Unveto: "take back"}
 
 # By the names of the run screen's actions. Its other actions change nothing in the run.
 ACTIONS: dict[str, Meaning] = {

@@ -100,7 +100,6 @@ class Certificate:
     what these runs of the search show; its fresh runs say how often f shows with other seeds.
     """
 
-    number: int
     first_run: int
     terms: Terms
     exact: tuple[int, ...] = ()

@@ -314,7 +314,7 @@ class _Caller:
         self._certificates += 1
         error = error_of(self._certificates)
         terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, at_once=True)
-        return steps.Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+        return steps.Certificate(FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
 
     def certified(self, made: steps.Certified) -> None:
         claims = []
