@@ -252,14 +252,14 @@ def seen(state: RunState) -> tuple:
 
 @given(st.lists(moves, max_size=40))
 def test_a_state_is_never_changed_by_later_events(steps):
-    with patch("ddenv.runfile.persistent.CHUNK", 3):
+    with patch("ddenv.runfile.state.CHUNK", 3):
         kept = [(state, seen(state)) for state in grown(steps)]
         assert all(seen(earlier) == was for earlier, was in kept)
 
 
 @given(st.lists(moves, max_size=40))
 def test_what_is_counted_along_the_way_is_what_the_tests_say(steps):
-    with patch("ddenv.runfile.persistent.CHUNK", 3):
+    with patch("ddenv.runfile.state.CHUNK", 3):
         for state in grown(steps):
             tests = list(state.tests)
             done = [test for test in tests if test.outcome not in ("running", "lost")]

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.runfile.persistent import CHUNK, PersistentTuple
+from ddenv.runfile.state import CHUNK, PersistentTuple
 
 lengths = st.sampled_from([0, 1, 2, CHUNK - 1, CHUNK, CHUNK + 1, 2 * CHUNK, 2 * CHUNK + 5])
 ends = st.none() | st.integers(-3 * CHUNK, 3 * CHUNK)

@@ -9,9 +9,8 @@ from textual.app import App
 
 from ddenv.runfile import state as runs_state
 from ddenv.runfile.fold import fold
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Candidate, Round, RunState, Split, Trial
+from ddenv.runfile.state import Candidate, PersistentTuple, Round, RunState, Split, Trial
 from ddenv.workbench.run.candidate_rows import COLUMNS, fitting, listed, words
 from ddenv.workbench.run.candidates import Candidates
 

@@ -9,9 +9,9 @@ from textual.app import App
 
 from ddenv import __version__
 from ddenv.runfile.fold import fold
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node
 from ddenv.runfile.snapshot import Snapshot
+from ddenv.runfile.state import PersistentTuple
 from ddenv.workbench.run.status import Header, Status, branch_of, facts, fitted, heading
 
 

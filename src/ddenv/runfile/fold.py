@@ -17,9 +17,8 @@ from ddenv.runfile import events as e
 from ddenv.runfile import fold_claims, fold_decisions, fold_tests
 from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
 from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, PastRound, Point
-from ddenv.runfile.state import Candidate, Round, RunState, Split, spent
+from ddenv.runfile.state import Candidate, PersistentTuple, Round, RunState, Split, spent
 from ddenv.runfile.store import Recorded
 from ddenv.text import count
 

@@ -8,9 +8,8 @@ from dataclasses import replace
 from ddenv.runfile import events as e
 from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, origin, searched_anew, without_open
 from ddenv.runfile.fold_tests import Changes, shared, with_node, with_removal, with_test
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Margins, Node, NumberTried, Returned
-from ddenv.runfile.state import OUTCOMES, RunState
+from ddenv.runfile.state import OUTCOMES, PersistentTuple, RunState
 
 
 def certificate_started(state: RunState, event: e.CertificateStarted, _: float) -> Changes:

@@ -7,9 +7,8 @@ from dataclasses import fields, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, Point, Removal
-from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunState, Test, Trial
+from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e

@@ -12,9 +12,8 @@ from textual.screen import Screen, ScreenResultType
 from textual.widgets import Static
 
 from ddenv.learn.race import Turn
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Round
+from ddenv.runfile.state import PersistentTuple, Round
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap

@@ -6,9 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Round, RunState, Split, Trial
+from ddenv.runfile.state import PersistentTuple, Round, RunState, Split, Trial
 from ddenv.runfile.supports import Names
 from ddenv.runs.playback import Played
 from ddenv.workbench.map.place import Way
