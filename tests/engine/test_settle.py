@@ -1,11 +1,6 @@
 """Which models rest on which: found once before the first test, known to views, and kept together where the user asks for it."""
 
-import tempfile
-from pathlib import Path
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from ddenv.engine import bench
 from ddenv.engine.journal import Journal
@@ -25,11 +20,10 @@ from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import Guided, numbers, until
-from tests.engine.killing import Killed, kill_after, killed, resumed, story
+from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs
 from tests.engine.reading import events, state_of
-from tests.engine.test_certify import DRIFTING, at_rates, claims
-from tests.tiers import examples
+from tests.engine.test_certify import claims
 
 PAIRS = [("ball", "post"), ("beam", "far_box")]
 
@@ -37,16 +31,12 @@ PAIRS = [("ball", "post"), ("beam", "far_box")]
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
     """The small world, where the ball can move."""
-    return _world(tmp_path_factory.mktemp("world"))
-
-
-def _world(folder):
     text = (DATA / "wall.sdf").read_text()
     before, after = text.split('<model name="ball">')
     static = '<static>true</static>\n      <pose>4 4 0.3 0 0 0</pose>\n      <link name="link">'
     assert static in after
     inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
-    path = Path(folder) / "moving.sdf"
+    path = tmp_path_factory.mktemp("world") / "moving.sdf"
     free = after.replace(static, f'<pose>4 4 0.3 0 0 0</pose>\n      <link name="link">{inertial}', 1)
     path.write_text(f'{before}<model name="ball">{free}')
     return path
@@ -169,17 +159,3 @@ def test_a_pinned_model_holds_its_whole_stack(tmp_path, world):
     state = drive(path, guided)
     assert set(state.environment) == {"wall", "far_box", "beam"}
     assert set(claims(state)) == {None, "wall"}
-
-
-@given(salt=st.integers(0, 30), moments=st.lists(st.integers(1, 200), min_size=1, max_size=4), jobs=st.integers(1, 3))
-@examples(0.1)
-def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
-    oracle, asked = at_rates(salt, *DRIFTING), {"accept_rate": "kept", "keep_supports": True}
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as aside:
-        asked["world"] = _world(aside)
-        undisturbed = drive(new_run(Path(folder), **asked), pool(oracle, 1))
-        path = new_run(Path(folder), **asked)
-        killed(path, pool(oracle, jobs, salt), moments)
-        state = resumed(path, pool(oracle, jobs, salt))
-    assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
-    assert state.supports == undisturbed.supports

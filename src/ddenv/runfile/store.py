@@ -189,8 +189,8 @@ class RunFile:
             raise UserError(f"{path}: is not a ddenv run file")
         if not OLDEST_VERSION <= version <= SCHEMA_VERSION:
             which = "a newer ddenv" if version > SCHEMA_VERSION else "a ddenv from before its first release"
-            reads = f"this one reads format {SCHEMA_VERSION}"
-            raise UserError(f"{path}: was written by {which} (format {version}); {reads}")
+            words = f"was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
+            raise UserError(f"{path}: {words}")
         # A view or trigger in place of a table could run forever.
         if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
             raise UserError(f"{path}: damaged run file: its tables are not those of a run file")
