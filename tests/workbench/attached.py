@@ -44,9 +44,9 @@ class Session:
     async def look(self):
         """Lets the screen see what was written, without waiting for its clock."""
         self.screen.poll._looked = self.screen.poll._posed = -1e9
-        self.screen.following.look()
+        self.screen.look()
         while self.screen.poll.catching_up:
-            self.screen.following.look()
+            self.screen.look()
         await self.pilot.pause()
         assert not self.screen.snapshot.error or "nonsense" in self.screen.snapshot.error
 

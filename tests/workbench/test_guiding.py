@@ -398,7 +398,7 @@ async def test_a_run_file_that_is_gone_is_told_and_can_be_left(run):
     async with Attached(run) as session:
         run.let_go()
         run.path.unlink()
-        session.screen.following.look()
+        session.screen.look()
         await session.pilot.pause()
         assert "was deleted while it was open" in " ".join(session.text("#happening").split())
         await session.press("v", "u")

@@ -22,12 +22,7 @@ def signs() -> dict[str, Signs]:
             *LEGEND,
         ),
         "On the map of tests played back": (*OF_WAYS, ("a", "in only one of the two")),
-        "On the time of a test": (
-            ("●", "the instant shown"),
-            ("┤", "its end"),
-            ("▾", "touches a model"),
-            OF_WAYS[-1],
-        ),
+        "On the time of a test": (("●", "the instant shown"), ("┤", "its end"), ("▾", "touches a model"), OF_WAYS[-1]),
         "On the chart": (("╌", "at least this many models seem to be needed"), ("▲", "you decided something")),
         "How a test ended": (*_split(OUTCOME), ("▶", "running")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),

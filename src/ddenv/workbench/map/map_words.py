@@ -107,7 +107,9 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all). Names are shortened."""
-    words = [_standing(state, each.name), _size(each)]
+    width, depth = each.high[0] - each.low[0], each.high[1] - each.low[1]
+    shaped = bool(each.polygons) and math.isfinite(width + depth)
+    words = [_standing(state, each.name), f"{width:.3g} x {depth:.3g} m" if shaped else "no shapes"]
     if state.f_position is not None:
         words.append(f"{each.distance(state.f_position[:2]):.1f} m from f")
     for number, (name, moment) in enumerate(_sensed(state), start=1):
@@ -117,13 +119,6 @@ def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     text.append("".join(f" · {word}" for word in words if word), "not bold")
     text.truncate(columns or text.cell_len, overflow="ellipsis")
     return text
-
-
-def _size(each: Footprint) -> str:
-    width, depth = each.high[0] - each.low[0], each.high[1] - each.low[1]
-    if not each.polygons or not math.isfinite(width + depth):
-        return "no shapes"
-    return f"{width:.3g} x {depth:.3g} m"
 
 
 def _standing(state: RunState, name: str) -> str:

@@ -20,6 +20,8 @@ from ddenv.workbench.run.candidate_rows import Column, Item, Listed, Words, fitt
 from ddenv.workbench.shared.bindings import keys
 
 STRONG, WEAK = Style(bold=True), Style(dim=True)
+# More rows than there are.
+FAR = 1_000_000_000
 
 
 class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
@@ -37,8 +39,8 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         ("down", "down", "move(1)", "", "the candidate below: the map shows its models"),
         ("page_up", "pageup", "page(-1)", "", "one page of candidates up"),
         ("page_down", "pagedown", "page(1)", "", "one page of candidates down"),
-        ("first", "home,ctrl+home", "first", "", "the first candidate"),
-        ("last", "end,ctrl+end", "last", "", "the last candidate"),
+        ("first", "home,ctrl+home", f"move({-FAR})", "", "the first candidate"),
+        ("last", "end,ctrl+end", f"move({FAR})", "", "the last candidate"),
         ("choose", "enter", "move(0)", "", "stay on this candidate"),
     )
 
@@ -94,12 +96,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     def action_page(self, pages: int) -> None:
         self._by_hand(self.cursor_row + pages * self._page)
-
-    def action_first(self) -> None:
-        self._by_hand(0)
-
-    def action_last(self) -> None:
-        self._by_hand(len(self._listed) - 1)
 
     def on_click(self, event: events.Click) -> None:
         row = event.y - 1 + self.scroll_offset.y
@@ -161,8 +157,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
-        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
-        segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
+        words = cells.get(last.name, "")
+        emphasis = STRONG if words.startswith(("●", "▶", "?")) else WEAK if words.startswith(("○", "⊘")) else Style()
+        segments = [Segment(row, style), Segment(_aligned(last, f"  {words}"), style + emphasis)]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 
 
@@ -173,9 +170,3 @@ def _aligned(column: Column, text: str) -> str:
     before = "" if column.name in ("#", "environment", "verdict") else " "
     room = column.width - len(before)
     return before + (set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…")
-
-
-def _emphasis(words: str) -> Style:
-    if words.startswith(("●", "▶", "?")):
-        return STRONG
-    return WEAK if words.startswith(("○", "⊘")) else Style.null()

@@ -17,7 +17,7 @@ from ddenv.guiding.situation import Situation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
-from ddenv.settings import Setting, Value
+from ddenv.settings import Value
 from ddenv.text import plain
 from ddenv.words.methods import KINDS, note, paragraph
 from ddenv.workbench.help.hints import Framed
@@ -57,33 +57,23 @@ class Change(ModalScreen[course.Change | None]):
                 for kind in KINDS:
                     with Horizontal(classes="row"):
                         yield Static(kind, classes="label", markup=False)
-                        yield self._select(kind)
+                        now = self._now[kind]
+                        # A schema of another package may not be installed here: it can stay.
+                        known = (*names(kind), *(() if now in names(kind) else (now,)))
+                        yield _select(kind, [(Text(plain(name)), name) for name in known], now)
                     yield Static("", id=f"{kind}-meaning", classes="meaning", markup=False)
                 for one in OTHERS:
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
-                        yield self._field(one)
+                        now = self._texts[one.name]
+                        names_of = [(Text(name), name) for name in one.choices]
+                        yield _select(one.name, names_of, now) if one.choices else Entry(now, id=one.name)
                     empty = "; empty: no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Change", id="apply", variant="primary")
                 yield Button("Cancel", id="cancel")
-
-    def _select(self, kind: Kind) -> Select[str]:
-        now = self._now[kind]
-        # A schema of another package may not be installed here: it can stay.
-        known = (*names(kind), *(() if now in names(kind) else (now,)))
-        return Select(
-            [(Text(plain(name)), name) for name in known], value=now, allow_blank=False, id=kind, compact=True
-        )
-
-    def _field(self, one: Setting) -> Select[str] | Entry:
-        now = self._texts[one.name]
-        if one.choices:
-            names = [(name, name) for name in one.choices]
-            return Select(names, value=now, allow_blank=False, id=one.name, compact=True)
-        return Entry(now, id=one.name)
 
     @on(Select.Changed)
     def _explain(self) -> None:
@@ -92,10 +82,6 @@ class Change(ModalScreen[course.Change | None]):
             name = str(self.query_one(f"#{kind}", Select).value)
             words = note(kind, algorithm) or paragraph(kind, name)
             self.query_one(f"#{kind}-meaning", Static).update(Text(words))
-
-    def _text(self, one: Setting) -> str:
-        field = self.query_one(f"#{one.name}", Select) if one.choices else self.query_one(f"#{one.name}", Input)
-        return str(field.value)
 
     def _command(self) -> course.Change:
         """The command for the settings in the dialog. Raises UserError, which begins with the name of the first wrong field."""
@@ -106,8 +92,9 @@ class Change(ModalScreen[course.Change | None]):
         }
         wrong = []
         for one in OTHERS:
+            field = self.query_one(f"#{one.name}", Select if one.choices else Input)
             try:
-                asked[one.name] = course.typed(one.name, self._text(one))
+                asked[one.name] = course.typed(one.name, str(field.value))
             except UserError as error:
                 wrong.append(str(error))
         if wrong:
@@ -134,3 +121,7 @@ class Change(ModalScreen[course.Change | None]):
             self.action_apply()
         else:
             self.dismiss(None)
+
+
+def _select(name: str, options: list[tuple[Text, str]], now: str) -> Select[str]:
+    return Select(options, value=now, allow_blank=False, id=name, compact=True)

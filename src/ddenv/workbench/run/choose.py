@@ -1,4 +1,4 @@
-"""Lists to choose from: models by their names, the layers of the map, texts to copy."""
+"""Lists to choose from: models by their names, and the layers of the map."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.text import count, plain, shortened, truncated
+from ddenv.text import count, shortened
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.bindings import keys
@@ -89,8 +89,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._listed, self._found = found[:LISTED], len(found)
         options = self.query_one(OptionList)
         options.set_options(Option(self._prompt(name)) for name in self._listed)
-        if self._listed:
-            options.highlighted = 0
+        options.highlighted = 0 if self._listed else None
         self._show_found()
 
     def _show_found(self) -> None:
@@ -192,10 +191,3 @@ class Layers(ModalScreen[None]):
         if (place := options.highlighted) is not None:
             self._world.toggle_layer(self._names[place])
             options.replace_option_prompt_at_index(place, self._prompt(self._names[place]))
-
-
-def copied(what: str, text: str) -> Text:
-    lines = text.splitlines()
-    more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
-    shown = truncated(plain(lines[0]), 40) if lines else ""
-    return Text(f"{what:<26} ", no_wrap=True).append(f"{shown}{more}", "dim")

@@ -5,8 +5,6 @@ A key that guides the run has the action `guide`, with its name in `ddenv.guidin
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from functools import partial
 from typing import TYPE_CHECKING
 
 from textual.binding import Binding, BindingType
@@ -149,17 +147,13 @@ class KeyOffers:
     @property
     def pointed(self) -> Pointed:
         """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
-        names, elements, table = self._selection(), self._screen.poll.snapshot.state.elements, self._screen.table
-        known = tuple(name for name in elements if name in names) if names else ()
+        world, table = self._screen.world, self._screen.table
+        names = frozenset(world.selection)
+        if not names and world.has_focus and (name := world.model_at_cursor) is not None:
+            names = frozenset((name,))
+        known = tuple(name for name in self._screen.poll.snapshot.state.elements if name in names) if names else ()
         row = table.under_cursor if table.is_attached and table.is_on_screen else None
         return Pointed(row, table.following, (*known, *sorted(names.difference(known))))
-
-    def _selection(self) -> frozenset[str]:
-        world = self._screen.world
-        if world.selection:
-            return frozenset(world.selection)
-        name = world.model_at_cursor if world.has_focus else None
-        return frozenset() if name is None else frozenset((name,))
 
     def show(self, footer: KeyFooter) -> None:
         now, pointed = self._screen.asking.situation, self.pointed
@@ -185,12 +179,10 @@ class KeyOffers:
         elif name == "change":
             opening.change()
         elif name in TITLES:
-            environment = self._screen.poll.snapshot.state.environment
-            opening.choose(TITLES[name], environment, True, partial(self._chosen, name), self.pointed.models)
 
-    def _chosen(self, name: str, models: Collection[str]) -> None:
-        now = offer(name, self._screen.asking.situation, Pointed(models=tuple(models)))
-        if now.command is None:
-            self._screen.asking.refuse(now.why_not)
-        else:
-            self._screen.asking.ask(now.command)
+            def chosen(models: tuple[str, ...]) -> None:
+                now = offer(name, asking.situation, Pointed(models=models))
+                asking.refuse(now.why_not) if now.command is None else asking.ask(now.command)
+
+            environment = self._screen.poll.snapshot.state.environment
+            opening.choose(TITLES[name], environment, True, chosen, self.pointed.models)

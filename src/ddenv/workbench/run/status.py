@@ -73,8 +73,6 @@ class Status(Widget):
 
         At an earlier moment of the run, `place` is its number, and the number of moments.
         """
-        if (scene, asked, place) == self._besides and snapshot is self._snapshot:
-            return
         self._snapshot, self._besides = snapshot, (scene, asked, place)
         now = facts(snapshot, scene, asked) if place is None else facts_of_past(snapshot, scene, *place)
         if now != self._facts:
@@ -221,16 +219,9 @@ def title(snapshot: Snapshot) -> str:
     sign, word = STATUS.get(snapshot.status, ("·", snapshot.status))
     models = f"{len(state.environment)} of {count(len(state.elements), 'model')}"
     said = "" if snapshot.status in ("running", "baseline") else f", {word}"
-    return f"{sign} {_done(snapshot)}{name}: {models}{said}"
-
-
-def _done(snapshot: Snapshot) -> str:
-    left = remaining(snapshot.state, snapshot.engine == "alive")
-    if left is None:
-        return ""
-    done = snapshot.state.tests_done
-    part = 100 * done / max(1, done + left.tests[1])
-    return f"{STEP * int(part / STEP)} % "
+    left, done = remaining(state, snapshot.engine == "alive"), state.tests_done
+    part = "" if left is None else f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
+    return f"{sign} {part}{name}: {models}{said}"
 
 
 def worth_a_look(before: Snapshot, now: Snapshot) -> str:

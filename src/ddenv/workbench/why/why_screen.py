@@ -244,10 +244,7 @@ class WhyScreen(Screen[None]):
     def action_play(self) -> None:
         one = self.entry
         if one is None or one.parting is None:
-            refuse(
-                self,
-                "there are no two runs to play: none that share a seed and end differently are stored",
-            )
+            refuse(self, "there are no two runs to play: none that share a seed and end differently are stored")
             return
         try:
             both = one.parting.with_test, one.parting.without_test
