@@ -10,7 +10,7 @@ from textual.widgets import DataTable
 from ddenv.runfile import branches
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import Node
-from ddenv.workbench.help.side_by_side import SideBySide
+from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.history import History, lines
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question

@@ -16,10 +16,9 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.help.dialogs import Pick, SideBySide
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.help.pick import Pick
 from ddenv.workbench.help.shortcuts import Help
-from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.history import History
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates

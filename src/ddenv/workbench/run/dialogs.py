@@ -18,9 +18,8 @@ from ddenv.runfile.failures import OtherFailure
 from ddenv.runfile.position import Chapter
 from ddenv.text import count, plain
 from ddenv.words.methods import chosen, note, paragraph
+from ddenv.workbench.help.dialogs import Pick, Reading
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.pick import Pick
-from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.processes import Scene
 from ddenv.workbench.widgets.question import Choice

@@ -18,7 +18,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name, run_path
 from ddenv.text import plain, truncated
-from ddenv.workbench.help.pick import Pick
+from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change

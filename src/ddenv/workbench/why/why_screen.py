@@ -24,13 +24,12 @@ from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
 from ddenv.text import plain, shortened
 from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
+from ddenv.workbench.help.dialogs import Reading
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.playback.moving import RobotWay, without
-from ddenv.workbench.playback.playback_screen import Playback
+from ddenv.workbench.playback.playback_screen import Playback, way_of, without
 from ddenv.workbench.shared.background import call_if_open, refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
@@ -99,7 +98,7 @@ class WhyScreen(Screen[None]):
         super().__init__()
         self._file, self._position, self._place, self._look_at, self._ask = file, position, place, look, ask
         self._seen: tuple[object, ...] = ()
-        self._head = self._trouble = ""
+        self._trouble = ""
         self._state = RunState()
         self._entries: tuple[Entry, ...] = ()
         self.map = WorldMap(id="why-map")
@@ -141,7 +140,16 @@ class WhyScreen(Screen[None]):
         """Reads all again once there is another certificate, or another nearest world that passes."""
         now = self._look_at()
         state, works = now.state, now.works
-        self._show_isolation(now)
+        self.query_one("#why-header", Static).update(
+            Text(f" {plain(head_of(state, works))}", no_wrap=True, overflow="ellipsis")
+        )
+        # What the key of isolation does.
+        begun, known = state.isolating is not None, state.isolated is not None
+        does = STOP if now.isolates else GO_ON if begun else "" if known else BEGIN
+        self.query_one(KeyFooter).say("why.isolate", does)
+        if now.trouble and now.trouble != self._trouble:
+            self.notify(plain(now.trouble), severity="error", markup=False)
+        self._trouble = now.trouble
         # Margins are shown once their search is over.
         margins = state.margins if state.margining is None else None
         known = current(state) is not None or state.isolated is not None or margins is not None
@@ -153,22 +161,6 @@ class WhyScreen(Screen[None]):
             self._read(state)
         else:
             self._found((), 0, "")
-
-    def _show_isolation(self, now: Look) -> None:
-        """How far the search for the nearest world that passes is, and what its key does."""
-        begun = now.state.isolating is not None
-        head = head_of(now.state, now.works)
-        if head != self._head:
-            self._head = head
-            self.query_one("#why-header", Static).update(Text(f" {plain(head)}", no_wrap=True, overflow="ellipsis"))
-        done = now.state.isolated is not None and not begun
-        self.query_one(KeyFooter).say(
-            "why.isolate", STOP if now.isolates else GO_ON if begun else "" if done else BEGIN
-        )
-        if now.trouble != self._trouble:
-            self._trouble = now.trouble
-            if now.trouble:
-                self.notify(plain(now.trouble), severity="error", markup=False)
 
     @work(thread=True, group="why", exclusive=True)
     def _read(self, state: RunState) -> None:
@@ -238,7 +230,7 @@ class WhyScreen(Screen[None]):
         except UserError as error:
             return (), (str(error),)
         lacks = dict.fromkeys(line for each in found for line in each.lacks)
-        ways = tuple(RobotWay(each, name).whole for each, name in zip(found, one.ways, strict=True) if each.rows)
+        ways = tuple(way_of(each, name) for each, name in zip(found, one.ways, strict=True) if each.rows)
         return (ways if len(ways) == 2 else ()), tuple(lacks)
 
     def action_play(self) -> None:
@@ -275,21 +267,15 @@ class MarginsDialog(Reading):
 
     def __init__(self, state: RunState, run: str) -> None:
         known = state.margins
-        found = () if known is None else rows(known)
+        if known is None or not (found := rows(known)):
+            command = f"ddenv margins {plain(run)} finds how far each number can change"
+            super().__init__("Margins", [("Not looked for yet", [("", command)])])
+            return
         lines = []
         for one in found:
             name, now, until, goal, runs = map(plain, one.cells)
-            lines += [
-                (shortened(name, 24), bar(one.margin, 41)),
-                ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
-            ]
-        groups = [("How far each number can change before f disappears", lines)]
-        if not lines:
-            groups = [
-                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number can change")])
-            ]
-        if known is not None and found:
-            groups += [
-                ("What this means", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
-            ]
-        super().__init__("Margins", groups)
+            words = f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"
+            lines += [(shortened(name, 24), bar(one.margin, 41)), ("", words)]
+        means = [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)]
+        title = "How far each number can change before f disappears"
+        super().__init__("Margins", [(title, lines), ("What this means", means)])

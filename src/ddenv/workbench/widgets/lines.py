@@ -44,18 +44,14 @@ class Lines(ScrollView, can_focus=True):
         """`nothing` is shown when there are no items."""
         super().__init__(id=id)
         self._line, self._nothing, self._tail, self._parts = line, nothing, tail, parts
-        self._items: Sequence[Any] = ()
+        self.items: Sequence[Any] = ()
         # What each line is made of, and how many columns the items were taken apart for.
         self._rows: Sequence[Any] = ()
         self._columns = 0
 
-    @property
-    def items(self) -> Sequence[Any]:
-        return self._items
-
     def show(self, items: Sequence[Any]) -> None:
         at_end = self.scroll_offset.y >= self.max_scroll_y
-        before, self._items = self._items, items
+        before, self.items = self.items, items
         if not self.size.width:
             # Not visible: the screen needs no new layout for each line.
             self._columns = 0
@@ -70,14 +66,14 @@ class Lines(ScrollView, can_focus=True):
     def _take_apart(self, before: Sequence[Any]) -> None:
         """Makes the rows; only those of new items where the ones `before` are still the first."""
         if self._parts is None:
-            self._rows = self._items
+            self._rows = self.items
             return
         # The scroll bar may come and go.
         columns = max(1, self.size.width - self.styles.scrollbar_size_vertical)
         known = len(before)
-        goes_on = columns == self._columns and known <= len(self._items) and known > 0
-        goes_on = goes_on and before[0] is self._items[0] and before[-1] is self._items[known - 1]
-        new = self._items[known:] if goes_on else self._items
+        goes_on = columns == self._columns and known <= len(self.items) and known > 0
+        goes_on = goes_on and before[0] is self.items[0] and before[-1] is self.items[known - 1]
+        new = self.items[known:] if goes_on else self.items
         rows = [row for item in new for row in self._parts(item, columns)]
         self._rows, self._columns = [*self._rows, *rows] if goes_on else rows, columns
 
