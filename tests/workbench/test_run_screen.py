@@ -157,7 +157,7 @@ async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(
         await session.pilot.pause()
         more = ("#models", "#decisions", *panes)
         assert all(session.screen.query_one(pane).is_on_screen for pane in more)
-        names = [row.name for row in session.screen.query_one("#models", Lines).items]
+        names = session.screen.query_one("#models", Lines).items
         assert names == ["crate_04", "crate_03", "crate_02", "crate_01", "crate_00"]
         await session.pilot.click("#models", offset=(2, 1))
         assert session.screen.query_one(WorldMap).model_at_cursor == "crate_03"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -11,14 +11,13 @@ from textual.widget import Widget
 
 from ddenv.evidence.slices import in_last
 from ddenv.runfile.state import RunState, partition_letter
-from ddenv.runfile.supports import Names, drops
+from ddenv.runfile.supports import drops, drops_without
 from ddenv.text import count, shortened
 from ddenv.words.signs import DROPS, dropping
 from ddenv.workbench.map.place import Shown
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
-    from ddenv.runfile.state import Candidate, Trial
 
 LEGEND = (
     ("S", "start"),
@@ -139,31 +138,24 @@ class MapLines(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._shown: tuple[int, Candidate | Trial | None, Names, Callable[[int, int], Text]] | None = None
+        self._shown = Shown()
 
-    def show(
-        self, selected: int, shown: Candidate | Trial | None, fallen: Names, legend: Callable[[int, int], Text]
-    ) -> None:
-        """`selected` models are selected, those of `shown` stand out; `legend` makes lines of signs for a width.
-
-        `fallen` would drop without the selected ones, or without those that are not shown.
-        """
-        self._shown = selected, shown, fallen, legend
+    def show(self, shown: Shown) -> None:
+        self._shown = shown
         self.refresh()
 
     def render(self) -> Text:
-        if self._shown is None:
-            return Text()
-        width = self.size.width
-        selected, shown, fallen, legend = self._shown
-        text, drop = Text(no_wrap=True), dropping(fallen, LONGEST_DROPPED if width > 44 else SHORT_DROPPED)
-        if selected:
-            text.append(f"{selected} selected{f', w {drop}' if drop else ''}", "bold")
+        width, shown, text = self.size.width, self._shown, Text(no_wrap=True)
+        state, longest = shown.snapshot.state, LONGEST_DROPPED if width > 44 else SHORT_DROPPED
+        if shown.selection:
+            drop = dropping(drops_without(state, shown.selection), longest)
+            text.append(f"{len(shown.selection)} selected{f', w {drop}' if drop else ''}", "bold")
             text.append(": p pin, w try without, o try only", "dim")
-        elif shown is not None:
-            text.append(f"{shown.label}: {drop or count(shown.size, 'model')}", "bold")
+        elif shown.candidate is not None:
+            drop = dropping(drops(state, shown.candidate), longest)
+            text.append(f"{shown.candidate.label}: {drop or count(shown.candidate.size, 'model')}", "bold")
             text.append("" if drop else "  others in small letters", "dim")
-        if not text:
-            return legend(width, 2)
+        else:
+            return legend(shown, width, 2)
         text.truncate(width, overflow="ellipsis")
-        return text.append("\n").append_text(legend(width, 1))
+        return text.append("\n").append_text(legend(shown, width, 1))

@@ -371,20 +371,17 @@ class WorldMap(Widget, can_focus=True):
         if model != self._pointed:
             self._pointed = model
             self.post_message(self.Pointed(model))
-        subtitle = self._subtitle(model, view)
+        subtitle = Text(f"{view.columns * view.scale:.3g} m wide")
+        if self.picking:
+            x, y = view.point(self.viewport.cursor)
+            subtitle = Text(f"x {x:.2f}, y {y:.2f} m")
+        elif model is not None:
+            subtitle = self.describe(model, self.size.width - 4)
+        elif not self.place.prints:
+            subtitle = Text("" if self.notice else "this world has no models")
         # Another one draws the whole border.
         if subtitle != self._subtitle_shown and isinstance(self.parent, Widget):
             self._subtitle_shown = self.parent.border_subtitle = subtitle
-
-    def _subtitle(self, model: str | None, view: View) -> Text:
-        if self.picking:
-            x, y = view.point(self.viewport.cursor)
-            return Text(f"x {x:.2f}, y {y:.2f} m")
-        if model is not None:
-            return self.describe(model, self.size.width - 4)
-        if not self.place.prints:
-            return Text("" if self.notice else "this world has no models")
-        return Text(f"{view.columns * view.scale:.3g} m wide")
 
 
 class Viewport:

@@ -35,16 +35,21 @@ DIM = Style(dim=True)
 
 
 class ModelsLeft(Vertical):
-    """The list of models; it is filled only while it is in sight."""
+    """The list of models, the nearest to f first; it is filled only while it is in sight."""
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, classes="panel")
         self.border_title = "Models left"
         self._made_of: tuple[object, ...] = ()
+        # The part of each model, its footprint, and when it was sensed, simulated s; where f ended, m.
+        self._parts: dict[str, str] = {}
+        self._prints: dict[str, Footprint] = {}
+        self._sensed: dict[str, float] = {}
+        self._f: tuple[float, float] | None = None
 
     def compose(self) -> ComposeResult:
         yield Static("", id="models-heading", markup=False)
-        yield Lines(line, nothing="none", id="models")
+        yield Lines(self._line, nothing="none", id="models")
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
         split = None if state.round is None or state.round.done else state.round.split
@@ -55,46 +60,27 @@ class ModelsLeft(Vertical):
         self._made_of = made_of
         heading = f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
         self.query_one("#models-heading", Static).update(heading)
-        lines.show(rows(state, prints))
+        parts = {} if split is None else split.letter_of
+        self._parts = {name: partition_letter(part) for name, part in parts.items()} | dict.fromkeys(state.pinned, "+")
+        self._prints = {each.name: each for each in prints}
+        self._sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
+        self._f = None if state.f_position is None else state.f_position[:2]
+        lines.show(sorted(state.environment, key=self._nearly))
 
+    def _nearly(self, name: str) -> float:
+        """How far from f the rectangle around a model is, m: exact distances only for models in sight, of thousands."""
+        stands = self._prints.get(name)
+        if stands is None or self._f is None:
+            return math.inf
+        sides = zip(stands.low, self._f, stands.high, strict=True)
+        return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in sides))
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """`part` is its letter, "+" if it is pinned, "" in no part; `stands` its footprint, `f` its end, m; `sensed` in simulated s."""
-
-    name: str
-    part: str
-    stands: Footprint | None
-    f: tuple[float, float] | None
-    sensed: float | None
-
-
-def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
-    parts = state.round.split.letter_of if state.round is not None and not state.round.done else {}
-    sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
-    places = {each.name: each for each in prints}
-    f = None if state.f_position is None else state.f_position[:2]
-    found = []
-    for name in state.environment:
-        part = "+" if name in state.pinned else partition_letter(parts[name]) if name in parts else ""
-        found.append(Row(name, part, places.get(name), f, sensed.get(name)))
-    return tuple(sorted(found, key=_nearly))
-
-
-def _nearly(row: Row) -> float:
-    """How far from f the rectangle around a model is, m: exact distances only for models in sight, of thousands."""
-    if row.stands is None or row.f is None:
-        return math.inf
-    sides = zip(row.stands.low, row.f, row.stands.high, strict=True)
-    return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in sides))
-
-
-def line(row: Row, width: int) -> Text:
-    room = max(4, width - REST)
-    away = "" if row.stands is None or row.f is None else f"{row.stands.distance(row.f):.1f} m"
-    sensed = "never" if row.sensed is None else f"{row.sensed:.1f} s"
-    text = Text(padded(shortened(row.name, room), room), no_wrap=True)
-    return text.append(f"{row.part:>3}", "bold").append(f"{away:>9}").append(f"{sensed:>9}", "dim")
+    def _line(self, name: str, width: int) -> Text:
+        room, stands = max(4, width - REST), self._prints.get(name)
+        away = "" if stands is None or self._f is None else f"{stands.distance(self._f):.1f} m"
+        sensed = f"{self._sensed[name]:.1f} s" if name in self._sensed else "never"
+        text = Text(padded(shortened(name, room), room), no_wrap=True)
+        return text.append(f"{self._parts.get(name, ''):>3}", "bold").append(f"{away:>9}").append(f"{sensed:>9}", "dim")
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,6 @@ from ddenv.errors import UserError
 from ddenv.runfile.position import Step
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
-from ddenv.runfile.supports import drops, drops_without
 from ddenv.runfile.tested import Wanted
 from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
@@ -240,9 +239,7 @@ class RunScreen(Screen[None]):
         self.scene.show(wanted)
 
     def show_legend(self) -> None:
-        selection, candidate, state = self.world.selection, self.world.shown.candidate, self.world.snapshot.state
-        fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
-        self._legend.show(len(selection), candidate, fallen, self.world.legend)
+        self._legend.show(self.world.shown)
 
     def _show_models(self) -> None:
         self.query_one(ModelsLeft).show(self.snapshot.state, self.world.place.prints)
@@ -322,7 +319,7 @@ class RunScreen(Screen[None]):
 
     @on(Lines.Clicked, "#models")
     def _model_clicked(self, event: Lines.Clicked) -> None:
-        self.find(event.item.name)
+        self.find(event.item)
 
     def find(self, name: str) -> None:
         self.action_pane("map")
