@@ -48,10 +48,7 @@ class Framed(Vertical, Keys):
         self._hints = hints
 
     def on_mount(self) -> None:
-        self._show_hints()
-
-    def _show_hints(self) -> None:
-        """With the user's own keys in place of the usual ones."""
+        """Shows the hints, with the user's own keys in place of the usual ones."""
         if not self._hints:
             return
         now: dict[str | None, list[str]] = {}
@@ -64,7 +61,7 @@ class Framed(Vertical, Keys):
     def say(self, words: str) -> None:
         """Says what a key did, in place of the keys for a moment: a notice would wait until the dialog is closed."""
         self.border_subtitle = Content(words)
-        self.set_timer(SAID, self._show_hints)
+        self.set_timer(SAID, self.on_mount)
 
 
 def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -67,7 +66,11 @@ def legend(shown: Shown, width: int, lines: int) -> Text:
     signs = [sign for sign, there in meanings.items() if there]
     usual = (*LEGEND[:PLACES], *signs, *LEGEND[PLACES:]) if state.elements else LEGEND[:2]
     text, used, gap = Text(no_wrap=True, overflow="ellipsis"), 0, GAP if width >= WITH_GAPS else 1
-    for sign, meaning in _of_ways(shown) if shown.ways or shown.limits else usual:
+    if shown.ways or shown.limits:
+        ways = ((sign, way.name) for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False))
+        rare = (LIMITS if shown.limits else None, PARTED if shown.parting else None, shown.apart)
+        usual = (*ways, *filter(None, rare), *(each for each in LEGEND if each[0] in "SG×·#"))
+    for sign, meaning in usual:
         cells = len(sign) + 1 + len(meaning)
         if used and used + gap + cells > width:
             lines -= 1
@@ -79,18 +82,6 @@ def legend(shown: Shown, width: int, lines: int) -> Text:
         text.append(sign, "bold").append(f" {meaning}", "dim")
         used += (gap if used else 0) + cells
     return text
-
-
-def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
-    for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
-        yield sign, way.name
-    if shown.limits:
-        yield LIMITS
-    if shown.parting is not None:
-        yield PARTED
-    if shown.apart is not None:
-        yield shown.apart
-    yield from (each for each in LEGEND if each[0] in "SG×·#")
 
 
 def sensed_order(state: RunState) -> dict[str, int]:

@@ -119,14 +119,13 @@ class Opening:
         return ""
 
     def why(self) -> None:
-        from ddenv.workbench.why.why_screen import Look, WhyScreen
+        from ddenv.workbench.why.why_screen import WhyScreen
+
+        def engine() -> tuple[bool, str]:
+            return self._poll.snapshot.engine != "absent", self._asking.trouble
 
         position, place = self._screen.browsing.position, self._screen.world.place
-
-        def look() -> Look:
-            return Look(position.now, self._poll.snapshot.engine != "absent", self._asking.trouble)
-
-        self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, look, self._asking.ask))
+        self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, engine, self._asking.ask))
 
     def layers(self) -> None:
         self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())

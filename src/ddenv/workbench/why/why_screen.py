@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from rich.text import Text
@@ -47,21 +46,10 @@ FIRST = ids("why", "help close play isolate margins copy signs closer farther fi
 BEGIN, GO_ON, STOP = "world that passes", "go on", "stop"
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
-    """The run as it is shown, whether an engine works on it, and the error that ended the last one, or ""."""
-
-    state: RunState
-    works: bool
-    trouble: str = ""
-
-    @property
-    def isolates(self) -> bool:
-        return self.works and self.state.isolating is not None
-
-
 class WhyScreen(Screen[None]):
-    """`ask` starts and stops engines, or says why not; `place` is the run's world, if it is read already."""
+    """`look` says whether an engine works on the run, and the error that ended the last one, or "". `ask` starts and stops engines,
+    or says why not; `place` is the run's world, if it is read already.
+    """
 
     CSS_PATH = "why.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
@@ -92,11 +80,11 @@ class WhyScreen(Screen[None]):
         file: RunFile,
         position: Position,
         place: Place,
-        look: Callable[[], Look],
+        look: Callable[[], tuple[bool, str]],
         ask: Callable[[Isolate | Stop], None],
     ) -> None:
         super().__init__()
-        self._file, self._position, self._place, self._look_at, self._ask = file, position, place, look, ask
+        self._file, self._position, self._place, self._engine, self._ask = file, position, place, look, ask
         self._seen: tuple[object, ...] = ()
         self._trouble = ""
         self._state = RunState()
@@ -138,18 +126,17 @@ class WhyScreen(Screen[None]):
 
     def _look(self) -> None:
         """Reads all again once there is another certificate, or another nearest world that passes."""
-        now = self._look_at()
-        state, works = now.state, now.works
+        state, (works, trouble) = self._position.now, self._engine()
         self.query_one("#why-header", Static).update(
             Text(f" {plain(head_of(state, works))}", no_wrap=True, overflow="ellipsis")
         )
         # What the key of isolation does.
         begun, known = state.isolating is not None, state.isolated is not None
-        does = STOP if now.isolates else GO_ON if begun else "" if known else BEGIN
+        does = (STOP if works else GO_ON) if begun else "" if known else BEGIN
         self.query_one(KeyFooter).say("why.isolate", does)
-        if now.trouble and now.trouble != self._trouble:
-            self.notify(plain(now.trouble), severity="error", markup=False)
-        self._trouble = now.trouble
+        if trouble and trouble != self._trouble:
+            self.notify(plain(trouble), severity="error", markup=False)
+        self._trouble = trouble
         # Margins are shown once their search is over.
         margins = state.margins if state.margining is None else None
         known = current(state) is not None or state.isolated is not None or margins is not None
@@ -178,7 +165,7 @@ class WhyScreen(Screen[None]):
         self._entries = found
         self.set_class(not found, "-empty")
         if not found:
-            words = trouble or nothing_yet(self._state, self._look_at().works, attach_name(self._file.path))
+            words = trouble or nothing_yet(self._state, self._engine()[0], attach_name(self._file.path))
             self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
             return
         beyond = f" · {more} more are not listed" if more else ""
@@ -245,13 +232,13 @@ class WhyScreen(Screen[None]):
             refuse(self, str(error))
 
     def action_isolate(self) -> None:
-        self._ask(Stop() if self._look_at().isolates else Isolate())
+        self._ask(Stop() if self._engine()[0] and self._position.now.isolating is not None else Isolate())
 
     def action_margins(self) -> None:
-        self.app.push_screen(MarginsDialog(self._look_at().state, attach_name(self._file.path)))
+        self.app.push_screen(MarginsDialog(self._position.now, attach_name(self._file.path)))
 
     def action_copy(self) -> None:
-        command = remedy(self._state, self._look_at().works, attach_name(self._file.path))
+        command = remedy(self._state, self._engine()[0], attach_name(self._file.path))
         lines = [one.text for one in self._entries]
         if not lines and not command:
             refuse(self, "there is nothing to copy yet")
