@@ -10,9 +10,6 @@ from textual.widgets import Input, Select
 
 from ddenv.guiding import course
 from ddenv.guiding.commands import question
-from ddenv.guiding.offers import Pointed, offer
-from ddenv.guiding.selections import Adopt
-from ddenv.guiding.situation import Situation
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import commands
 from ddenv.workbench.map.world_map import WorldMap
@@ -288,23 +285,6 @@ async def test_no_run_inside_begins_before_all_is_over(run, make, why):
         assert session.said() == why
 
 
-@pytest.mark.parametrize(
-    ("make", "shown"),
-    [
-        (fake_moments.helped, {"leave out", "try without", "try only", "undo"}),
-        (fake_moments.waiting, {"pause", "accept", "reject", "try without", "try only"}),
-    ],
-)
-async def test_the_footer_offers_what_can_be_done_now(run, make, shown):
-    make(run).hold()
-    async with Attached(run, (200, 60)) as session:
-        footer = {key.words for key in session.screen.query_one(KeyFooter).entries}
-        assert footer - {"pins", "history", "settings", "export", "why", "inside", "help", "quit", *MORE} == shown
-
-
-MORE = {"signs", "facts", "play", "rounds", "find", "layers", "copy", "scene", "runs"}
-
-
 async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
@@ -326,30 +306,6 @@ async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
         await session.look()
         assert {"run.accept", "run.reject"} <= enabled() & offered()
         assert not {"run.step", "run.step_round"} & offered()
-
-
-def test_a_in_the_footer_says_what_it_would_take(run):
-    fake_moments.guided(run)
-    run.finish(17, "similar", 0.1, failure="stuck")
-    run.judge_trial(3, "similar", [17])
-    run.write("unpinned", models=[0])
-    now = Situation(run.state)
-    words = [offer("accept", now, Pointed(row)).words for row in now.state.trials]
-    assert words == ["", "count as f", "adopt"]
-    # From anywhere it adopts the last try that shows f.
-    assert offer("accept", now, Pointed()).command == Adopt(3)
-
-
-@pytest.mark.screens
-async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):
-    started = starts(monkeypatch)
-    fake_moments.finished(run)
-    async with Attached(run) as session:
-        await session.press("p", "slash", *"00", "enter")
-        words = "pinned, so that it always stays: crate_00. A new search begins from 2 models; an engine starts"
-        assert words in session.said()
-        assert session.asked() == [("pin", {"models": [0]})]
-        assert len(started) == 1
 
 
 async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(run, monkeypatch):

@@ -133,13 +133,8 @@ async def test_the_log_tells_what_happened_and_goes_on(run):
 @pytest.mark.screens
 async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(run):
     fake_moments.guided(run).hold()
-    seen = {
-        "1": ["#map", "#candidates", "#happening"],
-        "2": ["#candidates", "#happening"],
-        "3": ["#chart"],
-        "4": ["#happening"],
-        "5": ["#log"],
-    }
+    seen = {"1": ["#map", "#candidates", "#happening"], "2": ["#candidates", "#happening"]}
+    seen |= {"3": ["#chart"], "4": ["#happening"], "5": ["#log"]}
     panes = ("#map", "#candidates", "#chart", "#happening", "#log")
     async with Attached(run, (80, 24)) as session:
         for key, shown in seen.items():
@@ -178,18 +173,16 @@ def test_no_two_keys_of_the_run_screen_and_of_what_is_on_it_are_the_same():
 
 
 async def test_e_explains_the_method_of_the_run(runs):
-    run = run_by("splitting", runs)
-    fake_moments.mid_round(run)
+    data = fake_run.scenario()
+    data["reduction"]["algorithm"] = "splitting"
+    run = fake_moments.mid_round(fake_run.FakeRun(runs / "splitting.ddenv", data))
     async with Attached(run, (80, 24)) as session:
         await session.press("e")
         assert isinstance(session.app.screen, Method)
         static = session.app.screen.query_one(Static)
         words = " ".join(told(session.app.screen).split())
-        for kind, name in (
-            ("algorithm", "splitting"),
-            ("partitioning", "model2model"),
-            ("prioritization", "failure-proximal"),
-        ):
+        chosen = {"algorithm": "splitting", "partitioning": "model2model", "prioritization": "failure-proximal"}
+        for kind, name in chosen.items():
             assert f"{kind} {name}" in words
             assert " ".join(explanation(kind, name).split()) in words
         assert words.count("Not used by splitting.") == 1
@@ -199,34 +192,25 @@ async def test_e_explains_the_method_of_the_run(runs):
     run.close()
 
 
-def run_by(algorithm, runs):
-    data = fake_run.scenario()
-    data["reduction"]["algorithm"] = algorithm
-    return fake_run.FakeRun(runs / f"{algorithm}.ddenv", data)
+STOPS = "The engine stops. Go on later with: ddenv resume crates-1"
+GOES_ON = "The engine goes on. Attach again with: ddenv open crates-1"
 
 
 @pytest.mark.parametrize(
-    ("key", "commands", "words"), [("s", [("stop", {})], "ddenv resume crates-1"), ("l", [], "ddenv open crates-1")]
+    ("keys", "commands", "words"),
+    [(["q", "s"], [("stop", {})], STOPS), (["q", "l"], [], GOES_ON), (["ctrl+q"], [], GOES_ON)],
 )
-async def test_q_asks_what_becomes_of_the_engine(run, key, commands, words):
+async def test_q_asks_what_becomes_of_the_engine(run, keys, commands, words):
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         await session.press("q")
         assert isinstance(session.app.screen, Quit)
         await session.press("escape")
         assert session.app.screen is session.screen
-        await session.press("q", key)
+        await session.press(*keys)
         assert session.commands() == commands
-        assert words in session.app._exit_renderables[0].plain
+        assert session.app._exit_renderables[0].plain == words
         assert session.app.return_value == 0
-
-
-async def test_leaving_tells_how_to_come_back(run):
-    fake_moments.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("ctrl+q")
-        assert session.app._exit_renderables[0].plain == "The engine goes on. Attach again with: ddenv open crates-1"
-        assert session.commands() == []
 
 
 async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):

@@ -15,7 +15,6 @@ from ddenv.environment import Environment
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.subject import read_parts
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
@@ -253,19 +252,17 @@ def fake_sensed(state, test, sensed):
     return replace(test, first_sensed=sensed, took_part=met)
 
 
-async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(busy):
-    async with Shown(busy) as (_, world):
+async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(run):
+    run.created()
+    async with Shown(run) as (_, world):
+        assert world.legend(200).plain.startswith("S start  G goal  × end of f")
+        assert "parts" not in world.legend(200).plain
+    fake_moments.mid_round(run)
+    async with Shown(run) as (_, world):
         assert world.legend(25, 1).plain == "S start G goal × end of f"
         assert world.legend(30, 1).plain == "S start  G goal  × end of f"
         assert world.legend(30, 2).plain.splitlines()[1].startswith("A B parts  ")
         assert max(map(len, world.legend(30, 2).plain.splitlines())) <= 30
-
-
-async def test_before_the_first_round_the_legend_has_no_letters(run):
-    run.created().baseline()
-    async with Shown(run) as (_, world):
-        assert world.legend(200).plain.startswith("S start  G goal  × end of f")
-        assert "parts" not in world.legend(200).plain
 
 
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
@@ -322,16 +319,6 @@ async def test_every_part_that_is_seen_has_a_letter_at_any_size(busy):
             assert set("ABC") <= set(text_of(world))
 
 
-async def test_what_a_trial_leaves_out_has_small_letters(busy):
-    async with Shown(busy, (80, 24)) as (pilot, world):
-        pilot.app.set_focus(None)
-        world.show(replace(world.snapshot, live=()), Trial(1, ("crate_00", "crate_01", "crate_02"), 0))
-        await pilot.pause()
-        text = text_of(world)
-        assert {"A", "B", "b", "c"} <= set(text)
-        assert "C" not in text
-
-
 async def test_words_about_a_model(busy):
     async with Shown(busy) as (_, world):
         assert world.describe("crate_00").plain == "crate_00 · part A · 1.2 x 0.8 m · 5.9 m from f"
@@ -381,16 +368,3 @@ async def test_two_ways_fill_the_map_of_a_large_world(reach):
         assert (shown == len(prints)) == (reach == 10)
         assert all(view.cell(x, y) is not None for x in (0, 6) for y in (0.5, -0.5))
         assert view.cell(6, 0)[1] - view.cell(0, 0)[1] > (30 if reach == 200 else 10)
-
-
-@pytest.mark.parametrize("theme", ["textual-light", "ansi-dark"])
-async def test_in_every_theme_models_stand_out_from_the_background(busy, theme):
-    async with Shown(busy) as (pilot, world):
-        pilot.app.theme = theme
-        await pilot.pause()
-        canvas, index = world.picture.canvas, world._numbers["crate_00"]
-        back = world._palette.back
-        shown = np.argwhere(world.picture.grid[0::2] == index)
-        colors = {int(canvas.fore[tuple(cell)]) for cell in shown} | {int(canvas.back[tuple(cell)]) for cell in shown}
-        assert colors - {back}
-        assert (back == -1) == theme.startswith("ansi")

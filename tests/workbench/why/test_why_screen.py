@@ -86,18 +86,24 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
         assert screen.query_one(OptionList).option_count == 2
 
 
-async def test_before_the_search_has_ended_there_is_nothing_to_do(run):
-    fake_moments.mid_round(run).hold()
-    async with Attached(run) as session:
-        assert "The search is still running" in words(await opened(session), "#why-empty")
-
-
-async def test_where_all_could_stay_away_there_is_nothing_to_look_at(run):
+def nothing_needed(run):
     fake_moments._rounds(run).start_certificate()
     run.certify_all(2, None, 6 * "s")
     run.finish_certificate((None, "kept", 6 * "s"))
+    return run
+
+
+@pytest.mark.parametrize(
+    ("moment", "why"),
+    [
+        (fake_moments.mid_round, "The search is still running"),
+        (nothing_needed, "No model is left to leave out"),
+    ],
+)
+async def test_where_there_is_nothing_to_look_at_it_says_why(run, moment, why):
+    moment(run).hold()
     async with Attached(run) as session:
-        assert "No model is left to leave out" in words(await opened(session), "#why-empty")
+        assert why in words(await opened(session), "#why-empty")
 
 
 async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run):
@@ -107,9 +113,8 @@ async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run)
     async with Attached(run) as session:
         said = words(await opened(session), "#why-empty")
     assert "none was left out: what is left keeps less than 80 %" in said and "f in 6 of 12 fresh runs" in said
-    assert (
-        CliRunner().invoke(command_line, ["why", str(run.path)], standalone_mode=False).output.split() == said.split()
-    )
+    typed = CliRunner().invoke(command_line, ["why", str(run.path)], standalone_mode=False)
+    assert typed.output.split() == said.split()
     write_report(run.path, run.path.with_suffix(".md"))
     assert "none was left out: what is left keeps less than 80 %" in run.path.with_suffix(".md").read_text()
 
@@ -235,11 +240,8 @@ async def test_margins_are_one_key_away(run, size):
         await opened(session)
         await session.press("m")
         shown = picture_of(session)
-        assert (
-            "crate_00.friction" in shown
-            and "███|███" in shown
-            and "f until 0 (all) … 0.2; then goal ≥" in " ".join(shown.split())
-        )
+        for said in ("crate_00.friction", "███|███", "f until 0 (all) … 0.2; then goal ≥"):
+            assert said in " ".join(shown.split())
         await session.press("escape")
         assert isinstance(session.app.screen, WhyScreen)
 
