@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run.run_screen import RunScreen
 from tests.conftest import ROOT
@@ -93,15 +91,3 @@ class Attached:
 
     async def __aexit__(self, *error):
         await self._context.__aexit__(*error)
-
-
-def starts(monkeypatch) -> list:
-    """Engines that are started from now on do nothing; returns where they are noted."""
-    started = []
-
-    def start_engine(path, jobs, **options):
-        started.append((path, jobs, options))
-        return SimpleNamespace(poll=lambda: None)
-
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", start_engine)
-    return started

@@ -5,7 +5,7 @@ import sys
 
 import fake_moments
 import pytest
-from attached import Attached, starts
+from attached import Attached
 from textual.widgets import Input, Select
 
 from ddenv.guiding import course
@@ -213,8 +213,7 @@ async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
         ]
 
 
-async def test_a_run_without_an_engine_is_guided_too(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_a_run_without_an_engine_is_guided_too(run, started):
     fake_moments.guided(run)
     async with Attached(run) as session:
         await session.press("1")
@@ -228,8 +227,7 @@ async def test_a_run_without_an_engine_is_guided_too(run, monkeypatch):
         assert len(started) == 1
 
 
-async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_a_finished_run_goes_on_from_a_try(run, started):
     fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("r", "space", "s")
@@ -239,8 +237,7 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
         assert len(started) == 1
 
 
-async def test_one_key_leaves_out_the_model_that_only_helps(run, monkeypatch):
-    starts(monkeypatch)
+async def test_one_key_leaves_out_the_model_that_only_helps(run, started):
     fake_moments.helped(run)
     async with Attached(run) as session:
         assert "Minimal but for crate_01" in session.text("#happening")
@@ -308,8 +305,7 @@ async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
         assert not {"run.step", "run.step_round"} & offered()
 
 
-async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(run, started):
     fake_moments.finished(run)
     async with Attached(run, (80, 24)) as session:
         for key in ("1", "2"):
@@ -320,8 +316,7 @@ async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_
         assert [options for *_, options in started] == [{"accept_mode": "automatic", "isolate": 0}]
 
 
-async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, started):
     fake_moments.guided(run).hold()
     async with Attached(run) as session:
         await session.press("u")

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import fake_moments
 import fake_run
 import pytest
-from attached import Attached, starts
+from attached import Attached
 from test_app import told
 from textual.widgets import Static
 
@@ -213,8 +213,7 @@ async def test_q_asks_what_becomes_of_the_engine(run, keys, commands, words):
         assert session.app.return_value == 0
 
 
-async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, started):
     fake_moments.mid_round(run)
     async with Attached(run) as session:
         assert "engine is gone" in session.text("#status")
@@ -223,7 +222,7 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypa
         await session.press("s")
         assert "space starts one" in session.said()
         await session.press("space")
-        assert started == [(run.path, 2, {"accept_mode": "automatic"})]
+        assert started == [(run.path.name, 2, {"accept_mode": "automatic"})]
         await session.look()
         assert "engine starts" in session.text("#status")
         await session.press("r")

@@ -7,6 +7,7 @@ from contextlib import suppress
 import fake_moments
 import fake_run
 import pytest
+from test_explain_algorithms import leave_out
 from textual.widgets import Input
 from textual.worker import WorkerCancelled
 
@@ -228,25 +229,6 @@ def test_saving_a_scenario(snap_compare, scenarios, monkeypatch, tmp_path):
     assert snap_compare(Workbench(), terminal_size=SMALL, run_before=shown("ddenv", "f7"))
 
 
-def reduced_by(algorithm, runs):
-    data = fake_run.scenario()
-    data["reduction"] |= {"algorithm": algorithm, "accept_rate": "first"}
-    run = fake_run.FakeRun(runs / "crates-1.ddenv", data).created().baseline()
-    run.round = 1
-    groups = [[0, 1, 2, 3], list(range(4, 11))]
-    run.write(
-        "round_started",
-        round=1,
-        n_partitions=2,
-        environment=list(range(11)),
-        partitions=groups,
-        candidates=[["complement", 0, 0.0]],
-    )
-    run.test(0, "pass")
-    run.live((run.start(0, 1), 0.4))
-    return run
-
-
 @pytest.mark.screens
 @pytest.mark.parametrize("size", [SMALL, USUAL], ids=str)
 @pytest.mark.parametrize("does", ["budget", "race"])
@@ -261,7 +243,12 @@ def test_what_a_lesson_lets_students_do(snap_compare, runs, does, size):
 
 @pytest.mark.screens
 def test_run_screen_of_another_algorithm(snap_compare, runs):
-    run = reduced_by("splitting", runs)
+    data = fake_run.scenario()
+    data["reduction"] |= {"algorithm": "splitting", "accept_rate": "first"}
+    run = fake_run.FakeRun(runs / "crates-1.ddenv", data).created().baseline()
+    leave_out(run, [0, 1, 2, 3])
+    run.test(0, "pass")
+    run.live((run.start(0, 1), 0.4))
     run.hold()
     assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
     run.close()

@@ -5,7 +5,7 @@ import sqlite3
 import fake_moments
 import fake_run
 import pytest
-from attached import Attached, starts
+from attached import Attached
 from click.testing import CliRunner
 from textual.widgets import OptionList
 
@@ -180,14 +180,13 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
         assert [one.test.id for one in played._tests] == [known.parting.with_test, known.parting.without_test]
 
 
-async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, started):
     fake_moments.finished(run)
     async with Attached(run) as session:
         screen = await opened(session)
         assert "world that passes" in session.text(KeyFooter)
         await session.press("i")
-        assert started == [(run.path, run.state.jobs, {"accept_mode": "automatic", "isolate": 0})]
+        assert started == [(run.path.name, run.state.jobs, {"accept_mode": "automatic", "isolate": 0})]
         # The engine begins.
         run.hold()
         run.start_isolation(2)
@@ -213,8 +212,7 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, mon
         (fake_moments.isolated, "a nearest world that passes is known"),
     ],
 )
-async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, monkeypatch, moment, why):
-    started = starts(monkeypatch)
+async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, started, moment, why):
     moment(run)
     async with Attached(run) as session:
         await opened(session)
