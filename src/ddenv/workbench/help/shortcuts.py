@@ -72,7 +72,7 @@ def groups(screen: Screen[Any]) -> list[Group]:
         (everywhere if of_app else own if active.node is screen else panes).append(active)
     pane, title, hints = screen.focused, "Here", ""
     if pane is not None:
-        titles = (str(title) for node in pane.ancestors_with_self if (title := getattr(node, "border_title", None)))
+        titles = (str(each) for node in pane.ancestors_with_self if (each := getattr(node, "border_title", None)))
         title, hints = plain(next(titles, title)), (pane.HELP or "") if "HELP" in vars(type(pane)) else ""
     found = [
         Group(title, _merged(panes), tuple(plain(line) for line in hints.splitlines() if line.strip())),

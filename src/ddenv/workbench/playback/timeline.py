@@ -28,7 +28,8 @@ class Timeline(Widget):
         """`go` is called with the simulated time, s, that the user wants to see, `turn` with so many frames."""
         super().__init__(id=id)
         self._go, self._turn = go, turn
-        self._time, self._parting = 0.0, None
+        self._time = 0.0
+        self._parting: float | None = None
         self._tests: tuple[Played, ...] = ()
         self._dragging = False
 

@@ -16,10 +16,10 @@ from ddenv.guiding import course
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.schemas import Kind, names
+from ddenv.schemas import names
 from ddenv.settings import Value
 from ddenv.text import plain
-from ddenv.words.methods import KINDS, note, paragraph
+from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.entry import Entry
@@ -41,23 +41,16 @@ class Change(ModalScreen[course.Change | None]):
     def __init__(self, state: RunState) -> None:
         super().__init__()
         self._state = state
-        options = settings(state)
-        partitioning, _, prioritization = options.pair.partition("/")
-        self._now: dict[Kind, str] = {
-            "algorithm": options.algorithm,
-            "partitioning": partitioning,
-            "prioritization": prioritization,
-        }
-        now = {one.name: getattr(options, one.name) for one in OTHERS}
-        self._texts = {name: "" if value is None else str(value) for name, value in now.items()}
 
     def compose(self) -> ComposeResult:
+        options = settings(self._state)
+        now_chosen = chosen(options.algorithm, options.pair)
         with Framed("Change settings, from the next round on", "ctrl+s changes   escape cancels"):
             with VerticalScroll(can_focus=False, classes="fields"):
                 for kind in KINDS:
                     with Horizontal(classes="row"):
                         yield Static(kind, classes="label", markup=False)
-                        now = self._now[kind]
+                        now = now_chosen[kind]
                         # A schema of another package may not be installed here: it can stay.
                         known = (*names(kind), *(() if now in names(kind) else (now,)))
                         yield _select(kind, [(Text(plain(name)), name) for name in known], now)
@@ -65,7 +58,7 @@ class Change(ModalScreen[course.Change | None]):
                 for one in OTHERS:
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
-                        now = self._texts[one.name]
+                        now = "" if (value := getattr(options, one.name)) is None else str(value)
                         names_of = [(Text(name), name) for name in one.choices]
                         yield _select(one.name, names_of, now) if one.choices else Entry(now, id=one.name)
                     empty = "; empty: no limit" if one.none else ""
@@ -92,7 +85,8 @@ class Change(ModalScreen[course.Change | None]):
         }
         wrong = []
         for one in OTHERS:
-            field = self.query_one(f"#{one.name}", Select if one.choices else Input)
+            id = f"#{one.name}"
+            field = self.query_one(id, Select) if one.choices else self.query_one(id, Input)
             try:
                 asked[one.name] = course.typed(one.name, str(field.value))
             except UserError as error:

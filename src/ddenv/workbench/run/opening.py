@@ -19,7 +19,6 @@ from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name, run_path
 from ddenv.text import plain, truncated
 from ddenv.workbench.help.dialogs import Pick
-from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Layers
@@ -45,7 +44,12 @@ class Opening:
 
     def _open(self, dialog: Screen[Answer | None], then: Callable[[Answer], object]) -> None:
         """Calls `then` with the answer, unless the dialog is cancelled."""
-        self._screen.app.push_screen(dialog, lambda answer: None if answer is None else then(answer))
+
+        def answered(answer: Answer | None) -> None:
+            if answer is not None:
+                then(answer)
+
+        self._screen.app.push_screen(dialog, answered)
 
     def choose(
         self,
@@ -128,7 +132,7 @@ class Opening:
         self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, engine, self._asking.ask))
 
     def layers(self) -> None:
-        self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())
+        self._screen.app.push_screen(Layers(self._screen.world), lambda _: self._screen.show_legend())
 
     def copy(self) -> None:
         path, name = self._poll.path, attach_name(self._poll.path)

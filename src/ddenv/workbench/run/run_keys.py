@@ -86,7 +86,7 @@ KEYS: list[BindingType] = [
         ),
         ("why", "W", "open('why')", "why", "why the robot fails: what happens without each model that is left"),
         HELP,
-        ("quit", "q", "quit", "quit", "leave; asks whether to stop the engine"),
+        ("quit", "q", "open('quit')", "quit", "leave; asks whether to stop the engine"),
         ("failures", "f", "open('failures')", "failures", "other failures that the tests met; reduce one in a branch"),
         ("find", "slash", "open('find')", "find", "find a model by its name, and show it on the map", "/"),
         ("layers", "l", "open('layers')", "layers", "choose what the map shows"),

@@ -303,9 +303,6 @@ class RunScreen(Screen[None]):
     def action_detach(self) -> None:
         self.opening.detach()
 
-    def action_quit(self) -> None:
-        self.opening.quit()
-
     # Panes and the map.
 
     def _row_chosen(self) -> None:

@@ -40,22 +40,21 @@ class Header(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._lefts: tuple[str, ...] = ()
-        self._rights: tuple[str, ...] = ("",)
+        self._heading: tuple[tuple[str, ...], tuple[str, ...]] = ("",), ("",)
 
     def show(self, snapshot: Snapshot) -> None:
         now = heading(snapshot.state)
-        if now != (self._lefts, self._rights):
-            self._lefts, self._rights = now
+        if now != self._heading:
+            self._heading = now
             self.refresh()
 
     def render(self) -> Text:
-        name, room = "ddenv", self.size.width - 9
-        shortest = len(min(self._lefts, key=len, default=""))
-        right = next((each for each in self._rights if shortest + len(each) + 2 <= room), self._rights[-1])
+        (lefts, rights), room = self._heading, self.size.width - 9
+        shortest = min(map(len, lefts))
+        right = next((each for each in rights if shortest + len(each) + 2 <= room), rights[-1])
         room = max(0, room - len(right) - 2)
-        left = next((each for each in self._lefts if len(each) <= room), truncated((self._lefts or ("",))[-1], room))
-        text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
+        left = next((each for each in lefts if len(each) <= room), truncated(lefts[-1], room))
+        text = Text(" ", no_wrap=True).append("ddenv", ink(self.app.theme_variables, "primary", bold=True))
         return text.append(f"  {left:<{room}}  ", "bold").append(right)
 
 

@@ -16,7 +16,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
 from ddenv.runs.changes import changes
 from ddenv.runs.folder import attach_name
-from ddenv.runs.reasons import Parting, Reason, nearest, no_reasons, parting_sentence, reasons, sentence
+from ddenv.runs.reasons import Parting, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.runs.subject import read_parts
 from ddenv.text import as_sentence, padded, percent, plain, shortened, told_apart
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
@@ -52,18 +52,22 @@ class Entry:
     limits: Limits = ()
     figures: str = ""
 
-    @property
-    def text(self) -> str:
-        return " ".join(part for part in (self.sentence, *self.more) if part)
-
 
 def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
-    found = reasons(file, state) if current(state) is not None else ()
+    certificate = current(state)
+    found = () if certificate is None else reasons(file, state)
+    claims = {} if certificate is None else {each.without: each for each in certificate.claims}
     listed = found[:LISTED]
     snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
-    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
-    last = []
+    models, last = [], []
+    for number, each in enumerate(listed):
+        claim, sign, ways = claims.get(each.without), partition_letter(number), ("with", "without")
+        rates = (
+            f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
+        )
+        more = rates, parting_sentence(each)
+        models.append(Entry(each.without, sign, each.gone, sentence(each), more, each.parting, ways, snapshot, claim))
     if (one := nearest(file, state)) is not None:
         # The whole world fails, and without these it passes.
         whole, ways = snapshot_with(state, state.elements, (one.gone,) if one.gone else ()), ("fails", "passes")
@@ -88,15 +92,6 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
         figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
         yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
-
-
-def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
-    certificate = current(state)
-    claims = () if certificate is None else certificate.claims
-    claim = next((each for each in claims if each.without == reason.without), None)
-    rates = f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
-    sign, ways, more = partition_letter(letter), ("with", "without"), (rates, parting_sentence(reason))
-    return Entry(reason.without, sign, reason.gone, sentence(reason), more, reason.parting, ways, snapshot, claim)
 
 
 def head(width: int) -> Text:

@@ -239,7 +239,7 @@ class WhyScreen(Screen[None]):
 
     def action_copy(self) -> None:
         command = remedy(self._state, self._engine()[0], attach_name(self._file.path))
-        lines = [one.text for one in self._entries]
+        lines = [" ".join(filter(None, (one.sentence, *one.more))) for one in self._entries]
         if not lines and not command:
             refuse(self, "there is nothing to copy yet")
             return
