@@ -177,19 +177,9 @@ def with_margins(run: FakeRun) -> FakeRun:
 def margin_ran(run: FakeRun, name: str, value: float, number: int, letter: str) -> None:
     """A run with another value ends as this letter says: f, the goal, or lost."""
     outcome, failure = {"s": ("similar", "stuck"), "p": ("pass", ""), "o": ("other", "lost")}[letter]
-    ended = {"distance": None, "end_pose": None, "wall_seconds": 2.0}
+    ended = {"outcome": outcome, "failure": failure, "distance": None, "end_pose": None, "wall_seconds": 2.0}
     motions = {ROBOT: path_samples().tobytes()}
-    run.write(
-        "margin_ran",
-        motions,
-        name=name,
-        value=value,
-        run=number,
-        seed=number,
-        outcome=outcome,
-        failure=failure,
-        **ended,
-    )
+    run.write("margin_ran", motions, name=name, value=value, run=number, seed=number, **ended)
 
 
 def uncertified(run: FakeRun) -> FakeRun:

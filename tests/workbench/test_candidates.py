@@ -203,16 +203,3 @@ async def test_what_is_looked_at_stays_where_it_is():
         await pilot.pause()
         assert app.lines()[1].startswith("501")
         assert table.under_cursor.index == 9_999
-
-
-async def test_vetoed_rows_and_the_cursor_are_seen_without_colours(run, monkeypatch):
-    monkeypatch.setenv("NO_COLOR", "1")
-    fake_moments.mid_round(run).write("vetoed", candidate=3, verdict="vetoed")
-    async with (app := Table()).run_test(size=(60, 11)) as pilot:
-        app.table.show(snapshot(run))
-        await pilot.press("down")
-        assert app.lines()[4].endswith("⊘ vetoed")
-        reversed_rows = [
-            y for y in range(1, 7) if all(each.style.reverse for each in app.table.render_line(y) if each.text.strip())
-        ]
-        assert reversed_rows == [1 + app.table.cursor_row]

@@ -10,7 +10,6 @@ from textual.widgets import Input, Select
 
 from ddenv.guiding import course
 from ddenv.guiding.commands import question
-from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import commands
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
@@ -303,17 +302,6 @@ async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
         await session.look()
         assert {"run.accept", "run.reject"} <= enabled() & offered()
         assert not {"run.step", "run.step_round"} & offered()
-
-
-async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(run, started):
-    fake_moments.finished(run)
-    async with Attached(run, (80, 24)) as session:
-        for key in ("1", "2"):
-            await session.press(key)
-            words = [key.words for key in session.screen.query_one(KeyFooter).entries]
-            assert words[:4] == ["why", "world that passes", "export", "play"] and words[-2:] == ["quit", "help"]
-        await session.press("i")
-        assert [options for *_, options in started] == [{"accept_mode": "automatic", "isolate": 0}]
 
 
 async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, started):

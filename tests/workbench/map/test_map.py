@@ -17,6 +17,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.subject import read_parts
+from ddenv.workbench.map.map_words import legend
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Poll
@@ -112,7 +113,7 @@ async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(b
         await pilot.press("enter")
         assert world.selection == {"crate_02", "crate_03"}
         assert "*B" in text_of(world)
-        assert "* selected" in world.legend(80).plain
+        assert "* selected" in legend(world.shown, 80).plain
         await pilot.press("enter")
         assert pilot.app.selections[-1] == {"crate_03"}
         world.select(())
@@ -231,7 +232,7 @@ async def test_layers_are_shown_or_not(run, layer):
             world.toggle_layer(layer)
         assert seen == [layer not in HIDDEN, layer in HIDDEN]
         world.toggle_layer("partitions")
-        assert "A B" not in world.legend(200).plain
+        assert "A B" not in legend(world.shown, 200).plain
         assert layer in LAYERS
 
 
@@ -255,14 +256,14 @@ def fake_sensed(state, test, sensed):
 async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(run):
     run.created()
     async with Shown(run) as (_, world):
-        assert world.legend(200).plain.startswith("S start  G goal  × end of f")
-        assert "parts" not in world.legend(200).plain
+        assert legend(world.shown, 200).plain.startswith("S start  G goal  × end of f")
+        assert "parts" not in legend(world.shown, 200).plain
     fake_moments.mid_round(run)
     async with Shown(run) as (_, world):
-        assert world.legend(25, 1).plain == "S start G goal × end of f"
-        assert world.legend(30, 1).plain == "S start  G goal  × end of f"
-        assert world.legend(30, 2).plain.splitlines()[1].startswith("A B parts  ")
-        assert max(map(len, world.legend(30, 2).plain.splitlines())) <= 30
+        assert legend(world.shown, 25, 1).plain == "S start G goal × end of f"
+        assert legend(world.shown, 30, 1).plain == "S start  G goal  × end of f"
+        assert legend(world.shown, 30, 2).plain.splitlines()[1].startswith("A B parts  ")
+        assert max(map(len, legend(world.shown, 30, 2).plain.splitlines())) <= 30
 
 
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
@@ -274,7 +275,7 @@ async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
         world.show(Snapshot(world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
         new = world.picture.canvas.chars[(world.picture.canvas.chars != before)]
         assert (new > 0x2800).any()
-        assert "path of f" in world.legend(100).plain
+        assert "path of f" in legend(world.shown, 100).plain
         world.toggle_layer("original")
         assert (world.picture.canvas.chars == before).all()
 
@@ -309,14 +310,6 @@ async def test_a_model_that_a_running_test_moves_moves_on_the_map(busy):
         assert moved[0][1] > still[0][1] and moved[1] != still[1]
         # The next test begins, and it is back.
         assert at({}) == still
-
-
-async def test_every_part_that_is_seen_has_a_letter_at_any_size(busy):
-    for size in ((36, 9), (20, 7), (80, 24)):
-        async with Shown(busy, size) as (pilot, world):
-            pilot.app.set_focus(None)
-            await pilot.pause()
-            assert set("ABC") <= set(text_of(world))
 
 
 async def test_words_about_a_model(busy):

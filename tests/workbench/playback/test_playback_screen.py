@@ -11,6 +11,7 @@ from textual.events import MouseScrollDown
 from textual.widgets import OptionList
 
 from ddenv.map.raster import ARROWS, HOLLOW
+from ddenv.workbench.map.map_words import legend
 from ddenv.workbench.playback import playback_screen
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.playback_screen import SPEEDS, Playback, Playing, others
@@ -116,7 +117,7 @@ async def test_two_tests_are_overlaid_and_p_goes_to_where_they_part(two_ways):
         assert all("≠" in line for line in lines)
         # The second test ends sooner.
         assert lines[1].index("┤") < lines[0].index(NOW)
-        assert "a in only one of them" in screen.map.legend(100).plain
+        assert "a in only one of them" in legend(screen.map.shown, 100).plain
         await session.press("x")
         assert [one.test.id for one in screen._tests] == [61, 38]
 

@@ -24,10 +24,6 @@ class Entry:
     words: str
     enabled: bool
 
-    @property
-    def width(self) -> int:
-        return cell_len(self.shown) + cell_len(self.words) + 2
-
 
 class KeyFooter(Keys):
     """Shows bindings by their ids, those `first` that matter most if not all fit.
@@ -79,10 +75,11 @@ class KeyFooter(Keys):
                 continue
             binding = active[id].binding
             words, shown = self._words.get(id, (binding.description, ""))
-            entry = Entry(binding.key, shown or self.app.get_key_display(binding), words, active[id].enabled)
-            if words and entry.width <= room:
-                found[id] = entry
-                room -= entry.width
+            shown = shown or self.app.get_key_display(binding)
+            width = cell_len(shown) + cell_len(words) + 2
+            if words and width <= room:
+                found[id] = Entry(binding.key, shown, words, active[id].enabled)
+                room -= width
         # Help and the way out stand last.
         entries = tuple(found[id] for id in sorted(found, key=lambda id: id.endswith(LAST)))
         if entries != self.entries:

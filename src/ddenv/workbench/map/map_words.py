@@ -51,7 +51,7 @@ LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 PLACES, GAP, WITH_GAPS = 3, 2, 28
 
 
-def legend(shown: Shown, width: int, lines: int) -> Text:
+def legend(shown: Shown, width: int, lines: int = 2) -> Text:
     """The signs on the map with their meanings, as many as fit: first where the robot starts, has to go and ended."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
@@ -125,11 +125,11 @@ def _standing(state: RunState, name: str) -> str:
 
 
 class MapLines(Widget):
-    """One line on what is shown, and one of signs; two of signs where nothing is to be said."""
+    """One line on what is shown, and one of signs; two of signs where nothing is to be said, or with `only_signs`."""
 
-    def __init__(self, *, id: str | None = None) -> None:
+    def __init__(self, only_signs: bool = False, *, id: str) -> None:
         super().__init__(id=id)
-        self._shown = Shown()
+        self._only_signs, self._shown = only_signs, Shown()
 
     def show(self, shown: Shown) -> None:
         self._shown = shown
@@ -138,6 +138,8 @@ class MapLines(Widget):
     def render(self) -> Text:
         width, shown, text = self.size.width, self._shown, Text(no_wrap=True)
         state, longest = shown.snapshot.state, LONGEST_DROPPED if width > 44 else SHORT_DROPPED
+        if self._only_signs:
+            return legend(shown, width)
         if shown.selection:
             drop = dropping(drops_without(state, shown.selection), longest)
             text.append(f"{len(shown.selection)} selected{f', w {drop}' if drop else ''}", "bold")
@@ -147,6 +149,6 @@ class MapLines(Widget):
             text.append(f"{shown.candidate.label}: {drop or count(shown.candidate.size, 'model')}", "bold")
             text.append("" if drop else "  others in small letters", "dim")
         else:
-            return legend(shown, width, 2)
+            return legend(shown, width)
         text.truncate(width, overflow="ellipsis")
         return text.append("\n").append_text(legend(shown, width, 1))

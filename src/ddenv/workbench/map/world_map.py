@@ -20,7 +20,7 @@ from textual.widget import Widget
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
-from ddenv.workbench.map.map_words import describe, legend
+from ddenv.workbench.map.map_words import describe
 from ddenv.workbench.map.place import Limits, Place, Point, Shown, Way
 from ddenv.workbench.shared.bindings import keys
 
@@ -165,9 +165,6 @@ class WorldMap(Widget, can_focus=True):
     def toggle_layer(self, name: str) -> None:
         self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
-
-    def legend(self, width: int, lines: int = 2) -> Text:
-        return legend(self.shown, width, lines)
 
     @property
     def model_at_cursor(self) -> str | None:

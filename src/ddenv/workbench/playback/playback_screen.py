@@ -32,6 +32,7 @@ from ddenv.words.signs import outcome
 from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Limits, MovedPrints, Place, Point, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
@@ -145,7 +146,7 @@ class Playback(Screen[None]):
         with Horizontal(id="playback-body"):
             with Framed("World", id="playback-world", classes="panel"):
                 yield self.map
-                yield Static("", id="playback-legend", markup=False)
+                yield MapLines(only_signs=True, id="playback-legend")
             with Framed("What the robot meets", id="playback-met", classes="panel"):
                 yield Met(id="met")
         with Framed("", id="playback-time", classes="panel"):
@@ -166,9 +167,6 @@ class Playback(Screen[None]):
         self._place, self._prints = place, MovedPrints(place)
         self.map.set_place(place, notice)
         self._show()
-
-    def on_resize(self) -> None:
-        self.call_after_refresh(self._show_legend)
 
     def _take(self, numbers: Sequence[int]) -> None:
         """Other tests. Raises UserError, with nothing changed."""
@@ -241,11 +239,7 @@ class Playback(Screen[None]):
         if len(ends) == 2:
             words += f" · {math.dist(*ends):.2f} m apart"
         self.query_one("#playback-time").border_title = Text(words if playing.length else "no path is stored")
-        self._show_legend()
-
-    def _show_legend(self) -> None:
-        legend = self.query_one("#playback-legend", Static)
-        legend.update(self.map.legend(legend.size.width), layout=False)
+        self.query_one(MapLines).show(self.map.shown)
 
     def _go(self, time: float) -> None:
         self.playing.go(time)

@@ -65,10 +65,6 @@ class Asking:
             return "the run file is gone: it can no longer be guided; q leaves"
         return "this run file cannot be read" if snapshot.error else ""
 
-    @property
-    def trouble(self) -> str:
-        return self._engine.trouble if self._poll.snapshot.engine == "absent" else ""
-
     def waiting_for(self) -> str:
         (id, command), snapshot = self._last, self._poll.snapshot
         if command is None:

@@ -77,11 +77,6 @@ class Listed:
             return None
         return self.trials[row] if row < len(self.trials) else self.rest[row - len(self.trials)]
 
-    def row(self, item: Trial | Candidate) -> int | None:
-        if isinstance(item, Candidate):
-            return len(self.trials) + item.index if self.of[:1] == ("round",) else None
-        return next((row for row, each in enumerate(self.trials) if each.number == item.number), None)
-
 
 def listed(snapshot: Snapshot) -> Listed:
     state = snapshot.state

@@ -83,8 +83,8 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
                 self.scroll_to(y=self.scroll_offset.y + shift, animate=False, force=True)
         self.cursor_row = min(self.cursor_row, max(0, len(self._listed) - 1))
         self._arrange()
-        if self.following and snapshot.focus is not None:
-            self._put(self._listed.row(snapshot.focus))
+        if self.following and snapshot.focus is not None and self._listed.of[0] == "round":
+            self._put(len(self._listed.trials) + snapshot.focus.index)
         self.refresh()
 
     def follow(self) -> None:
@@ -118,15 +118,14 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _in_sight(self) -> bool:
         return self.scroll_offset.y <= self.cursor_row < self.scroll_offset.y + self._page
 
-    def _put(self, row: int | None, reveal: bool = False) -> None:
+    def _put(self, row: int, reveal: bool = False) -> None:
         """Moves the cursor. The view goes with it, if the cursor was in sight."""
-        if row is not None:
-            reveal = reveal or self._in_sight
-            lines = (each + 1 - self.scroll_offset.y for each in (self.cursor_row, row))
-            self.cursor_row = row
-            self.refresh(*(Region(0, y, self.size.width, 1) for y in lines if y > 0))
-            if reveal:
-                self._reveal()
+        reveal = reveal or self._in_sight
+        lines = (each + 1 - self.scroll_offset.y for each in (self.cursor_row, row))
+        self.cursor_row = row
+        self.refresh(*(Region(0, y, self.size.width, 1) for y in lines if y > 0))
+        if reveal:
+            self._reveal()
 
     def _reveal(self) -> None:
         if self.size.height and not self._in_sight:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
@@ -37,9 +37,10 @@ DIM = Style(dim=True)
 class ModelsLeft(Vertical):
     """The list of models, the nearest to f first; it is filled only while it is in sight."""
 
-    def __init__(self, *, id: str) -> None:
+    def __init__(self, find: Callable[[str], None], *, id: str) -> None:
+        """`find` is called with the name of a model that was clicked."""
         super().__init__(id=id, classes="panel")
-        self.border_title = "Models left"
+        self.border_title, self._find = "Models left", find
         self._made_of: tuple[object, ...] = ()
         # The part of each model, its footprint, and when it was sensed, simulated s; where f ended, m.
         self._parts: dict[str, str] = {}
@@ -49,7 +50,7 @@ class ModelsLeft(Vertical):
 
     def compose(self) -> ComposeResult:
         yield Static("", id="models-heading", markup=False)
-        yield Lines(self._line, nothing="none", id="models")
+        yield Lines(self._line, nothing="none", clicked=self._find, id="models")
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
         split = None if state.round is None or state.round.done else state.round.split
@@ -157,10 +158,10 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
         text.append("\n")
     if ruled:
         decided = {round(min(tests, last) * (columns - 1) / last) for tests in course.decided}
-        text.append(f"{'':>{margin - 1}}└", "dim")
+        rule = Text(f"{'':>{margin - 1}}└", "dim")
         for column in range(columns):
-            text.append(*((DECIDED, styles[2]) if column in decided else ("─", DIM)))
-        text.append("\n")
+            rule.append(*((DECIDED, styles[2]) if column in decided else ("─", DIM)))
+        text.append_text(rule).append("\n")
     end, words = count(course.tests, "test"), f"{count(points[-1].models, 'model')} left"
     space = columns - 1 - len(end)
     least = f"{words}, at least {course.needed} needed" if course.needed else words

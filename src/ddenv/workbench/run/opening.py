@@ -126,7 +126,8 @@ class Opening:
         from ddenv.workbench.why.why_screen import WhyScreen
 
         def engine() -> tuple[bool, str]:
-            return self._poll.snapshot.engine != "absent", self._asking.trouble
+            works = self._poll.snapshot.engine != "absent"
+            return works, "" if works else self._screen.engine.trouble
 
         position, place = self._screen.browsing.position, self._screen.world.place
         self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, engine, self._asking.ask))

@@ -119,7 +119,7 @@ class RunScreen(Screen[None]):
                     with _panel("now", "What is happening", "e explains the method"):
                         yield Happening(id="happening")
             with Vertical(id="run-more"):
-                yield ModelsLeft(id="models-panel")
+                yield ModelsLeft(self.find, id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
                     yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         if self.poll.watch:
@@ -313,10 +313,6 @@ class RunScreen(Screen[None]):
     def _selected(self) -> None:
         self.show_legend()
         self._show_keys()
-
-    @on(Lines.Clicked, "#models")
-    def _model_clicked(self, event: Lines.Clicked) -> None:
-        self.find(event.item)
 
     def find(self, name: str) -> None:
         self.action_pane("map")

@@ -102,10 +102,10 @@ def listed(entries: Sequence[Entry], width: int) -> Iterator[Text]:
     """The letter of each model on the map, its name, how often f shows without it, and the interval of that in %."""
     names = told_apart(tuple(one.name for one in entries if one.claim is not None), _name(width))
     for one in entries:
-        text, claim = Text(f"{one.letter:<3}", "bold", no_wrap=True), one.claim
+        claim = one.claim
         if one.figures:
             room = max(4, width - len(one.figures) - 4)
-            text.append(f"{padded(shortened(one.name, room), room)} {one.figures}", "not bold")
+            text = Text(f"   {padded(shortened(one.name, room), room)} {one.figures}", no_wrap=True)
         elif claim is None:
             sign = "○" if one.name == NEAREST else " "
             text = Text(f"{sign}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
@@ -113,6 +113,7 @@ def listed(entries: Sequence[Entry], width: int) -> Iterator[Text]:
             exact = claim.is_exact or not claim.runs
             interval = "" if exact else f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}"
             figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
+            text = Text(f"{one.letter:<3}", "bold", no_wrap=True)
             text.append(f"{padded(names[one.name], _name(width))}{figures}", "not bold")
         yield text
 

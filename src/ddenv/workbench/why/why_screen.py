@@ -26,6 +26,7 @@ from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
 from ddenv.workbench.help.dialogs import Reading
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.playback_screen import Playback, way_of, without
@@ -102,7 +103,7 @@ class WhyScreen(Screen[None]):
                     yield Static("", id="why-said", markup=False)
             with Framed("World", id="why-world", classes="panel"):
                 yield self.map
-                yield Static("", id="why-legend", markup=False)
+                yield MapLines(only_signs=True, id="why-legend")
         with VerticalScroll(id="why-nothing"):
             yield Static("", id="why-empty", markup=False)
         yield KeyFooter(FIRST)
@@ -204,8 +205,7 @@ class WhyScreen(Screen[None]):
         self.map.show_ways(ways, parting, apart, self._place.prints)
         title = "World" if one.parting is None or not ways else f"The two paths, seed {one.parting.seed}"
         self.query_one("#why-world").border_title = Text(title)
-        legend = self.query_one("#why-legend", Static)
-        legend.update(self.map.legend(legend.size.width))
+        self.query_one(MapLines).show(self.map.shown)
 
     def _ways(self, one: Entry) -> tuple[tuple[Way, ...], Sequence[str]]:
         """The ways of the two runs that are compared, and what the run file lacks of them."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from rich.segment import Segment
 from rich.text import Text
 from textual import events
 from textual.geometry import Size
-from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
@@ -21,17 +19,6 @@ class Lines(ScrollView, can_focus=True):
     With `parts` an item takes several lines: `parts(item, width)` are what `line` is called with.
     """
 
-    @dataclass
-    class Clicked(Message):
-        """A line was clicked; `item` is what it shows."""
-
-        lines: Lines
-        item: Any
-
-        @property
-        def control(self) -> Lines:
-            return self.lines
-
     def __init__(
         self,
         line: Callable[[Any, int], Text],
@@ -39,11 +26,12 @@ class Lines(ScrollView, can_focus=True):
         nothing: str = "",
         tail: bool = False,
         parts: Callable[[Any, int], Sequence[Any]] | None = None,
+        clicked: Callable[[Any], object] = lambda _: None,
         id: str | None = None,
     ) -> None:
-        """`nothing` is shown when there are no items."""
+        """`nothing` is shown when there are no items; `clicked` is called with what a line shows that was clicked."""
         super().__init__(id=id)
-        self._line, self._nothing, self._tail, self._parts = line, nothing, tail, parts
+        self._line, self._nothing, self._tail, self._parts, self._clicked = line, nothing, tail, parts, clicked
         self.items: Sequence[Any] = ()
         # What each line is made of, and how many columns the items were taken apart for.
         self._rows: Sequence[Any] = ()
@@ -90,7 +78,7 @@ class Lines(ScrollView, can_focus=True):
     def on_click(self, event: events.Click) -> None:
         place = int(event.y + self.scroll_offset.y)
         if 0 <= place < len(self._rows):
-            self.post_message(self.Clicked(self, self._rows[place]))
+            self._clicked(self._rows[place])
 
     def render_line(self, y: int) -> Strip:
         width, base = self.scrollable_content_region.width, self.rich_style
