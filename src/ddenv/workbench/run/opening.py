@@ -138,7 +138,7 @@ class Opening:
     def copy(self) -> None:
         path, name = self._poll.path, attach_name(self._poll.path)
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
-        if selected := self._screen.keys.pointed.models:
+        if selected := self._screen.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
         texts += [("to come back", f"ddenv open {name}"), ("to go on without a screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]

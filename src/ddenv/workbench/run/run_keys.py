@@ -5,18 +5,9 @@ A key that guides the run has the action `guide`, with its name in `ddenv.guidin
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from textual.binding import Binding, BindingType
 
-from ddenv.guiding.offers import Offer, Pointed, offer
-from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.run.snapshot import NOT_NOW
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
-
-if TYPE_CHECKING:
-    from ddenv.workbench.run.run_screen import RunScreen
-
 
 # The footer's keys by priority; the last ones fit on wide screens only.
 FIRST = ids(
@@ -117,58 +108,3 @@ KEYS: list[BindingType] = [
         ("detach", "d", "detach", "detach", "leave the workbench; the engine goes on"),
     ),
 ]
-
-
-class KeyOffers:
-    """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in the table and on the map."""
-
-    def __init__(self, screen: RunScreen) -> None:
-        self._screen = screen
-
-    def offer(self, name: str) -> Offer:
-        if self._screen.browsing.is_past:
-            return Offer(why_not=NOT_NOW)
-        return offer(name, self._screen.asking.situation, self.pointed)
-
-    @property
-    def pointed(self) -> Pointed:
-        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
-        world, table = self._screen.world, self._screen.table
-        names = frozenset(world.selection)
-        if not names and world.has_focus and (name := world.model_at_cursor) is not None:
-            names = frozenset((name,))
-        known = tuple(name for name in self._screen.poll.snapshot.state.elements if name in names) if names else ()
-        row = table.under_cursor if table.is_attached and table.is_on_screen else None
-        return Pointed(row, table.following, (*known, *sorted(names.difference(known))))
-
-    def show(self, footer: KeyFooter) -> None:
-        now, pointed = self._screen.asking.situation, self.pointed
-        for name, binding in GUIDING.items():
-            offered = offer(name, now, pointed)
-            footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
-
-    def pressed(self, key: str) -> None:
-        # To list what all keys do now takes longer than most keys take.
-        if any(each in GUIDING.values() for each in self._screen._bindings.key_to_bindings.get(key, ())):
-            active = self._screen.active_bindings.get(key)
-            if active is not None and not active.enabled and active.node is self._screen:
-                name = next(name for name, each in GUIDING.items() if each.id == active.binding.id)
-                self._screen.asking.refuse(self.offer(name).why_not)
-
-    def use(self, name: str) -> None:
-        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
-        offered, asking, opening = self.offer(name), self._screen.asking, self._screen.opening
-        if self._screen.browsing.is_past:
-            asking.refuse(offered.why_not)
-        elif offered.command is not None and name != "pin":
-            asking.ask(offered.command)
-        elif name == "change":
-            opening.change()
-        elif name in TITLES:
-
-            def chosen(models: tuple[str, ...]) -> None:
-                now = offer(name, asking.situation, Pointed(models=models))
-                asking.refuse(now.why_not) if now.command is None else asking.ask(now.command)
-
-            environment = self._screen.poll.snapshot.state.environment
-            opening.choose(TITLES[name], environment, True, chosen, self.pointed.models)

@@ -17,6 +17,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.runfile.position import Step
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
@@ -32,8 +33,8 @@ from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
-from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, KeyOffers
-from ddenv.workbench.run.snapshot import Browsing
+from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, GUIDING, KEYS, LOOKING, ON_MAP, TITLES
+from ddenv.workbench.run.snapshot import NOT_NOW, Browsing
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_lines
 from ddenv.workbench.shared.messages import Attention
@@ -82,7 +83,6 @@ class RunScreen(Screen[None]):
         self._legend = MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
-        self.keys = KeyOffers(self)
         self._pane = "map"
         # Whether something is not shown yet, whether the next look comes soon, and when the run was shown last.
         self._stale, self._coming, self._shown_at = False, False, time.monotonic()
@@ -246,21 +246,61 @@ class RunScreen(Screen[None]):
 
     # The keys that guide the run.
 
+    @property
+    def pointed(self) -> Pointed:
+        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
+        names = self.world.selection
+        if not names and self.world.has_focus and (name := self.world.model_at_cursor) is not None:
+            names = frozenset((name,))
+        known = tuple(name for name in self.poll.snapshot.state.elements if name in names) if names else ()
+        row = self.table.under_cursor if self.table.is_attached and self.table.is_on_screen else None
+        return Pointed(row, self.table.following, (*known, *sorted(names.difference(known))))
+
+    def _offer(self, name: str) -> Offer:
+        """What a key does now, by its name in `ddenv.guiding.offers.ACTIONS`."""
+        if self.browsing.is_past:
+            return Offer(why_not=NOT_NOW)
+        return offer(name, self.asking.situation, self.pointed)
+
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action != "guide":
             return True
-        return None if self.keys.offer(str(parameters[0])).why_not else True
+        return None if self._offer(str(parameters[0])).why_not else True
 
     def action_guide(self, name: str) -> None:
-        self.keys.use(name)
+        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
+        offered = self._offer(name)
+        if self.browsing.is_past:
+            self.asking.refuse(offered.why_not)
+        elif offered.command is not None and name != "pin":
+            self.asking.ask(offered.command)
+        elif name == "change":
+            self.opening.change()
+        elif name in TITLES:
+
+            def chosen(models: tuple[str, ...]) -> None:
+                now = offer(name, self.asking.situation, Pointed(models=models))
+                self.asking.refuse(now.why_not) if now.command is None else self.asking.ask(now.command)
+
+            self.opening.choose(TITLES[name], self.poll.snapshot.state.environment, True, chosen, self.pointed.models)
 
     def on_key(self, event: events.Key) -> None:
-        self.keys.pressed(event.key)
+        """Says why a key does nothing."""
+        # To list what all keys do now takes longer than most keys take.
+        if any(each in GUIDING.values() for each in self._bindings.key_to_bindings.get(event.key, ())):
+            active = self.active_bindings.get(event.key)
+            if active is not None and not active.enabled and active.node is self:
+                name = next(name for name, each in GUIDING.items() if each.id == active.binding.id)
+                self.asking.refuse(self._offer(name).why_not)
 
     @on(WorldMap.Pointed)
     def _show_keys(self) -> None:
-        if not self.poll.watch and self._footer.is_attached:
-            self.keys.show(self._footer)
+        if self.poll.watch or not self._footer.is_attached:
+            return
+        now, pointed = self.asking.situation, self.pointed
+        for name, binding in GUIDING.items():
+            offered = offer(name, now, pointed)
+            self._footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
     def _keys_here(self) -> tuple[str, ...]:
         if self.browsing.is_past:
