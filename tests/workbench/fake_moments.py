@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.store import ROBOT
 from ddenv.words.claims import verdict_on
@@ -120,6 +122,15 @@ def finished(run: FakeRun) -> FakeRun:
     claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
     run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
+
+
+def faster_without(run: FakeRun) -> FakeRun:
+    """A finished run in which the robot is faster without crate_00."""
+    finished(run)
+    samples = path_samples()[: 8 * 60]
+    samples[1::8] = array("d", [1.2 * x + 1.2 for x in samples[1::8]])
+    run.put_motion(61, samples)
+    return run
 
 
 def isolating(run: FakeRun) -> FakeRun:

@@ -162,6 +162,10 @@ class FakeRun:
         self.finish(number, outcome, distance, failure=failure)
         return number
 
+    def put_motion(self, test: int, samples: array, model: str = ROBOT) -> None:
+        """Another way of a model in a test."""
+        self.file._db.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (test, model, samples.tobytes()))
+
     def imply(self, candidate: int, by: int) -> int:
         """The first test of a candidate follows from the test `by`."""
         self.tests += 1

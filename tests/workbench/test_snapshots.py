@@ -1,7 +1,6 @@
 """What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking at them."""
 
 import math
-from array import array
 from contextlib import suppress
 
 import fake_moments
@@ -13,7 +12,6 @@ from textual.worker import WorkerCancelled
 
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, open_lesson
-from ddenv.runfile.store import ROBOT
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.shared.messages import ShowLessons
@@ -157,28 +155,19 @@ def test_what_a_key_opens(snap_compare, run, name, theme, size):
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
 
 
-def parts(run):
-    """A finished run in which the robot is faster without crate_00."""
-    fake_moments.finished(run)
-    samples = fake_run.path_samples()[: 8 * 60]
-    samples[1::8] = array("d", [1.2 * x + 1.2 for x in samples[1::8]])
-    run.file._db.execute("INSERT OR REPLACE INTO motion VALUES (61, ?, ?)", (ROBOT, samples.tobytes()))
-    run.write("paused")
-
-
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[USUAL]), ids=str)
 @pytest.mark.parametrize(
     "keys", slow(pytest.mark.screens, [(), ("enter", *["right"] * 20)], but=[()]), ids=["why", "both"]
 )
 def test_why_it_fails(snap_compare, run, keys, size):
-    parts(run)
+    fake_moments.faster_without(run).write("paused")
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "W", *keys))
 
 
 @pytest.mark.screens
 def test_both_runs_in_no_colour(snap_compare, run, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
-    parts(run)
+    fake_moments.faster_without(run).write("paused")
     keys = ("W", "enter", *["right"] * 20)
     assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=shown("ddenv", *keys))
 

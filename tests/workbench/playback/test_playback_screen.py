@@ -1,6 +1,5 @@
 """Tests played back on the map: the robot moves with the time, frame by frame, alone or over another test, by keys and mouse."""
 
-import sqlite3
 from array import array
 
 import fake_moments
@@ -18,7 +17,6 @@ from ddenv.workbench.playback.playback_screen import SPEEDS, Playback, Playing, 
 from ddenv.workbench.playback.timeline import NOW, Timeline
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.why.why_screen import WhyScreen
-from tests.workbench.fake_run import path_samples
 
 
 def robots(screen):
@@ -26,19 +24,6 @@ def robots(screen):
     text = [screen.map._canvas.text(row) for row in range(screen.map.size.height)]
     signs = ARROWS + HOLLOW
     return {(char, (y, x)) for y, line in enumerate(text) for x, char in enumerate(line) if char in signs}
-
-
-def way(speed=1.0, until=80):
-    """The path of the fake robot, sped up, and cut after some rows."""
-    samples = path_samples()[: 8 * until]
-    samples[1::8] = array("d", [-6 + speed * (x + 6) for x in samples[1::8]])
-    return samples
-
-
-def put(run, test, samples, model=""):
-    with sqlite3.connect(run.path) as database:
-        database.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (test, model, samples.tobytes()))
-    database.close()
 
 
 async def settled(session):
@@ -49,10 +34,8 @@ async def settled(session):
 
 @pytest.fixture
 def two_ways(run):
-    """A run in which crate_00 makes the robot slower: without it the run of the same seed ends sooner."""
-    fake_moments.finished(run)
-    put(run, 61, way(1.2, 60))
-    return run
+    """Without crate_00 the run of the same seed ends sooner."""
+    return fake_moments.faster_without(run)
 
 
 async def test_the_row_under_the_cursor_is_played_and_the_robot_moves(two_ways):
@@ -181,7 +164,7 @@ async def test_models_move_where_their_motion_is_stored(runs):
     motion = array("d")
     for time, x in ((0.0, -1.8), (20.0, -1.8), (40.0, 4.0)):
         motion.extend((time, x, -2.0, 0.15, 1, 0, 0, 0))
-    put(run, 1, motion, "crate_03")
+    run.put_motion(1, motion, "crate_03")
     async with Attached(run) as session:
         session.app.screen.opening.play_row(run.state.tests[0])
         screen = await settled(session)
@@ -199,9 +182,7 @@ async def test_models_move_where_their_motion_is_stored(runs):
 
 
 async def test_without_trajectories_it_says_what_is_missing_and_shows_the_rest(two_ways):
-    with sqlite3.connect(two_ways.path) as database:
-        database.execute("DELETE FROM motion")
-    database.close()
+    two_ways.file._db.execute("DELETE FROM motion")
     async with Attached(two_ways) as session:
         await session.press("P")
         screen = await settled(session)

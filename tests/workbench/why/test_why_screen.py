@@ -1,7 +1,5 @@
 """The why view: each model that is left, what happens without it, and the robot's ways with and without it on one map."""
 
-import sqlite3
-
 import fake_moments
 import fake_run
 import pytest
@@ -121,9 +119,7 @@ async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run)
 
 async def test_damaged_trajectories_are_told_and_the_rest_is_shown(run):
     fake_moments.finished(run)
-    with sqlite3.connect(run.path) as database:
-        database.execute("DELETE FROM motion")
-    database.close()
+    run.file._db.execute("DELETE FROM motion")
     async with Attached(run) as session:
         screen = await opened(session)
         said = words(screen, "#why-said")
@@ -158,9 +154,7 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
     with RunFile(run.path) as file:
         known = nearest(file, run.state)
     if damaged:
-        with sqlite3.connect(run.path) as database:
-            database.execute("DELETE FROM motion")
-        database.close()
+        run.file._db.execute("DELETE FROM motion")
     async with Attached(run) as session:
         screen = await opened(session)
         options = screen.query_one(OptionList)
