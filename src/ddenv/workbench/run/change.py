@@ -44,13 +44,13 @@ class Change(ModalScreen[course.Change | None]):
 
     def compose(self) -> ComposeResult:
         options = settings(self._state)
-        now_chosen = chosen(options.algorithm, options.pair)
+        used = chosen(options.algorithm, options.pair)
         with Framed("Change settings, from the next round on", "ctrl+s changes   escape cancels"):
             with VerticalScroll(can_focus=False, classes="fields"):
                 for kind in KINDS:
                     with Horizontal(classes="row"):
                         yield Static(kind, classes="label", markup=False)
-                        now = now_chosen[kind]
+                        now = used[kind]
                         # A schema of another package may not be installed here: it can stay.
                         known = (*names(kind), *(() if now in names(kind) else (now,)))
                         yield _select(kind, [(Text(plain(name)), name) for name in known], now)
@@ -59,8 +59,8 @@ class Change(ModalScreen[course.Change | None]):
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
                         now = "" if (value := getattr(options, one.name)) is None else str(value)
-                        names_of = [(Text(name), name) for name in one.choices]
-                        yield _select(one.name, names_of, now) if one.choices else Entry(now, id=one.name)
+                        choices = [(Text(name), name) for name in one.choices]
+                        yield _select(one.name, choices, now) if one.choices else Entry(now, id=one.name)
                     empty = "; empty: no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)
