@@ -30,7 +30,8 @@ from ddenv.guiding.commands import (
 )
 from ddenv.guiding.offers import ACTIONS, Pointed, offer
 from ddenv.runfile.store import RunFile
-from ddenv.workbench.run.run_keys import GUIDING, KeyOffers
+from ddenv.workbench.run.run_keys import GUIDING
+from ddenv.workbench.run.run_screen import RunScreen
 from tests.engine.fake import ELEMENTS, new_run
 from tests.engine.guided import COMMANDS, Disturbed, at_once
 from tests.engine.killing import killed
@@ -181,17 +182,13 @@ def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engi
         with RunFile(begun(folder, salt, plan, moment, "automatic")) as file:
             state = Journal(file).state
         now = Situation(state, engine, barred)
-        table = SimpleNamespace(under_cursor=None, following=True, is_attached=True, is_on_screen=True)
-        world, poll = (
-            SimpleNamespace(selection=models, has_focus=False),
-            SimpleNamespace(snapshot=SimpleNamespace(state=state)),
-        )
-        browsing, asking = SimpleNamespace(is_past=False), SimpleNamespace(situation=now)
-        screen = SimpleNamespace(browsing=browsing, poll=poll, table=table, world=world, asking=asking)
-        keys, said = KeyOffers(screen), {}
-        keys.show(SimpleNamespace(say=said.__setitem__))
+        said, pointed = {}, Pointed(models=tuple(models))
+        footer = SimpleNamespace(say=said.__setitem__, is_attached=True)
+        screen = SimpleNamespace(pointed=pointed, asking=SimpleNamespace(situation=now), _footer=footer)
+        screen.poll = SimpleNamespace(watch=False)
+        RunScreen._show_keys(screen)
         for action, binding in GUIDING.items():
-            offered = keys.offer(action)
+            offered = offer(action, now, pointed)
             assert bool(said[binding.id]) == (not offered.why_not)
             if offered.command is not None:
                 assert refusal(offered.command, now) == ""

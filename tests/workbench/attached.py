@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run.run_screen import RunScreen
 from tests.conftest import ROOT
@@ -44,9 +42,9 @@ class Session:
     async def look(self):
         """Lets the screen see what was written, without waiting for its clock."""
         self.screen.poll._looked = self.screen.poll._posed = -1e9
-        self.screen.following.look()
+        self.screen.look()
         while self.screen.poll.catching_up:
-            self.screen.following.look()
+            self.screen.look()
         await self.pilot.pause()
         assert not self.screen.snapshot.error or "nonsense" in self.screen.snapshot.error
 
@@ -93,15 +91,3 @@ class Attached:
 
     async def __aexit__(self, *error):
         await self._context.__aexit__(*error)
-
-
-def starts(monkeypatch) -> list:
-    """Engines that are started from now on do nothing; returns where they are noted."""
-    started = []
-
-    def start_engine(path, jobs, **options):
-        started.append((path, jobs, options))
-        return SimpleNamespace(poll=lambda: None)
-
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", start_engine)
-    return started

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.store import ROBOT
 from ddenv.words.claims import verdict_on
@@ -122,6 +124,15 @@ def finished(run: FakeRun) -> FakeRun:
     return _claimed(run, claims)
 
 
+def faster_without(run: FakeRun) -> FakeRun:
+    """A finished run in which the robot is faster without crate_00."""
+    finished(run)
+    samples = path_samples()[: 8 * 60]
+    samples[1::8] = array("d", [1.2 * x + 1.2 for x in samples[1::8]])
+    run.put_motion(61, samples)
+    return run
+
+
 def isolating(run: FakeRun) -> FakeRun:
     """After its end, isolation: the robot passes without the two models that were left; without one of them it is being tried."""
     finished(run).start_isolation(2)
@@ -177,19 +188,9 @@ def with_margins(run: FakeRun) -> FakeRun:
 def margin_ran(run: FakeRun, name: str, value: float, number: int, letter: str) -> None:
     """A run with another value ends as this letter says: f, the goal, or lost."""
     outcome, failure = {"s": ("similar", "stuck"), "p": ("pass", ""), "o": ("other", "lost")}[letter]
-    ended = {"distance": None, "end_pose": None, "wall_seconds": 2.0}
+    ended = {"outcome": outcome, "failure": failure, "distance": None, "end_pose": None, "wall_seconds": 2.0}
     motions = {ROBOT: path_samples().tobytes()}
-    run.write(
-        "margin_ran",
-        motions,
-        name=name,
-        value=value,
-        run=number,
-        seed=number,
-        outcome=outcome,
-        failure=failure,
-        **ended,
-    )
+    run.write("margin_ran", motions, name=name, value=value, run=number, seed=number, **ended)
 
 
 def uncertified(run: FakeRun) -> FakeRun:

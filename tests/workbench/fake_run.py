@@ -144,18 +144,9 @@ class FakeRun:
         end: tuple[float, float, float] = END,
         aside: float = 0.0,
     ) -> None:
-        event = {
-            "test": test,
-            "outcome": outcome,
-            "failure": failure,
-            "distance": distance,
-            "end_pose": [*end, 1.0, 0.0, 0.0, 0.0],
-            "simulated_seconds": 45.0,
-            "wall_seconds": wall,
-            "first_sensed": [],
-            "first_touched": [],
-            "cut": False,
-        }
+        event = {"test": test, "outcome": outcome, "failure": failure, "distance": distance, "cut": False}
+        event |= {"end_pose": [*end, 1.0, 0.0, 0.0, 0.0], "simulated_seconds": 45.0, "wall_seconds": wall}
+        event |= {"first_sensed": [], "first_touched": []}
         if self.met is not None:
             event["took_part"] = self.numbers(self.met)
         way = path_samples()
@@ -170,6 +161,10 @@ class FakeRun:
         number = self.start(candidate, run)
         self.finish(number, outcome, distance, failure=failure)
         return number
+
+    def put_motion(self, test: int, samples: array, model: str = ROBOT) -> None:
+        """Another way of a model in a test."""
+        self.file._db.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (test, model, samples.tobytes()))
 
     def imply(self, candidate: int, by: int) -> int:
         """The first test of a candidate follows from the test `by`."""
@@ -215,16 +210,10 @@ class FakeRun:
         pairs = Pairs(both=shown, second=runs - shown)
         bound = pairs.keeps_at_least(0.015) if without is None else pairs.at_most(0.015)
         names = {"s": "similar", "p": "pass", "o": "other", "e": "error"}
-        return {
-            "without": None if without is None else self.elements.index(without),
-            "verdict": verdict,
-            "shown": shown,
-            "runs": runs,
-            "low": low,
-            "high": high,
-            "outcomes": {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes},
-            "bound": bound,
-        }
+        counts = {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes}
+        claim = {"without": None if without is None else self.elements.index(without), "verdict": verdict}
+        claim |= {"shown": shown, "runs": runs, "low": low, "high": high, "outcomes": counts, "bound": bound}
+        return claim
 
     def start_isolation(self, size: int) -> None:
         """Isolation starts; the `size` first models are what the reduction left."""
@@ -276,21 +265,11 @@ class FakeRun:
         seen = [{"test": tests[0], "runs": failures, "kinds": ["stuck"], "position": END}]
         if others:
             seen.append({"test": tests[failures], "runs": others, "kinds": ["fell"], "position": OTHER_END})
-        self.write(
-            "baseline_finished",
-            runs=runs,
-            failures=failures,
-            rate=failures / runs,
-            low=0.3,
-            high=0.95,
-            failure_test=tests[0],
-            position=END,
-            seen=seen,
-            miss_chance=(1 - failures / runs) ** 4,
-            iterations_95=2,
-            outcomes=outcomes,
-            distances=dict.fromkeys(tests[:failures], 0.1),
-        )
+        rate = failures / runs
+        rates = {"rate": rate, "low": 0.3, "high": 0.95, "miss_chance": (1 - rate) ** 4, "iterations_95": 2}
+        found = {"failure_test": tests[0], "position": END, "seen": seen, "outcomes": outcomes, **rates}
+        distances = dict.fromkeys(tests[:failures], 0.1)
+        self.write("baseline_finished", runs=runs, failures=failures, distances=distances, **found)
         return self
 
     def start_round(self, parts: int, environment: list[str] | None = None, pinned: tuple[str, ...] = ()) -> None:
@@ -302,15 +281,9 @@ class FakeRun:
         partitions = [kept[a:b] for a, b in pairwise(cuts)]
         kinds = ("partition", "complement") if parts > 2 else ("partition",)
         candidates = [[kind, index, 0.4 + 1.7 * index] for index in range(parts) for kind in kinds]
-        self.write(
-            "round_started",
-            round=self.round,
-            n_partitions=parts,
-            environment=whole,
-            partitions=partitions,
-            candidates=candidates,
-            pinned=self.numbers(list(pinned)),
-        )
+        split = {"n_partitions": parts, "partitions": partitions, "candidates": candidates}
+        begun = {"round": self.round, "environment": whole, "pinned": self.numbers(list(pinned))}
+        self.write("round_started", **begun, **split)
         self.write("forecast", round=self.round, tests=[12, 51, 72], tests_done=self.tests)
 
     def supports(self, *pairs: tuple[str, str]) -> None:

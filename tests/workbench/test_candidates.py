@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import fake_moments
+import fake_run
 import pytest
 from attached import SRC
 from textual.app import App
@@ -28,19 +29,12 @@ def large(number: int, judged: int = 0) -> Snapshot:
     """A round of so many candidates of which some are judged, each with one test."""
     names = tuple(f"m{place}" for place in range(number // 2))
     split = Split(names, tuple((name,) for name in names))
-    kinds = ("partition", "complement")
-    candidates = PersistentTuple.of(
-        Candidate(
-            index,
-            kinds[index % 2],
-            index // 2,
-            split,
-            0.5,
-            "dissimilar" * (index < judged),
-            (index + 1,) * (index < judged),
-        )
-        for index in range(number)
-    )
+    found = []
+    for index in range(number):
+        verdict, tests = ("dissimilar", (index + 1,)) if index < judged else ("", ())
+        kind = "complement" if index % 2 else "partition"
+        found.append(Candidate(index, kind, index // 2, split, 0.5, verdict, tests))
+    candidates = PersistentTuple.of(found)
     tests = PersistentTuple.of(
         runs_state.Test(id, 0, "round", 1, id - 1, 0, 0, "pass", distance=1.0) for id in range(1, judged + 1)
     )
@@ -64,16 +58,15 @@ class Table(App):
 
 def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
     rows = rows_of(snapshot(fake_moments.mid_round(run)))
-    assert [rows[0][name] for name in ("tests", "evidence", "to f", "real", "verdict")] == [
-        "4/4",
-        "2◇ 2○",
-        "2.3 m",
-        "8.0 s",
-        "○ dissimilar",
-    ]
+    shown = [rows[0][name] for name in ("tests", "evidence", "to f", "real", "verdict")]
+    assert shown == ["4/4", "2◇ 2○", "2.3 m", "8.0 s", "○ dissimilar"]
     assert rows[1]["tests"] == "1/4"
     assert rows[1]["verdict"].startswith("▶ 2")
     assert (rows[3]["tests"], rows[3]["evidence"], rows[3]["real"]) == ("", "", "")
+    # Without an engine nothing runs.
+    assert rows_of(snapshot(run, "absent"))[1]["verdict"] == ""
+    waiting = fake_moments.waiting(fake_run.FakeRun(run.path.with_name("b.ddenv")))
+    assert rows_of(snapshot(waiting))[0]["verdict"] == "? a or x"
 
 
 def test_what_a_candidate_drops_has_a_sign_and_a_word(run):
@@ -88,16 +81,8 @@ def test_what_a_candidate_drops_has_a_sign_and_a_word(run):
         ("without C", ""),
     ]
     assert (rows[3]["verdict"], rows[4]["verdict"]) == ("drops 3 models", "drops crate_07")
-
-
-def test_what_a_try_drops_has_the_same_sign(run):
-    fake_moments.piled(run)
     run.try_out([name for name in run.elements if name != "crate_04"])
     assert "try 1↓" in [row["candidate"] for row in rows_of(snapshot(run))]
-
-
-def test_what_waits_says_which_keys_decide(run):
-    assert rows_of(snapshot(fake_moments.waiting(run)))[0]["verdict"] == "? a or x"
 
 
 FRESH = ("environment", "runs", "ended", "f", "shown", "verdict")
@@ -145,10 +130,6 @@ def test_a_second_certificate_counts_its_own_runs(run):
 def test_a_search_that_goes_on_has_its_candidates_again(run):
     fake_moments.certifying(run).write("rate_lost", node=1, lost=2, again=[], tests=[])
     assert listed(snapshot(run)).of[0] == "round"
-
-
-def test_tests_of_a_dead_engine_do_not_run(run):
-    assert rows_of(snapshot(fake_moments.mid_round(run), "absent"))[1]["verdict"] == ""
 
 
 def test_trials_of_this_place_stand_above_the_candidates(run):
@@ -221,16 +202,3 @@ async def test_what_is_looked_at_stays_where_it_is():
         await pilot.pause()
         assert app.lines()[1].startswith("501")
         assert table.under_cursor.index == 9_999
-
-
-async def test_vetoed_rows_and_the_cursor_are_seen_without_colours(run, monkeypatch):
-    monkeypatch.setenv("NO_COLOR", "1")
-    fake_moments.mid_round(run).write("vetoed", candidate=3, verdict="vetoed")
-    async with (app := Table()).run_test(size=(60, 11)) as pilot:
-        app.table.show(snapshot(run))
-        await pilot.press("down")
-        assert app.lines()[4].endswith("⊘ vetoed")
-        reversed_rows = [
-            y for y in range(1, 7) if all(each.style.reverse for each in app.table.render_line(y) if each.text.strip())
-        ]
-        assert reversed_rows == [1 + app.table.cursor_row]

@@ -24,103 +24,134 @@ def told(run, engine="alive") -> tuple[int | None, str]:
     return explanation.line, " ".join(explanation.sentences)
 
 
-def test_before_anything_the_key_that_starts_is_named(run):
+def searched(run, parts=2):
+    """The first round has begun."""
+    run.baseline()
+    run.start_round(parts)
+
+
+def counted(run):
+    run.test(None, "failed")
+    run.test(None, "pass", run=1)
+
+
+def first_run(run):
+    searched(run, 3)
+    run.start(0)
+
+
+def rerun(outcome, failure=""):
+    def make(run):
+        searched(run)
+        run.test(0, outcome, 2.3, failure=failure)
+        run.start(0, 1)
+
+    return make
+
+
+def reduced(run):
+    searched(run)
+    run.write("reduced", candidate=0, environment=[0, 1, 2, 3, 4, 5], evidence_test=run.similar(0))
+
+
+def in_vain(run):
+    searched(run)
+    run.dissimilar(0)
+    run.dissimilar(1)
+
+
+def used_up(run):
+    run.baseline().write("changed", settings={"budget": 4})
+    run.write("engine_stopped", reason="the budget of 4 tests is used up")
+
+
+def writes(kind, **data):
+    return lambda run: run.write(kind, **data)
+
+
+NEVER = writes("finished", minimal=False, reason="the robot never failed in 4 runs")
+CUT = lambda run: run.baseline().write("finished", minimal=False, reason="stopped early")  # noqa: E731
+# What happens after a run was created, the line of the algorithm, and words that are said; first while an engine works.
+WORKING = (
+    (counted, 0, "Of 2 runs so far 1 failed and 1 reached the goal"),
+    (writes("noted", about="slow", words="this world is slow: 0.25 s"), 0, "This world is slow: 0.25 s."),
+    (lambda run: run.baseline(), 2, "11 models", "split by model2model", "the robot got stuck in 3 of 4 runs (75 %"),
+    (first_run, 5, "First run of part A (4 models), candidate 1 of 6", "within 0.33 m"),
+    (rerun("pass"), 7, "Re-run 1 of 3", "the goal was reached"),
+    (rerun("other", "tipped over"), 7, "Re-run 1 of 3", "the robot tipped over 2.3 m from f's end"),
+    (rerun("error"), 7, "Re-run 1 of 3", "broke"),
+    (rerun("timeout"), 7, "Re-run 1 of 3", "too long"),
+    (reduced, 11, "11 → 6 models"),
+    (in_vain, 15),
+)
+ENDED = (
+    (CUT, 21, "and 3 more"),
+    (NEVER, None, "The robot never failed in 4 runs."),
+    (writes("engine_stopped", reason=""), None, "r resumes"),
+    (writes("engine_failed", reason="disk full"), None, "could not go on: disk full"),
+    (used_up, None, "was stopped: the budget of 4 tests is used up.", "c raises it, and the run goes on"),
+)
+BEGUN = (*((each, "alive") for each in WORKING), *((each, "absent") for each in ENDED))
+
+
+@pytest.mark.parametrize(("case", "engine"), BEGUN)
+def test_line_and_words_say_what_happens(run, case, engine):
+    make, line, *words = case
+    make(run.created())
+    found = told(run, engine)
+    assert found[0] == line and [each for each in words if each not in found[1]] == []
+    assert make is not NEVER or found[1] == words[0]
+
+
+MINIMAL = (
+    "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 81 %"
+)
+MEANS = "Minimal means: what is left keeps at least 81 % of the whole world's rate"
+CERTIFIES = "they have to show that what is left keeps 67 % of the whole world's rate"
+MOMENTS = (
+    (fake_moments.mid_round, "alive", 7, "1 later candidate at the same time"),
+    (fake_moments.mid_round, "absent", None, "not running", "r resumes", "2 unfinished tests"),
+    (fake_moments.waiting, "alive", 10, "0.12 m from f's end", "a accepts it (11 → 4 models), x rejects"),
+    (fake_moments.certifying, "alive", 21, CERTIFIES, "So far f shows in 11 of 12 runs of what is left."),
+    (fake_moments.certifying, "alive", 21, "Now: run 5 of everything that is left except crate_00."),
+    (fake_moments.finished, "absent", 21, MINIMAL, MEANS, "crate_00, crate_01", "95 % interval 30 % to 95 %"),
+    (fake_moments.uncertified, "absent", 21, "No single model can be removed; no fresh runs were made."),
+    (fake_moments.not_shown, "absent", 21, "Not shown that each model is needed: tests broke without crate_01"),
+)
+
+
+@pytest.mark.parametrize("case", MOMENTS)
+def test_at_each_moment_line_and_words_say_what_happens(run, case):
+    make, engine, line, *words = case
+    make(run)
+    found = told(run, engine)
+    assert found[0] == line and [each for each in words if each not in found[1]] == []
+    # Only a certificate may call it so.
+    assert ("Minimal" in found[1]) == (make is fake_moments.finished)
+
+
+def test_before_an_engine_works_the_key_that_starts_one_is_named(run):
     run.write("created", scenario=run.data, elements=run.elements)
-    line, words = told(run, "absent")
-    assert line is None
-    assert "r starts" in words
-
-
-def test_a_starting_engine_is_not_called_dead(run):
+    assert told(run, "absent")[0] is None and "r starts" in told(run, "absent")[1]
     assert "starts" in told(run.created(), "starting")[1]
+    fake_moments.mid_round(run).write("paused")
+    line, words = told(run)
+    assert line == 7 and words.startswith("Paused: no new test starts; running tests finish first.")
+
+
+@pytest.mark.parametrize("scenario", [{}, {"reduction": 3, "failure": {"epsilon": "x"}}])
+def test_settings_that_make_no_sense_do_no_harm(run, scenario):
+    run.write("created", scenario=scenario, elements=run.elements)
+    run.write("engine_started", pid=1, jobs=1, version="0", simulator="none")
+    assert told(run)[0] == 0
 
 
 def test_it_is_said_that_the_piles_settle(run):
     run.created().write("supports_started")
     assert told(run)[1].startswith("Finding models that support others")
+    assert facts(snapshot(run))["state"][0] == "▶ finding models that support others"
     run.supports()
     assert "rests on" not in told(run)[1]
-
-
-def test_a_slow_world_is_told_while_its_baseline_runs(run):
-    run.created().write("noted", about="slow", words="this world is slow: 0.25 s simulated in each second")
-    assert "This world is slow: 0.25 s simulated in each second." in told(run)[1]
-
-
-def test_the_baseline_counts_its_runs(run):
-    run.created()
-    run.test(None, "failed")
-    run.test(None, "pass", run=1)
-    line, words = told(run)
-    assert line == 0
-    assert "Of 2 runs so far 1 failed and 1 reached the goal" in words
-
-
-def test_between_baseline_and_round_the_partitioning_is_named(run):
-    line, words = told(run.created().baseline())
-    assert line == 2
-    assert "11 models" in words
-    assert "split by model2model" in words
-    assert "Baseline: the robot got stuck in 3 of 4 runs (75 %" in words
-
-
-def test_a_first_run_is_line_5(run):
-    run.created().baseline()
-    run.start_round(3)
-    run.start(0)
-    line, words = told(run)
-    assert line == 5
-    assert "First run of part A (4 models), candidate 1 of 6" in words
-    assert "within 0.33 m" in words
-
-
-@pytest.mark.parametrize(
-    ("outcome", "reason"),
-    [
-        ("pass", "the goal was reached"),
-        ("other", "the robot tipped over 2.3 m from f's end"),
-        ("error", "broke"),
-        ("timeout", "too long"),
-    ],
-)
-def test_a_rerun_is_line_7_and_says_why(run, outcome, reason):
-    run.created().baseline()
-    run.start_round(2)
-    run.test(0, outcome, 2.3, failure="tipped over" if outcome == "other" else "")
-    run.start(0, 1)
-    line, words = told(run)
-    assert line == 7
-    assert "Re-run 1 of 3" in words
-    assert reason in words
-
-
-def test_speculation_is_shown(run):
-    assert "1 later candidate at the same time" in told(fake_moments.mid_round(run))[1]
-
-
-def test_waiting_names_the_keys_and_the_sizes(run):
-    line, words = told(fake_moments.waiting(run))
-    assert line == 10
-    assert "got stuck 0.12 m from f's end" in words
-    assert "a accepts it (11 → 4 models), x rejects" in words
-
-
-def test_a_reduction_is_line_11(run):
-    run.created().baseline()
-    run.start_round(2)
-    test = run.similar(0)
-    run.write("reduced", candidate=0, environment=[0, 1, 2, 3, 4, 5], evidence_test=test)
-    line, words = told(run)
-    assert line == 11
-    assert "11 → 6 models" in words
-
-
-def test_a_round_without_f_is_line_15(run):
-    run.created().baseline()
-    run.start_round(2)
-    run.dissimilar(0)
-    run.dissimilar(1)
-    assert told(run)[0] == 15
 
 
 def test_a_full_disk_comes_first(run):
@@ -129,13 +160,6 @@ def test_a_full_disk_comes_first(run):
     assert facts(snapshot(run))["state"][0] == "! out of disk space"
     run.write("disk_space", enough=True, needed=32_000_000, free=10**9)
     assert "disk" not in told(run)[1]
-
-
-def test_paused_comes_first(run):
-    fake_moments.mid_round(run).write("paused")
-    line, words = told(run)
-    assert line == 7
-    assert words.startswith("Paused: no new test starts; running tests finish first.")
 
 
 def test_after_a_step_its_result_is_shown(run):
@@ -151,14 +175,6 @@ def test_after_a_step_its_result_is_shown(run):
     )
 
 
-def test_a_minimal_end_names_what_is_kept(run):
-    line, words = told(fake_moments.finished(run), "absent")
-    assert line == 21
-    assert "Minimal: 2 models left" in words
-    assert "crate_00, crate_01" in words
-    assert "95 % interval 30 % to 95 %" in words
-
-
 def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run):
     run.created().baseline()
     run.start_round(2)
@@ -171,35 +187,6 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
     words = told(run)[1]
     assert "Run 3 of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in words
     assert "It is accepted once its runs show that it keeps the rate of f" in words
-
-
-def test_a_certificate_comes_before_the_end(run):
-    line, words = told(fake_moments.certifying(run))
-    assert line == 21
-    assert "they have to show that what is left keeps 67 % of the whole world's rate" in words
-    assert "So far f shows in 11 of 12 runs of what is left." in words
-    assert "Now: run 5 of everything that is left except crate_00." in words
-
-
-def test_minimal_is_said_with_what_it_means(run):
-    words = told(fake_moments.finished(run), "absent")[1]
-    assert (
-        "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 81 %"
-        in words
-    )
-    assert "Minimal means: what is left keeps at least 81 % of the whole world's rate" in words
-
-
-def test_without_fresh_runs_nothing_is_called_minimal(run):
-    words = told(fake_moments.uncertified(run), "absent")[1]
-    assert "No single model can be removed; no fresh runs were made." in words
-    assert "Minimal" not in words
-
-
-def test_what_is_not_shown_is_said_in_so_many_words(run):
-    words = told(fake_moments.not_shown(run), "absent")[1]
-    assert "Not shown that each model is needed: tests broke without crate_01" in words
-    assert "Minimal" not in words
 
 
 def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
@@ -225,42 +212,12 @@ def test_a_baseline_that_goes_on_says_why(run):
     assert "Of 4 runs so far 1 failed and 3 reached the goal." in told(run)[1]
 
 
-def test_an_early_end_is_not_called_minimal(run):
-    run.created()
-    run.write("finished", minimal=False, reason="the robot never failed in 4 runs")
-    line, words = told(run, "absent")
-    assert line is None
-    assert words == "The robot never failed in 4 runs."
-
-
-@pytest.mark.parametrize(
-    ("kind", "words"), [("engine_stopped", "r resumes"), ("engine_failed", "could not go on: disk full")]
-)
-def test_stopped_and_failed(run, kind, words):
-    run.created().write(kind, reason="disk full")
-    assert words in told(run, "absent")[1]
-
-
-def test_a_killed_engine_is_named_with_the_key_that_resumes(run):
-    fake_moments.mid_round(run)
-    words = told(run, "absent")[1]
-    assert "not running" in words
-    assert "r resumes" in words
-    assert "2 unfinished tests" in words
-
-
 def test_the_chance_to_miss_f_names_the_cure(run):
     state = fold(run.created().baseline(failures=1).file.events())
     words = "for a 95 % chance of seeing f, use --iterations 2"
     assert words not in baseline(state)
     state.scenario["reduction"] = {"iterations": 1}
     assert words in baseline(state)
-
-
-def test_long_lists_of_models_are_cut(run):
-    run.created().baseline()
-    run.write("finished", minimal=False, reason="stopped early")
-    assert "and 3 more" in told(run, "absent")[1]
 
 
 def test_a_damaged_file_says_so(run):
@@ -305,15 +262,6 @@ def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run
     assert "Accepted another" not in told(run)[1]
 
 
-def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):
-    run.created().baseline()
-    run.write("changed", settings={"budget": 4})
-    run.write("engine_stopped", reason="the budget of 4 tests is used up")
-    words = told(run, "absent")[1]
-    assert "The engine was stopped: the budget of 4 tests is used up." in words
-    assert "c raises it, and the run goes on" in words
-
-
 def test_what_was_pinned_is_not_called_needed(run):
     fake_moments.finished(run)
     run.pin("crate_00")
@@ -335,13 +283,6 @@ def test_a_file_that_is_gone_and_another_engine_are_named(run):
     assert explain(gone).sentences[0] == "x.ddenv: the run file was deleted."
     other = replace(found, state=found.state.changed(engine_version="0.0.1"), version="0.1.0")
     assert explain(other).sentences[0].startswith("Another version of ddenv works on this run (0.0.1)")
-
-
-@pytest.mark.parametrize("scenario", [{}, {"reduction": 3, "failure": {"epsilon": "x"}}])
-def test_settings_that_make_no_sense_do_no_harm(run, scenario):
-    run.write("created", scenario=scenario, elements=run.elements)
-    run.write("engine_started", pid=1, jobs=1, version="0", simulator="none")
-    assert told(run)[0] == 0
 
 
 @pytest.mark.parametrize(

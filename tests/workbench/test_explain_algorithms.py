@@ -45,21 +45,14 @@ def run_by(runs):
         each.close()
 
 
-def leave_out(run, *groups, kept=None):
+def leave_out(run, *groups, kept=tuple(range(11))):
     """A round that leaves out each of the groups (places in the kept models) in turn."""
     run.round += 1
-    kept = list(range(11)) if kept is None else kept
     rest = [place for place in kept if len(groups) == 1 and place not in groups[0]]
     partitions = [*map(list, groups), *([rest] if rest else [])]
     candidates = [["complement", index, 0.0] for index in range(len(groups))]
-    run.write(
-        "round_started",
-        round=run.round,
-        n_partitions=len(partitions),
-        environment=kept,
-        partitions=partitions,
-        candidates=candidates,
-    )
+    parts = {"n_partitions": len(partitions), "environment": list(kept), "partitions": partitions}
+    run.write("round_started", round=run.round, **parts, candidates=candidates)
 
 
 BEGINNINGS = {

@@ -5,13 +5,11 @@ import sys
 
 import fake_moments
 import pytest
-from attached import Attached, starts
+from attached import Attached
 from textual.widgets import Input, Select
 
 from ddenv.guiding import commands as asks
-from ddenv.guiding.commands import Adopt, Situation, question
-from ddenv.guiding.offers import Pointed, offer
-from ddenv.workbench.help.footer import KeyFooter
+from ddenv.guiding.commands import question
 from ddenv.workbench.help.shortcuts import commands
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
@@ -214,8 +212,7 @@ async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
         ]
 
 
-async def test_a_run_without_an_engine_is_guided_too(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_a_run_without_an_engine_is_guided_too(run, started):
     fake_moments.guided(run)
     async with Attached(run) as session:
         await session.press("1")
@@ -229,8 +226,7 @@ async def test_a_run_without_an_engine_is_guided_too(run, monkeypatch):
         assert len(started) == 1
 
 
-async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_a_finished_run_goes_on_from_a_try(run, started):
     fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("r", "space", "s")
@@ -240,8 +236,7 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
         assert len(started) == 1
 
 
-async def test_one_key_leaves_out_the_model_that_only_helps(run, monkeypatch):
-    starts(monkeypatch)
+async def test_one_key_leaves_out_the_model_that_only_helps(run, started):
     fake_moments.helped(run)
     async with Attached(run) as session:
         assert "Minimal but for crate_01" in session.text("#happening")
@@ -286,23 +281,6 @@ async def test_no_run_inside_begins_before_all_is_over(run, make, why):
         assert session.said() == why
 
 
-@pytest.mark.parametrize(
-    ("make", "shown"),
-    [
-        (fake_moments.helped, {"leave out", "try without", "try only", "undo"}),
-        (fake_moments.waiting, {"pause", "accept", "reject", "try without", "try only"}),
-    ],
-)
-async def test_the_footer_offers_what_can_be_done_now(run, make, shown):
-    make(run).hold()
-    async with Attached(run, (200, 60)) as session:
-        footer = {key.words for key in session.screen.query_one(KeyFooter).entries}
-        assert footer - {"pins", "history", "settings", "export", "why", "inside", "help", "quit", *MORE} == shown
-
-
-MORE = {"signs", "facts", "play", "rounds", "find", "layers", "copy", "scene", "runs"}
-
-
 async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
@@ -326,44 +304,7 @@ async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
         assert not {"run.step", "run.step_round"} & offered()
 
 
-def test_a_in_the_footer_says_what_it_would_take(run):
-    fake_moments.guided(run)
-    run.finish(17, "similar", 0.1, failure="stuck")
-    run.judge_trial(3, "similar", [17])
-    run.write("unpinned", models=[0])
-    now = Situation(run.state)
-    words = [offer("accept", now, Pointed(row)).words for row in now.state.trials]
-    assert words == ["", "count as f", "adopt"]
-    # From anywhere it adopts the last try that shows f.
-    assert offer("accept", now, Pointed()).command == Adopt(3)
-
-
-@pytest.mark.screens
-async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):
-    started = starts(monkeypatch)
-    fake_moments.finished(run)
-    async with Attached(run) as session:
-        await session.press("p", "slash", *"00", "enter")
-        words = "pinned, so that it always stays: crate_00. A new search begins from 2 models; an engine starts"
-        assert words in session.said()
-        assert session.asked() == [("pin", {"models": [0]})]
-        assert len(started) == 1
-
-
-async def test_when_the_run_has_ended_the_next_steps_are_in_sight_and_i_finds_a_world_that_passes(run, monkeypatch):
-    started = starts(monkeypatch)
-    fake_moments.finished(run)
-    async with Attached(run, (80, 24)) as session:
-        for key in ("1", "2"):
-            await session.press(key)
-            words = [key.words for key in session.screen.query_one(KeyFooter).entries]
-            assert words[:4] == ["why", "world that passes", "export", "play"] and words[-2:] == ["quit", "help"]
-        await session.press("i")
-        assert [options for *_, options in started] == [{"accept_mode": "automatic", "isolate": 0}]
-
-
-async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, started):
     fake_moments.guided(run).hold()
     async with Attached(run) as session:
         await session.press("u")
@@ -396,7 +337,7 @@ async def test_a_run_file_that_is_gone_is_told_and_can_be_left(run):
     async with Attached(run) as session:
         run.let_go()
         run.path.unlink()
-        session.screen.following.look()
+        session.screen.look()
         await session.pilot.pause()
         assert "was deleted while it was open" in " ".join(session.text("#happening").split())
         await session.press("v", "u")

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import fake_moments
 import fake_run
-from attached import Attached, starts
+from attached import Attached
 from textual.widgets import DataTable
 
 from ddenv.runfile import branches
 from ddenv.runfile.fold import fold
 from ddenv.runfile.progress import Node
-from ddenv.workbench.help.side_by_side import SideBySide
+from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.history import History, lines
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
@@ -84,8 +84,7 @@ async def test_the_history_follows_the_run_and_compares(run):
         assert session.commands() == []
 
 
-async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_works(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_works(run, started):
     fake_moments.finished(run)
     async with Attached(run, (80, 24)) as session:
         await session.press("h", "enter")

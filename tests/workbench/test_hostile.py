@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import fake_moments
 import fake_run
 import pytest
-from attached import Attached, starts
+from attached import Attached
 from rich.cells import cell_len
 
 from ddenv.errors import UserError
@@ -127,41 +127,15 @@ def test_a_locked_run_is_read_again(run):
     assert folder.look()[0].status == "finished"
 
 
-KEYS = [
-    *(
-        "up",
-        "down",
-        "left",
-        "right",
-        "enter",
-        "space",
-        "tab",
-        "shift+tab",
-        "escape",
-        "home",
-        "end",
-        "pageup",
-        "pagedown",
-    ),
-    *(
-        "backspace",
-        "plus",
-        "minus",
-        "slash",
-        "shift+up",
-        "question_mark",
-        "left_square_bracket",
-        "right_square_bracket",
-    ),
-    *("f1", "ctrl+p", *"abcefghijklnopstuvwxyzACEGLNPSW0123456"),
-]
+NAMED = "up down left right enter space tab shift+tab escape home end pageup pagedown backspace plus minus slash"
+NAMED += " shift+up question_mark left_square_bracket right_square_bracket f1 ctrl+p"
+KEYS = [*NAMED.split(), *"abcefghijklnopstuvwxyzACEGLNPSW0123456"]
 SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 
 
 @pytest.mark.fuzz
 @pytest.mark.parametrize("watch", [True, False], ids=["watch", "guide"])
-async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
-    started = starts(monkeypatch)
+async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, started, watch):
     monkeypatch.setattr("ddenv.workbench.shared.processes.Scene.start", lambda self: None)
     fake_moments.guided(run)
     run.hold()

@@ -1,18 +1,17 @@
 """What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking at them."""
 
 import math
-from array import array
 from contextlib import suppress
 
 import fake_moments
 import fake_run
 import pytest
+from test_explain_algorithms import leave_out
 from textual.widgets import Input
 from textual.worker import WorkerCancelled
 
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, open_lesson
-from ddenv.runfile.store import ROBOT
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.shared.messages import ShowLessons
@@ -156,28 +155,19 @@ def test_what_a_key_opens(snap_compare, run, name, theme, size):
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
 
 
-def parts(run):
-    """A finished run in which the robot is faster without crate_00."""
-    fake_moments.finished(run)
-    samples = fake_run.path_samples()[: 8 * 60]
-    samples[1::8] = array("d", [1.2 * x + 1.2 for x in samples[1::8]])
-    run.file._db.execute("INSERT OR REPLACE INTO motion VALUES (61, ?, ?)", (ROBOT, samples.tobytes()))
-    run.write("paused")
-
-
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[USUAL]), ids=str)
 @pytest.mark.parametrize(
     "keys", slow(pytest.mark.screens, [(), ("enter", *["right"] * 20)], but=[()]), ids=["why", "both"]
 )
 def test_why_it_fails(snap_compare, run, keys, size):
-    parts(run)
+    fake_moments.faster_without(run).write("paused")
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "W", *keys))
 
 
 @pytest.mark.screens
 def test_both_runs_in_no_colour(snap_compare, run, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
-    parts(run)
+    fake_moments.faster_without(run).write("paused")
     keys = ("W", "enter", *["right"] * 20)
     assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=shown("ddenv", *keys))
 
@@ -228,25 +218,6 @@ def test_saving_a_scenario(snap_compare, scenarios, monkeypatch, tmp_path):
     assert snap_compare(Workbench(), terminal_size=SMALL, run_before=shown("ddenv", "f7"))
 
 
-def reduced_by(algorithm, runs):
-    data = fake_run.scenario()
-    data["reduction"] |= {"algorithm": algorithm, "accept_rate": "first"}
-    run = fake_run.FakeRun(runs / "crates-1.ddenv", data).created().baseline()
-    run.round = 1
-    groups = [[0, 1, 2, 3], list(range(4, 11))]
-    run.write(
-        "round_started",
-        round=1,
-        n_partitions=2,
-        environment=list(range(11)),
-        partitions=groups,
-        candidates=[["complement", 0, 0.0]],
-    )
-    run.test(0, "pass")
-    run.live((run.start(0, 1), 0.4))
-    return run
-
-
 @pytest.mark.screens
 @pytest.mark.parametrize("size", [SMALL, USUAL], ids=str)
 @pytest.mark.parametrize("does", ["budget", "race"])
@@ -261,7 +232,12 @@ def test_what_a_lesson_lets_students_do(snap_compare, runs, does, size):
 
 @pytest.mark.screens
 def test_run_screen_of_another_algorithm(snap_compare, runs):
-    run = reduced_by("splitting", runs)
+    data = fake_run.scenario()
+    data["reduction"] |= {"algorithm": "splitting", "accept_rate": "first"}
+    run = fake_run.FakeRun(runs / "crates-1.ddenv", data).created().baseline()
+    leave_out(run, [0, 1, 2, 3])
+    run.test(0, "pass")
+    run.live((run.start(0, 1), 0.4))
     run.hold()
     assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
     run.close()

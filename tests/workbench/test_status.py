@@ -47,11 +47,6 @@ def test_how_much_is_left_is_said_also_where_there_is_little_room(run, width):
     assert told["left"].startswith("about ") and "tests" in told
 
 
-def test_it_is_said_that_the_piles_settle(run):
-    run.created().write("supports_started")
-    assert said(snapshot(run))["state"] == "▶ finding models that support others"
-
-
 @pytest.mark.parametrize("width", [200, 120, 100, 80])
 def test_where_f_is_clearly_rarer_the_mark_and_the_key_stay(run, width):
     told = said(snapshot(fake_moments.rarer(run)), width)

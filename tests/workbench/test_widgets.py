@@ -4,18 +4,15 @@ from pathlib import Path
 
 import fake_moments
 import fake_run
-import numpy as np
 import pytest
 
 from ddenv.map.footprints import footprints
-from ddenv.map.paint import Canvas
-from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import about, duration, percent, plain, truncated
 from ddenv.words.signs import brief, metres
 from ddenv.workbench.map.map_colors import mixed
-from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
+from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, kept, looks
 from ddenv.workbench.map.place import Shown
 from ddenv.workbench.shared.processes import last_line
 from ddenv.world.sdf.read import parse_world
@@ -71,18 +68,6 @@ def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run, r
     other.start_round(2)
     assert looks_of(other)["floor"] == (FLOOR, "A")
     other.close()
-
-
-def test_without_colours_the_cells_still_differ(run):
-    state = fold(fake_moments.mid_round(run).file.events())
-    prints = footprints(parse_world(run.world, Path("w.sdf")))
-    view = View(0, 0, 0.25, 64, 18)
-    canvas = Canvas(view.rows, view.columns, (0, 0, 0))
-    who = kept(Shown(snapshot=Snapshot(state), candidate=state.round.candidates[1]))
-    how = looks(prints, who, mixed((0, 0, 0), (255, 255, 255)))
-    fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
-    signs = {chr(char) for char in canvas.chars.flat}
-    assert {"█", "▓", "▒", " "} <= signs
 
 
 def test_the_last_line_of_a_log(tmp_path):

@@ -19,9 +19,9 @@ from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen
 from ddenv.words.decisions import CAME_BY
 from ddenv.words.slices import slice_in_short
+from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_lines
@@ -99,18 +99,15 @@ class History(Screen[int | None]):
         table = self.query_one(DataTable)
         table.clear()
         for row in self._rows:
-            table.add_row(*self._cells(row))
+            node, here = row.node, self._here
+            style = "bold" if node.number == here else "dim" if node.rejected or node.lost_rate else ""
+            size = f"{row.lines}{branches.sign(node, here)} {count(len(node.environment), 'model')}"
+            marked = "marked" if node.number == self._marked else ""
+            words = ", ".join(filter(None, (marked, branches.words(node, here))))
+            cells = (size, str(node.number), plain(node.what), str(node.tests), seen(node), words)
+            table.add_row(*(Text(text, style) for text in cells))
         table.move_cursor(row=next((place for place, row in enumerate(self._rows) if row.node.number == cursor), 0))
         self._show_about()
-
-    def _cells(self, row: branches.Row) -> Iterator[Text]:
-        node = row.node
-        style = "bold" if node.number == self._here else "dim" if node.rejected or node.lost_rate else ""
-        yield Text(f"{row.lines}{branches.sign(node, self._here)} {count(len(node.environment), 'model')}", style)
-        marked = "marked" if node.number == self._marked else ""
-        words = ", ".join(filter(None, (marked, branches.words(node, self._here))))
-        for text in (str(node.number), plain(node.what), str(node.tests), seen(node), words):
-            yield Text(text, style)
 
     @property
     def under_cursor(self) -> Node | None:

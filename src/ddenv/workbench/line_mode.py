@@ -106,28 +106,19 @@ def meaning(line: str, now: Situation) -> Offer | None:
     word, rest = first if first in GUIDES else _KEYS.get(first, ""), rest.strip()
     if not word:
         return None
-    action = GUIDES[word][0]
-    if action not in ("pin", "without", "only"):
-        return offer(action, now, Pointed(row=_row(rest, now.state) if rest else None))
-    if not rest:
-        raise UserError(f"{word}: which models? Type their names after it, separated by commas")
-    return offer(action, now, Pointed(models=_models(rest, now.state)))
-
-
-def _models(typed: str, state: RunState) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in typed.split(",") if name.strip())
-    unknown = next((name for name in names if name not in state.environment), None)
-    if unknown is not None:
-        raise UserError(f"there is no model '{unknown}' in what is left; 'models' lists them")
-    return names
-
-
-def _row(typed: str, state: RunState) -> Row:
+    action, state = GUIDES[word][0], now.state
+    if action in ("pin", "without", "only"):
+        names = tuple(name.strip() for name in rest.split(",") if name.strip())
+        if not names:
+            raise UserError(f"{word}: which models? Type their names after it, separated by commas")
+        if unknown := [name for name in names if name not in state.environment]:
+            raise UserError(f"there is no model '{unknown[0]}' in what is left; 'models' lists them")
+        return offer(action, now, Pointed(models=names))
     rows: list[Row] = [*state.trials, *(state.round.candidates if state.round is not None else ())]
-    found = next((row for row in rows if row.label.casefold() == typed.casefold()), None)
-    if found is None:
-        raise UserError(f"there is no '{typed}' in this round; 'table' lists the candidates and tries")
-    return found
+    row = next((row for row in rows if row.label.casefold() == rest.casefold()), None)
+    if rest and row is None:
+        raise UserError(f"there is no '{rest}' in this round; 'table' lists the candidates and tries")
+    return offer(action, now, Pointed(row))
 
 
 class LineMode:
@@ -195,17 +186,14 @@ class LineMode:
         if asked is not None and line.casefold() in YES:
             self._send(asked)
         elif line in ("help", "?"):
-            self._help()
+            self._say(*(f"{word}: {what}" for word, (_, what) in QUESTIONS.items()))
+            self._say(*(f"{word} or {key}: {what}" for word, (_, key, what) in GUIDES.items()))
+            self._say("quit or q: leave; the engine goes on")
         elif line in QUESTIONS:
             self._say(*QUESTIONS[line][0](self._poll.snapshot))
         else:
             self._guide(line)
         return True
-
-    def _help(self) -> None:
-        self._say(*(f"{word}: {what}" for word, (_, what) in QUESTIONS.items()))
-        self._say(*(f"{word} or {key}: {what}" for word, (_, key, what) in GUIDES.items()))
-        self._say("quit or q: leave; the engine goes on")
 
     def _guide(self, line: str) -> None:
         try:

@@ -26,20 +26,11 @@ def hints(screen):
     return found
 
 
-@pytest.mark.parametrize(
-    ("text", "keys"),
-    [
-        ("enter opens   escape cancels", [("enter opens", "enter"), ("escape cancels", "escape")]),
-        ("← → other tests", [("← → other tests", "left")]),
-        ("tab or click chooses more", [("tab or click chooses more", "tab")]),
-        ("l keep it running   s stop", [("l keep it running", "l"), ("s stop", "s")]),
-        ("^o opens a file", [("^o opens a file", "ctrl+o")]),
-    ],
-)
-def test_each_key_has_the_words_behind_it(text, keys):
-    found = clickable(text)
-    assert found.plain == text
-    assert [(found.plain[at.start : at.end], at.style.meta["key"]) for at in found.spans] == keys
+def test_each_key_has_the_words_behind_it():
+    said = {"enter opens": "enter", "← → other tests": "left", "tab or click chooses": "tab", "^o opens": "ctrl+o"}
+    found = clickable("   ".join(said))
+    assert found.plain == "   ".join(said)
+    assert {found.plain[at.start : at.end]: at.style.meta["key"] for at in found.spans} == said
 
 
 @pytest.mark.parametrize("name", slow(pytest.mark.screens, OPENED, but=["settings"]))

@@ -15,9 +15,9 @@ from ddenv.environment import Environment
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.subject import read_parts
+from ddenv.workbench.map.map_words import legend
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Poll
@@ -113,7 +113,7 @@ async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(b
         await pilot.press("enter")
         assert world.selection == {"crate_02", "crate_03"}
         assert "*B" in text_of(world)
-        assert "* selected" in world.legend(80).plain
+        assert "* selected" in legend(world.shown, 80).plain
         await pilot.press("enter")
         assert pilot.app.selections[-1] == {"crate_03"}
         world.select(())
@@ -232,7 +232,7 @@ async def test_layers_are_shown_or_not(run, layer):
             world.toggle_layer(layer)
         assert seen == [layer not in HIDDEN, layer in HIDDEN]
         world.toggle_layer("partitions")
-        assert "A B" not in world.legend(200).plain
+        assert "A B" not in legend(world.shown, 200).plain
         assert layer in LAYERS
 
 
@@ -253,19 +253,17 @@ def fake_sensed(state, test, sensed):
     return replace(test, first_sensed=sensed, took_part=met)
 
 
-async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(busy):
-    async with Shown(busy) as (_, world):
-        assert world.legend(25, 1).plain == "S start G goal × end of f"
-        assert world.legend(30, 1).plain == "S start  G goal  × end of f"
-        assert world.legend(30, 2).plain.splitlines()[1].startswith("A B parts  ")
-        assert max(map(len, world.legend(30, 2).plain.splitlines())) <= 30
-
-
-async def test_before_the_first_round_the_legend_has_no_letters(run):
-    run.created().baseline()
+async def test_the_legend_begins_with_the_places_and_has_the_letters_once_there_are_parts(run):
+    run.created()
     async with Shown(run) as (_, world):
-        assert world.legend(200).plain.startswith("S start  G goal  × end of f")
-        assert "parts" not in world.legend(200).plain
+        assert legend(world.shown, 200).plain.startswith("S start  G goal  × end of f")
+        assert "parts" not in legend(world.shown, 200).plain
+    fake_moments.mid_round(run)
+    async with Shown(run) as (_, world):
+        assert legend(world.shown, 25, 1).plain == "S start G goal × end of f"
+        assert legend(world.shown, 30, 1).plain == "S start  G goal  × end of f"
+        assert legend(world.shown, 30, 2).plain.splitlines()[1].startswith("A B parts  ")
+        assert max(map(len, legend(world.shown, 30, 2).plain.splitlines())) <= 30
 
 
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
@@ -277,7 +275,7 @@ async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
         world.show(Snapshot(world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
         new = world.picture.canvas.chars[(world.picture.canvas.chars != before)]
         assert (new > 0x2800).any()
-        assert "path of f" in world.legend(100).plain
+        assert "path of f" in legend(world.shown, 100).plain
         world.toggle_layer("original")
         assert (world.picture.canvas.chars == before).all()
 
@@ -312,24 +310,6 @@ async def test_a_model_that_a_running_test_moves_moves_on_the_map(busy):
         assert moved[0][1] > still[0][1] and moved[1] != still[1]
         # The next test begins, and it is back.
         assert at({}) == still
-
-
-async def test_every_part_that_is_seen_has_a_letter_at_any_size(busy):
-    for size in ((36, 9), (20, 7), (80, 24)):
-        async with Shown(busy, size) as (pilot, world):
-            pilot.app.set_focus(None)
-            await pilot.pause()
-            assert set("ABC") <= set(text_of(world))
-
-
-async def test_what_a_trial_leaves_out_has_small_letters(busy):
-    async with Shown(busy, (80, 24)) as (pilot, world):
-        pilot.app.set_focus(None)
-        world.show(replace(world.snapshot, live=()), Trial(1, ("crate_00", "crate_01", "crate_02"), 0))
-        await pilot.pause()
-        text = text_of(world)
-        assert {"A", "B", "b", "c"} <= set(text)
-        assert "C" not in text
 
 
 async def test_words_about_a_model(busy):
@@ -381,16 +361,3 @@ async def test_two_ways_fill_the_map_of_a_large_world(reach):
         assert (shown == len(prints)) == (reach == 10)
         assert all(view.cell(x, y) is not None for x in (0, 6) for y in (0.5, -0.5))
         assert view.cell(6, 0)[1] - view.cell(0, 0)[1] > (30 if reach == 200 else 10)
-
-
-@pytest.mark.parametrize("theme", ["textual-light", "ansi-dark"])
-async def test_in_every_theme_models_stand_out_from_the_background(busy, theme):
-    async with Shown(busy) as (pilot, world):
-        pilot.app.theme = theme
-        await pilot.pause()
-        canvas, index = world.picture.canvas, world._numbers["crate_00"]
-        back = world._palette.back
-        shown = np.argwhere(world.picture.grid[0::2] == index)
-        colors = {int(canvas.fore[tuple(cell)]) for cell in shown} | {int(canvas.back[tuple(cell)]) for cell in shown}
-        assert colors - {back}
-        assert (back == -1) == theme.startswith("ansi")

@@ -8,7 +8,7 @@ from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.side_by_side import SideBySide
+from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.compare_runs import differences, lines
 from ddenv.workbench.runs.recent_runs import RunsFolder

@@ -67,6 +67,6 @@ async def test_who_does_not_want_it_is_left_alone(run, sent):
     async with app.run_test() as pilot:
         await app.workers.wait_for_complete()
         run.write("finished", minimal=False, reason="")
-        app.screen.following.look()
+        app.screen.look()
         await pilot.pause()
         assert sent() == []

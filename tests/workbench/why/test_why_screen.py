@@ -1,11 +1,9 @@
 """The why view: each model that is left, what happens without it, and the robot's ways with and without it on one map."""
 
-import sqlite3
-
 import fake_moments
 import fake_run
 import pytest
-from attached import Attached, starts
+from attached import Attached
 from click.testing import CliRunner
 from textual.widgets import OptionList
 
@@ -86,18 +84,24 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
         assert screen.query_one(OptionList).option_count == 2
 
 
-async def test_before_the_search_has_ended_there_is_nothing_to_do(run):
-    fake_moments.mid_round(run).hold()
-    async with Attached(run) as session:
-        assert "The search is still running" in words(await opened(session), "#why-empty")
-
-
-async def test_where_all_could_stay_away_there_is_nothing_to_look_at(run):
+def nothing_needed(run):
     fake_moments._rounds(run).start_certificate()
     run.certify_all(2, None, 6 * "s")
     run.finish_certificate((None, "kept", 6 * "s"))
+    return run
+
+
+@pytest.mark.parametrize(
+    ("moment", "why"),
+    [
+        (fake_moments.mid_round, "The search is still running"),
+        (nothing_needed, "No model is left to leave out"),
+    ],
+)
+async def test_where_there_is_nothing_to_look_at_it_says_why(run, moment, why):
+    moment(run).hold()
     async with Attached(run) as session:
-        assert "No model is left to leave out" in words(await opened(session), "#why-empty")
+        assert why in words(await opened(session), "#why-empty")
 
 
 async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run):
@@ -107,18 +111,15 @@ async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run)
     async with Attached(run) as session:
         said = words(await opened(session), "#why-empty")
     assert "none was left out: what is left keeps less than 80 %" in said and "f in 6 of 12 fresh runs" in said
-    assert (
-        CliRunner().invoke(command_line, ["why", str(run.path)], standalone_mode=False).output.split() == said.split()
-    )
+    typed = CliRunner().invoke(command_line, ["why", str(run.path)], standalone_mode=False)
+    assert typed.output.split() == said.split()
     write_report(run.path, run.path.with_suffix(".md"))
     assert "none was left out: what is left keeps less than 80 %" in run.path.with_suffix(".md").read_text()
 
 
 async def test_damaged_trajectories_are_told_and_the_rest_is_shown(run):
     fake_moments.finished(run)
-    with sqlite3.connect(run.path) as database:
-        database.execute("DELETE FROM motion")
-    database.close()
+    run.file._db.execute("DELETE FROM motion")
     async with Attached(run) as session:
         screen = await opened(session)
         said = words(screen, "#why-said")
@@ -153,9 +154,7 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
     with RunFile(run.path) as file:
         known = nearest(file, run.state)
     if damaged:
-        with sqlite3.connect(run.path) as database:
-            database.execute("DELETE FROM motion")
-        database.close()
+        run.file._db.execute("DELETE FROM motion")
     async with Attached(run) as session:
         screen = await opened(session)
         options = screen.query_one(OptionList)
@@ -175,14 +174,13 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
         assert [one.test.id for one in played._tests] == [known.parting.with_test, known.parting.without_test]
 
 
-async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, monkeypatch):
-    started = starts(monkeypatch)
+async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, started):
     fake_moments.finished(run)
     async with Attached(run) as session:
         screen = await opened(session)
         assert "world that passes" in session.text(KeyFooter)
         await session.press("i")
-        assert started == [(run.path, run.state.jobs, {"accept_mode": "automatic", "isolate": 0})]
+        assert started == [(run.path.name, run.state.jobs, {"accept_mode": "automatic", "isolate": 0})]
         # The engine begins.
         run.hold()
         run.start_isolation(2)
@@ -208,8 +206,7 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, mon
         (fake_moments.isolated, "a nearest world that passes is known"),
     ],
 )
-async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, monkeypatch, moment, why):
-    started = starts(monkeypatch)
+async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, started, moment, why):
     moment(run)
     async with Attached(run) as session:
         await opened(session)
@@ -235,11 +232,8 @@ async def test_margins_are_one_key_away(run, size):
         await opened(session)
         await session.press("m")
         shown = picture_of(session)
-        assert (
-            "crate_00.friction" in shown
-            and "███|███" in shown
-            and "f until 0 (all) … 0.2; then goal ≥" in " ".join(shown.split())
-        )
+        for said in ("crate_00.friction", "███|███", "f until 0 (all) … 0.2; then goal ≥"):
+            assert said in " ".join(shown.split())
         await session.press("escape")
         assert isinstance(session.app.screen, WhyScreen)
 

@@ -38,19 +38,14 @@ class Commands(Provider):
             score = matcher.match(f"theme {name}")
             if score > ENOUGH:
                 yield Hit(score, Content(f"theme: {name}"), partial(setattr, self.app, "theme", name), f"theme {name}")
-        for name in self._models(query):
+        names = dict.fromkeys(each.name for world in self.screen.query(WorldMap) for each in world.place.prints)
+        wanted = query.strip().casefold()
+        for name in islice((name for name in names if wanted and wanted in name.casefold()), MOST_MODELS):
             words = f"go to {shortened(plain(name), LONGEST_NAME)} on the map"
             yield Hit(1.0, Content(words), partial(self._go_to, name), words)
 
     def _run(self, shortcut: Shortcut) -> Callable[[], Awaitable[bool]]:
         return partial(self.app.run_action, shortcut.action, shortcut.node)
-
-    def _models(self, query: str) -> list[str]:
-        wanted = query.strip().casefold()
-        if not wanted:
-            return []
-        names = dict.fromkeys(each.name for world in self.screen.query(WorldMap) for each in world.place.prints)
-        return list(islice((name for name in names if wanted in name.casefold()), MOST_MODELS))
 
     def _go_to(self, name: str) -> None:
         # Where the screen shows one pane at a time, the map may be hidden.

@@ -24,10 +24,6 @@ class Entry:
     words: str
     enabled: bool
 
-    @property
-    def width(self) -> int:
-        return cell_len(self.shown) + cell_len(self.words) + 2
-
 
 class KeyFooter(Keys):
     """Shows bindings by their ids, those `first` that matter most if not all fit.
@@ -69,11 +65,8 @@ class KeyFooter(Keys):
 
     def renew(self) -> None:
         self._due = False
-        if self.is_attached and (entries := self._fitting()) != self.entries:
-            self.entries = entries
-            self.refresh()
-
-    def _fitting(self) -> tuple[Entry, ...]:
+        if not self.is_attached:
+            return
         active = {each.binding.id: each for each in self.screen.active_bindings.values()}
         room = self.screen.size.width
         found: dict[str, Entry] = {}
@@ -82,18 +75,21 @@ class KeyFooter(Keys):
                 continue
             binding = active[id].binding
             words, shown = self._words.get(id, (binding.description, ""))
-            entry = Entry(binding.key, shown or self.app.get_key_display(binding), words, active[id].enabled)
-            if words and entry.width <= room:
-                found[id] = entry
-                room -= entry.width
+            shown = shown or self.app.get_key_display(binding)
+            width = cell_len(shown) + cell_len(words) + 2
+            if words and width <= room:
+                found[id] = Entry(binding.key, shown, words, active[id].enabled)
+                room -= width
         # Help and the way out stand last.
-        return tuple(found[id] for id in sorted(found, key=lambda id: id.endswith(LAST)))
+        entries = tuple(found[id] for id in sorted(found, key=lambda id: id.endswith(LAST)))
+        if entries != self.entries:
+            self.entries = entries
+            self.refresh()
 
     def render(self) -> Content:
-        return Content.assemble(*(part for entry in self.entries for part in (self._drawn(entry), " ")))
-
-    def _drawn(self, entry: Entry) -> Content:
-        drawn = Content.assemble((entry.shown, "bold $footer-key-foreground"), f" {entry.words}")
-        if not entry.enabled:
-            drawn = drawn.stylize("dim")
-        return drawn.stylize(pressing(entry.key, "" if entry.enabled else "app.bell"))
+        parts: list[Content | str] = []
+        for entry in self.entries:
+            drawn = Content.assemble((entry.shown, "bold $footer-key-foreground"), f" {entry.words}")
+            drawn = drawn if entry.enabled else drawn.stylize("dim")
+            parts += [drawn.stylize(pressing(entry.key, "" if entry.enabled else "app.bell")), " "]
+        return Content.assemble(*parts)

@@ -48,23 +48,20 @@ class Framed(Vertical, Keys):
         self._hints = hints
 
     def on_mount(self) -> None:
-        self._show_hints()
-
-    def _show_hints(self) -> None:
-        if self._hints:
-            self.border_subtitle = clickable(self._hints, self._own_keys())
-
-    def say(self, words: str) -> None:
-        """Says what a key did, in place of the keys for a moment: a notice would wait until the dialog is closed."""
-        self.border_subtitle = Content(words)
-        self.set_timer(SAID, self._show_hints)
-
-    def _own_keys(self) -> dict[str, str]:
+        """Shows the hints, with the user's own keys in place of the usual ones."""
+        if not self._hints:
+            return
         now: dict[str | None, list[str]] = {}
         for active in self.screen.active_bindings.values():
             now.setdefault(active.binding.id, []).append(active.binding.key)
         usual = [each for each in Binding.make_bindings(self.screen.BINDINGS) if each.id in now]
-        return {each.key: now[each.id][0] for each in usual if each.key not in now[each.id]}
+        own = {each.key: now[each.id][0] for each in usual if each.key not in now[each.id]}
+        self.border_subtitle = clickable(self._hints, own)
+
+    def say(self, words: str) -> None:
+        """Says what a key did, in place of the keys for a moment: a notice would wait until the dialog is closed."""
+        self.border_subtitle = Content(words)
+        self.set_timer(SAID, self.on_mount)
 
 
 def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:

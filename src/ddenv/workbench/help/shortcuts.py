@@ -6,17 +6,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from rich.table import Table
 from rich.text import Text
-from textual.app import App, ComposeResult
+from textual.app import App
 from textual.binding import ActiveBinding
-from textual.containers import VerticalScroll
 from textual.dom import DOMNode
-from textual.screen import ModalScreen, Screen
-from textual.widgets import Static
+from textual.screen import Screen
 
 from ddenv.text import plain
-from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.help.dialogs import Reading
 from ddenv.workbench.help.key_names import shown
 from ddenv.workbench.shared.bindings import keys
 
@@ -73,9 +70,12 @@ def groups(screen: Screen[Any]) -> list[Group]:
     for active in filter(_words, screen.active_bindings.values()):
         of_app = isinstance(active.node, App) or (active.node is screen and not active.binding.id)
         (everywhere if of_app else own if active.node is screen else panes).append(active)
-    title, hints = _pane(screen.focused)
+    pane, title, hints = screen.focused, "Here", ""
+    if pane is not None:
+        titles = (str(each) for node in pane.ancestors_with_self if (each := getattr(node, "border_title", None)))
+        title, hints = plain(next(titles, title)), (pane.HELP or "") if "HELP" in vars(type(pane)) else ""
     found = [
-        Group(title, _merged(panes), hints),
+        Group(title, _merged(panes), tuple(plain(line) for line in hints.splitlines() if line.strip())),
         Group("This screen", _merged(own)),
         Group("Everywhere", _merged(everywhere)),
     ]
@@ -87,18 +87,16 @@ def commands(screen: Screen[Any]) -> list[Shortcut]:
 
 
 def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
-    keys: dict[str, list[str]] = {}
-    first: dict[str, ActiveBinding] = {}
+    """A shortcut for each action, with all its keys."""
+    same: dict[str, list[ActiveBinding]] = {}
     for active in found:
-        what = active.binding.id or _words(active)
-        first.setdefault(what, active)
-        keys.setdefault(what, []).append(active.binding.key)
-    return tuple(_shortcut(active, shown(",".join(keys[what]))) for what, active in first.items())
-
-
-def _shortcut(active: ActiveBinding, keys: str) -> Shortcut:
-    binding = active.binding
-    return Shortcut(keys, _words(active), binding.action, active.node, binding.id or "", active.enabled)
+        same.setdefault(active.binding.id or _words(active), []).append(active)
+    shortcuts = []
+    for active, *more in same.values():
+        binding, keys = active.binding, shown(",".join(each.binding.key for each in (active, *more)))
+        id = binding.id or ""
+        shortcuts.append(Shortcut(keys, _words(active), binding.action, active.node, id, active.enabled))
+    return tuple(shortcuts)
 
 
 def _words(active: ActiveBinding) -> str:
@@ -106,36 +104,6 @@ def _words(active: ActiveBinding) -> str:
     if not binding.id:
         return TEXTUAL_WORDS.get(binding.action, "")
     return plain(active.tooltip or binding.tooltip or binding.description)
-
-
-def _pane(focused: DOMNode | None) -> tuple[str, tuple[str, ...]]:
-    if focused is None:
-        return "Here", ()
-    nodes = focused.ancestors_with_self
-    title = next((str(title) for node in nodes if (title := getattr(node, "border_title", None))), "Here")
-    hints = (focused.HELP or "").splitlines() if "HELP" in vars(type(focused)) else []
-    return plain(title), tuple(plain(line) for line in hints if line.strip())
-
-
-class Reading(ModalScreen[None]):
-    """A dialog with rows under titles: what stands there, in bold, and what it means."""
-
-    def __init__(self, title: str, groups: Iterable[tuple[str, Iterable[tuple[str | Text, str | Text]]]]) -> None:
-        super().__init__()
-        self._title, self._groups = title, groups
-
-    def compose(self) -> ComposeResult:
-        table = Table.grid(padding=(0, 2))
-        table.add_column(justify="right", style="bold", min_width=4, max_width=24)
-        table.add_column(overflow="fold")
-        for title, rows in self._groups:
-            if table.row_count:
-                table.add_row()
-            table.add_row("", Text(title, "bold underline"))
-            for row in rows:
-                table.add_row(*row)
-        with Framed(self._title, "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
-            yield Static(table, markup=False)
 
 
 class Help(Reading):

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ddenv.runfile import branches
 from ddenv.words.signs import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
-from ddenv.workbench.help.shortcuts import Reading
+from ddenv.workbench.help.dialogs import Reading
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, NO_PART, OF_WAYS, PARTS
 from ddenv.workbench.shared.bindings import keys
 
@@ -14,6 +14,9 @@ Signs = tuple[tuple[str, str], ...]
 
 
 def signs() -> dict[str, Signs]:
+    claims: dict[str, list[str]] = {}
+    for verdict, sign in CLAIM.items():
+        claims.setdefault(sign, []).append(verdict)
     return {
         "On the map": (
             PARTS,
@@ -22,16 +25,11 @@ def signs() -> dict[str, Signs]:
             *LEGEND,
         ),
         "On the map of tests played back": (*OF_WAYS, ("a", "in only one of the two")),
-        "On the time of a test": (
-            ("●", "the instant shown"),
-            ("┤", "its end"),
-            ("▾", "touches a model"),
-            OF_WAYS[-1],
-        ),
+        "On the time of a test": (("●", "the instant shown"), ("┤", "its end"), ("▾", "touches a model"), OF_WAYS[-1]),
         "On the chart": (("╌", "at least this many models seem to be needed"), ("▲", "you decided something")),
         "How a test ended": (*_split(OUTCOME), ("▶", "running")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
-        "Verdicts of a certificate": _joined(CLAIM),
+        "Verdicts of a certificate": tuple((sign, " or ".join(words)) for sign, words in claims.items()),
         "What a certificate has shown": (
             ("≥", "what is left keeps at least this share of the rate of f"),
             ("≤", "without the model f shows at most this often, as a share of the rate with it"),
@@ -51,13 +49,6 @@ def signs() -> dict[str, Signs]:
 
 def _split(words: dict[str, str]) -> Signs:
     return tuple((each[0], each[2:]) for each in words.values())
-
-
-def _joined(meanings: dict[str, str]) -> Signs:
-    found: dict[str, list[str]] = {}
-    for words, sign in meanings.items():
-        found.setdefault(sign, []).append(words)
-    return tuple((sign, " or ".join(words)) for sign, words in found.items())
 
 
 class SignsDialog(Reading):

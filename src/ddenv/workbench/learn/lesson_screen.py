@@ -180,7 +180,7 @@ class LessonScreen(LearnScreen[bool]):
         self.query_one(Happening).show(snapshot)
         self.query_one(Variables).show(variables(moment))
         self._map.show(snapshot, snapshot.pointed)
-        self._legend.show(0, snapshot.pointed, (), self._map.legend)
+        self._legend.show(self._map.shown)
         number, all_moments = self.course.position.place
         self.query_one("#lesson-now").border_subtitle = f"moment {number} of {all_moments}"
 

@@ -56,16 +56,14 @@ class Palette:
         """The looks of a model of part number `part`, or of none: -1."""
         if kind == PROTECTED:
             return Tone(SOLID[kind], self.shade(0.1), self.shade(0.2), self.shade(0.1))
-        if kind == SELECTED:
-            return self._solid(kind, self.live)
-        hue = NEUTRAL if part < 0 or kind == PINNED else HUES[part % len(HUES)]
-        strength = STRENGTH[kind]
-        # On a light background a bright hue would not be seen.
-        if luminance(packed(self.ground)) > 128:
-            hue, strength = blend(hue, (0, 0, 0), 0.4), LIGHT_STRENGTH[kind]
-        return self._solid(kind, packed(blend(self.ground, hue, strength)))
-
-    def _solid(self, kind: int, fill: int) -> Tone:
+        fill = self.live
+        if kind != SELECTED:
+            hue = NEUTRAL if part < 0 or kind == PINNED else HUES[part % len(HUES)]
+            strength = STRENGTH[kind]
+            # On a light background a bright hue would not be seen.
+            if luminance(packed(self.ground)) > 128:
+                hue, strength = blend(hue, (0, 0, 0), 0.4), LIGHT_STRENGTH[kind]
+            fill = packed(blend(self.ground, hue, strength))
         return Tone(SOLID[kind], fill, fill, packed(blend(unpacked(fill), self.ground, 0.5)))
 
 
@@ -78,19 +76,10 @@ def mixed(
 ) -> Palette:
     """For a background and a text colour; with `own` the background is the terminal's. `marks` are those of start, goal and f."""
     start, goal, failure = marks or ((31, 111, 235), (26, 127, 55), (207, 34, 46))
-    back = PLAIN if own else packed(ground)
-    return Palette(
-        back, ground, fore, packed(_seen(accent, ground, fore)), packed(start), packed(goal), packed(failure)
-    )
-
-
-def _seen(color: RGB, back: RGB, fore: RGB) -> RGB:
-    """`color`, moved towards the text's if it is too near to the background's."""
-    for part in (0.0, 0.25, 0.5):
-        found = blend(color, fore, part)
-        if abs(luminance(packed(found)) - luminance(packed(back))) > 90:
-            return found
-    return fore
+    # The accent is moved towards the text's colour if it is too near to the background's.
+    moved = (packed(blend(accent, fore, part)) for part in (0.0, 0.25, 0.5))
+    live = next((each for each in moved if abs(luminance(each) - luminance(packed(ground))) > 90), packed(fore))
+    return Palette(PLAIN if own else packed(ground), ground, fore, live, packed(start), packed(goal), packed(failure))
 
 
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:

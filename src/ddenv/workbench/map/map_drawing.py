@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -17,11 +17,11 @@ from textual.strip import Strip
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.colors import readable
 from ddenv.map.paint import Canvas
-from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, fit, owners, pack, spans
+from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Spans, View, arrow, braille, fit, owners, pack, spans
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.store import COLUMNS, Live
+from ddenv.runfile.store import COLUMNS
 from ddenv.text import plain, shortened
-from ddenv.workbench.map.map_colors import DULL, FAINT, ORIGINAL, PATH, REMOVED, Palette
+from ddenv.workbench.map.map_colors import DULL, FAINT, ORIGINAL, PATH, REMOVED, Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts, kept, looks
 from ddenv.workbench.map.place import MovedPrints, Point, Shown
@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 DASH = 5
 # In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
 LARGE = 4
-# Maximum width of a model's name, in cells.
-# Names are cut to the first of these lengths for which there is room.
+# Names are cut to the first of these lengths, in cells, for which there is room.
 LENGTHS = (26, 18, 10)
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 # A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
@@ -45,9 +44,7 @@ _Robot = tuple[tuple[float, float, float], int, str]
 
 
 # Lying models are the slow part of a frame: 16 of 19 ms with 3,000 models, and only zooming and panning change it.
-@lru_cache(maxsize=4)
-def _outlines(prints: tuple[Footprint, ...]) -> Outlines:
-    return pack(prints)
+_outlines = lru_cache(maxsize=4)(pack)
 
 
 @lru_cache(maxsize=4)
@@ -119,7 +116,22 @@ class MapDrawing:
         shown = self._with_live(shown)
         still = self._still(shown, view, palette)
         canvas = still.canvas.copy()
-        paths, robots = _riders(shown, palette) if shown.ways else self._driving(shown, palette)
+        paths: list[_Line] = []
+        robots: list[_Robot] = []
+        if shown.ways:
+            # The second one, a hollow arrow, is below the first one.
+            looks_of = ((palette.live, 0, ARROWS), (palette.shade(DULL), DASH, HOLLOW))
+            for way, (color, dash, signs) in list(zip(shown.ways, looks_of, strict=False))[::-1]:
+                paths.append((way.points[: way.gone], color, dash))
+                if way.robot is not None:
+                    robots.append((way.robot, color, signs))
+        else:
+            ids, dull = _in_focus(shown.snapshot), palette.shade(DULL)
+            trails = self._trails if "path" in shown.layers else {}
+            for one in shown.snapshot.live:
+                color = palette.live if one.test in ids or not ids else dull
+                paths.append((np.array(trails.get(one.test, [])).reshape(-1, 2), color, 0))
+                robots.append(((one.pose[0], one.pose[1], heading(one.pose[3:])), color, ARROWS))
         for points, color, dash in paths:
             bits = braille(points, view, dash)
             # They hide no letter.
@@ -138,16 +150,12 @@ class MapDrawing:
             self._of, self._picture = of, _still(*of)
         return self._picture
 
-    def _driving(self, shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
-        live, ids = shown.snapshot.live, _in_focus(shown.snapshot)
-        colors = {one.test: palette.live if one.test in ids or not ids else palette.shade(DULL) for one in live}
-        trails = self._trails if "path" in shown.layers else {}
-        paths = [(np.array(trail), colors.get(test, palette.shade(DULL)), 0) for test, trail in trails.items()]
-        return paths, [((one.pose[0], one.pose[1], heading(one.pose[3:])), colors[one.test], ARROWS) for one in live]
-
     def _with_live(self, shown: Shown) -> Shown:
         """With the models where they are in the running test whose robot stands out."""
-        live = None if shown.ways else _foremost(shown.snapshot)
+        live = None
+        if not shown.ways and shown.snapshot.live:
+            ids = _in_focus(shown.snapshot)
+            live = next((each for each in shown.snapshot.live if each.test in ids), shown.snapshot.live[0])
         if (live is None or not live.models) and self._moved is None:
             return shown
         if self._moved is None or self._moved.place is not shown.place:
@@ -162,20 +170,6 @@ def _in_focus(snapshot: Snapshot) -> frozenset[int]:
     return frozenset(test.id for test in snapshot.running if focus is not None and test.candidate == focus.index)
 
 
-def _foremost(snapshot: Snapshot) -> Live | None:
-    """The running test that stands out: one of the candidate in focus, if there is one."""
-    ids = _in_focus(snapshot)
-    return next((live for live in snapshot.live if live.test in ids), next(iter(snapshot.live), None))
-
-
-def _riders(shown: Shown, palette: Palette) -> tuple[list[_Line], list[_Robot]]:
-    """The robots on one or two ways with their paths; the second one, a hollow arrow, is below the first one."""
-    looks_of = ((palette.live, 0, ARROWS), (palette.shade(DULL), DASH, HOLLOW))
-    both = list(zip(shown.ways, looks_of, strict=False))[::-1]
-    paths = [(way.points[: way.gone], color, dash) for way, (color, dash, _) in both]
-    return paths, [(way.robot, color, signs) for way, (color, _, signs) in both if way.robot is not None]
-
-
 def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     how = looks(shown.place.prints, kept(shown), palette)
     filled, centers = _lying(shown.place.prints, view)
@@ -188,11 +182,13 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
         dotted = ghosts(canvas, gone, grid, how, palette.shade(FAINT))
     for points, color, dash in _lines(shown, palette):
         canvas.dots(braille(points, view, dash), color)
-    marks = {
-        cell: (sign, ground)
-        for point, sign, ground in _marks(shown, palette)
-        if (cell := view.cell(*point)) is not None
-    }
+    # Letters with their own backgrounds, so that they are easy to find.
+    failure = shown.failure if "failure" in shown.layers else None
+    places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal), (failure, "×", palette.failure)]
+    marks: dict[Cell, tuple[str, int]] = {}
+    for point, sign, ground in (*places, (shown.parting, PARTING, palette.live)):
+        if point and np.isfinite(point).all() and (cell := view.cell(*point)) is not None:
+            marks[cell] = sign, ground
     cells = place_signs(grid, centers, how.signs, marks)
     for index, (row, column) in cells.items():
         text, tone = how.signs.texts[index], how.looks[how.tones[index]]
@@ -256,15 +252,6 @@ def _path(rows: array[float] | None) -> np.ndarray:
     return np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
 
 
-def _marks(shown: Shown, palette: Palette) -> Iterator[tuple[Point, str, int]]:
-    """Letters at places, m, with their own backgrounds, so that they are easy to find."""
-    places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal)]
-    if "failure" in shown.layers:
-        places.append((shown.failure, "×", palette.failure))
-    places.append((shown.parting, PARTING, palette.live))
-    return ((point, sign, ground) for point, sign, ground in places if point and np.isfinite(point).all())
-
-
 def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
     rows, columns = canvas.chars.shape
     row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
@@ -283,8 +270,5 @@ def strip(canvas: Canvas, row: int) -> Strip:
 
 @lru_cache(maxsize=4096)
 def _style(fore: int, back: int, bold: bool) -> Style:
-    return Style(color=_color(fore), bgcolor=_color(back), bold=bold)
-
-
-def _color(value: int) -> Color:
-    return Color.default() if value < 0 else Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)
+    fore_color, back_color = (Color.default() if each < 0 else Color.from_rgb(*unpacked(each)) for each in (fore, back))
+    return Style(color=fore_color, bgcolor=back_color, bold=bold)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -11,14 +10,13 @@ from textual.widget import Widget
 
 from ddenv.evidence.slices import in_last
 from ddenv.runfile.state import RunState, partition_letter
-from ddenv.runfile.supports import Names, drops
+from ddenv.runfile.supports import drops, drops_without
 from ddenv.text import count, shortened
 from ddenv.words.signs import DROPS, dropping
 from ddenv.workbench.map.place import Shown
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
-    from ddenv.runfile.state import Candidate, Trial
 
 LEGEND = (
     ("S", "start"),
@@ -53,7 +51,7 @@ LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 PLACES, GAP, WITH_GAPS = 3, 2, 28
 
 
-def legend(shown: Shown, width: int, lines: int) -> Text:
+def legend(shown: Shown, width: int, lines: int = 2) -> Text:
     """The signs on the map with their meanings, as many as fit: first where the robot starts, has to go and ended."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
@@ -68,7 +66,11 @@ def legend(shown: Shown, width: int, lines: int) -> Text:
     signs = [sign for sign, there in meanings.items() if there]
     usual = (*LEGEND[:PLACES], *signs, *LEGEND[PLACES:]) if state.elements else LEGEND[:2]
     text, used, gap = Text(no_wrap=True, overflow="ellipsis"), 0, GAP if width >= WITH_GAPS else 1
-    for sign, meaning in _of_ways(shown) if shown.ways or shown.limits else usual:
+    if shown.ways or shown.limits:
+        ways = ((sign, way.name) for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False))
+        rare = (LIMITS if shown.limits else None, PARTED if shown.parting else None, shown.apart)
+        usual = (*ways, *filter(None, rare), *(each for each in LEGEND if each[0] in "SG×·#"))
+    for sign, meaning in usual:
         cells = len(sign) + 1 + len(meaning)
         if used and used + gap + cells > width:
             lines -= 1
@@ -80,18 +82,6 @@ def legend(shown: Shown, width: int, lines: int) -> Text:
         text.append(sign, "bold").append(f" {meaning}", "dim")
         used += (gap if used else 0) + cells
     return text
-
-
-def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
-    for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
-        yield sign, way.name
-    if shown.limits:
-        yield LIMITS
-    if shown.parting is not None:
-        yield PARTED
-    if shown.apart is not None:
-        yield shown.apart
-    yield from (each for each in LEGEND if each[0] in "SG×·#")
 
 
 def sensed_order(state: RunState) -> dict[str, int]:
@@ -107,7 +97,9 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all). Names are shortened."""
-    words = [_standing(state, each.name), _size(each)]
+    width, depth = each.high[0] - each.low[0], each.high[1] - each.low[1]
+    shaped = bool(each.polygons) and math.isfinite(width + depth)
+    words = [_standing(state, each.name), f"{width:.3g} x {depth:.3g} m" if shaped else "no shapes"]
     if state.f_position is not None:
         words.append(f"{each.distance(state.f_position[:2]):.1f} m from f")
     for number, (name, moment) in enumerate(_sensed(state), start=1):
@@ -117,13 +109,6 @@ def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     text.append("".join(f" · {word}" for word in words if word), "not bold")
     text.truncate(columns or text.cell_len, overflow="ellipsis")
     return text
-
-
-def _size(each: Footprint) -> str:
-    width, depth = each.high[0] - each.low[0], each.high[1] - each.low[1]
-    if not each.polygons or not math.isfinite(width + depth):
-        return "no shapes"
-    return f"{width:.3g} x {depth:.3g} m"
 
 
 def _standing(state: RunState, name: str) -> str:
@@ -140,35 +125,30 @@ def _standing(state: RunState, name: str) -> str:
 
 
 class MapLines(Widget):
-    """One line on what is shown, and one of signs; two of signs where nothing is to be said."""
+    """One line on what is shown, and one of signs; two of signs where nothing is to be said, or with `only_signs`."""
 
-    def __init__(self, *, id: str | None = None) -> None:
+    def __init__(self, only_signs: bool = False, *, id: str) -> None:
         super().__init__(id=id)
-        self._shown: tuple[int, Candidate | Trial | None, Names, Callable[[int, int], Text]] | None = None
+        self._only_signs, self._shown = only_signs, Shown()
 
-    def show(
-        self, selected: int, shown: Candidate | Trial | None, fallen: Names, legend: Callable[[int, int], Text]
-    ) -> None:
-        """`selected` models are selected, those of `shown` stand out; `legend` makes lines of signs for a width.
-
-        `fallen` would drop without the selected ones, or without those that are not shown.
-        """
-        self._shown = selected, shown, fallen, legend
+    def show(self, shown: Shown) -> None:
+        self._shown = shown
         self.refresh()
 
     def render(self) -> Text:
-        if self._shown is None:
-            return Text()
-        width = self.size.width
-        selected, shown, fallen, legend = self._shown
-        text, drop = Text(no_wrap=True), dropping(fallen, LONGEST_DROPPED if width > 44 else SHORT_DROPPED)
-        if selected:
-            text.append(f"{selected} selected{f', w {drop}' if drop else ''}", "bold")
+        width, shown, text = self.size.width, self._shown, Text(no_wrap=True)
+        state, longest = shown.snapshot.state, LONGEST_DROPPED if width > 44 else SHORT_DROPPED
+        if self._only_signs:
+            return legend(shown, width)
+        if shown.selection:
+            drop = dropping(drops_without(state, shown.selection), longest)
+            text.append(f"{len(shown.selection)} selected{f', w {drop}' if drop else ''}", "bold")
             text.append(": p pin, w try without, o try only", "dim")
-        elif shown is not None:
-            text.append(f"{shown.label}: {drop or count(shown.size, 'model')}", "bold")
+        elif shown.candidate is not None:
+            drop = dropping(drops(state, shown.candidate), longest)
+            text.append(f"{shown.candidate.label}: {drop or count(shown.candidate.size, 'model')}", "bold")
             text.append("" if drop else "  others in small letters", "dim")
-        if not text:
-            return legend(width, 2)
+        else:
+            return legend(shown, width)
         text.truncate(width, overflow="ellipsis")
-        return text.append("\n").append_text(legend(width, 1))
+        return text.append("\n").append_text(legend(shown, width, 1))

@@ -74,7 +74,6 @@ class Kept:
 def kept(shown: Shown) -> Kept:
     """What the map needs of a run's state, and how models stand out in the layers that are shown."""
     state, layers, candidate, place = shown.snapshot.state, shown.layers, shown.candidate, shown.place
-    parts = state.round.split.letter_of if state.round and "partitions" in layers else {}
     met = in_last(state) if "participants" in layers else None
     standing = frozenset(candidate.models) if candidate else None
     return Kept(
@@ -82,7 +81,7 @@ def kept(shown: Shown) -> Kept:
         frozenset(state.environment) if state.elements else place.elements,
         standing if met is None else frozenset(met.names(state.elements)),
         frozenset(drops(state, candidate)) if candidate else frozenset(),
-        parts,
+        state.round.split.letter_of if state.round and "partitions" in layers else {},
         state.pinned if "pinned" in layers else frozenset(),
         shown.selection,
         sensed_order(state) if "sensed" in layers else {},
@@ -91,7 +90,14 @@ def kept(shown: Shown) -> Kept:
 
 def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
     names, floor = _known(tuple(prints))
-    kinds = _kinds(names, floor, who)
+    kinds = np.where(floor, FLOOR, KEPT)
+    if who.shown is not None:
+        out = ~_among(names, who.shown)
+        kinds[out] = np.where(floor, FLOOR_OUT, LEFT_OUT)[out]
+    kinds[_among(names, who.pinned)] = PINNED
+    kinds[_among(names, who.selected)] = SELECTED
+    kinds[~_among(names, who.environment)] = REMOVED
+    kinds[~_among(names, who.elements)] = PROTECTED
     parts = np.fromiter(map(who.parts.get, names, repeat(-1)), dtype=int, count=len(names))
     # Only some of many parts look different, and only these colours are mixed.
     short = np.where(parts < 0, -1, parts % len(HUES))
@@ -109,9 +115,14 @@ def _known(prints: tuple[Footprint, ...]) -> tuple[tuple[str, ...], np.ndarray]:
 
 def _signs(names: tuple[str, ...], kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
     """A letter for each model of a part, with its number in the order of sensing if that is shown, and whether it drops."""
-    groups = kinds * (int(parts.max(initial=-1)) + 2) + parts + 1
+    several = int(parts.max(initial=-1)) + 2
+    groups = kinds * several + parts + 1
     found, which = np.unique(groups, return_inverse=True)
-    letters = [_label(*divmod(value, int(parts.max(initial=-1)) + 2)) for value in found.tolist()]
+    letters = []
+    for kind, part in (divmod(value, several) for value in found.tolist()):
+        letter = partition_letter(part - 1) if part else ""
+        forms = {PROTECTED: "#", PINNED: "+", REMOVED: "", SELECTED: f"*{letter}"}
+        letters.append(forms.get(kind, letter.lower() if kind in (LEFT_OUT, FLOOR_OUT) else letter))
     texts = [letters[number] for number in which.tolist()]
     rank = np.zeros(len(names))
     if who.sensed:
@@ -122,27 +133,6 @@ def _signs(names: tuple[str, ...], kinds: np.ndarray, parts: np.ndarray, who: Ke
     for number in np.flatnonzero(falling).tolist():
         texts[number] = f"{DROPS}{texts[number]}"
     return Signs(texts, groups, rank, np.isin(kinds, (PINNED, SELECTED)) | falling)
-
-
-def _label(kind: int, part: int) -> str:
-    if kind in (PROTECTED, PINNED, REMOVED):
-        return {PROTECTED: "#", PINNED: "+", REMOVED: ""}[kind]
-    letter = partition_letter(part - 1) if part else ""
-    if kind == SELECTED:
-        return f"*{letter}"
-    return letter.lower() if kind in (LEFT_OUT, FLOOR_OUT) else letter
-
-
-def _kinds(names: tuple[str, ...], floor: np.ndarray, who: Kept) -> np.ndarray:
-    kinds = np.where(floor, FLOOR, KEPT)
-    if who.shown is not None:
-        out = ~_among(names, who.shown)
-        kinds[out] = np.where(floor, FLOOR_OUT, LEFT_OUT)[out]
-    kinds[_among(names, who.pinned)] = PINNED
-    kinds[_among(names, who.selected)] = SELECTED
-    kinds[~_among(names, who.environment)] = REMOVED
-    kinds[~_among(names, who.elements)] = PROTECTED
-    return kinds
 
 
 # The world and what is left of it stay the same while the user looks at one candidate after the other.

@@ -23,7 +23,17 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 # The layers of the map, which can be hidden.
-LAYERS = ("partitions", "removed", "pinned", "sensed", "participants", "path", "original", "failure", "names")
+LAYERS = {
+    "partitions": "the parts of this round, by letter and colour",
+    "removed": "where removed models stood",
+    "pinned": "which models are pinned",
+    "sensed": "the order in which the robot sensed the models",
+    "participants": "models that affected the last similar run",
+    "path": "the robot's path on the last similar run",
+    "original": "the robot's path in f itself",
+    "failure": "where the robot ended in f",
+    "names": "the models' names, as n does on every map",
+}
 Point = tuple[float, float]
 # Outlines, (N, 2) m, of a model where it may move, each with its verdict, such as "f".
 Limits = tuple[tuple[str, "np.ndarray"], ...]

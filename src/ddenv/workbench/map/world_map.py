@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,9 +20,8 @@ from textual.widget import Widget
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
-from ddenv.workbench.map.map_words import describe, legend
+from ddenv.workbench.map.map_words import describe
 from ddenv.workbench.map.place import Limits, Place, Point, Shown, Way
-from ddenv.workbench.map.viewport import Viewport
 from ddenv.workbench.shared.bindings import keys
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
@@ -166,9 +165,6 @@ class WorldMap(Widget, can_focus=True):
     def toggle_layer(self, name: str) -> None:
         self.shown = replace(self.shown, layers=self.shown.layers ^ {name})
         self.draw()
-
-    def legend(self, width: int, lines: int = 2) -> Text:
-        return legend(self.shown, width, lines)
 
     @property
     def model_at_cursor(self) -> str | None:
@@ -372,17 +368,71 @@ class WorldMap(Widget, can_focus=True):
         if model != self._pointed:
             self._pointed = model
             self.post_message(self.Pointed(model))
-        subtitle = self._subtitle(model, view)
+        subtitle = Text(f"{view.columns * view.scale:.3g} m wide")
+        if self.picking:
+            x, y = view.point(self.viewport.cursor)
+            subtitle = Text(f"x {x:.2f}, y {y:.2f} m")
+        elif model is not None:
+            subtitle = self.describe(model, self.size.width - 4)
+        elif not self.place.prints:
+            subtitle = Text("" if self.notice else "this world has no models")
         # Another one draws the whole border.
         if subtitle != self._subtitle_shown and isinstance(self.parent, Widget):
             self._subtitle_shown = self.parent.border_subtitle = subtitle
 
-    def _subtitle(self, model: str | None, view: View) -> Text:
-        if self.picking:
-            x, y = view.point(self.viewport.cursor)
-            return Text(f"x {x:.2f}, y {y:.2f} m")
-        if model is not None:
-            return self.describe(model, self.size.width - 4)
-        if not self.place.prints:
-            return Text("" if self.notice else "this world has no models")
-        return Text(f"{view.columns * view.scale:.3g} m wide")
+
+class Viewport:
+    """A `view` (None before the map has a size) and a `cursor` (row, column) in it.
+
+    While `fitted`, the view shows everything important; zooming and panning end that.
+    """
+
+    def __init__(self) -> None:
+        self.view: View | None = None
+        self.cursor: Cell = (0, 0)
+        self.fitted = True
+
+    def resize(self, columns: int, rows: int, fitting: Callable[[int, int], View]) -> None:
+        """Changes the size or the important places: `fitting` returns a view of these for a size."""
+        view = self.view
+        new = fitting(columns, rows) if view is None or self.fitted else replace(view, columns=columns, rows=rows)
+        # Drawings are reused for a view, so an equal view stays the same object.
+        if new == view:
+            return
+        if view is None or self.cursor == (view.rows // 2, view.columns // 2):
+            # The crosshair is in the middle until the user moves it; then it keeps its place in the world.
+            self.cursor = rows // 2, columns // 2
+        else:
+            clipped = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)
+            self.cursor = new.cell(*view.point(self.cursor)) or clipped
+        self.view = new
+
+    def zoom(self, factor: float, about: Cell | None) -> None:
+        if self.view is not None:
+            self._look(self.view.zoomed(factor, self.view.point(about) if about else None))
+
+    def pan(self, columns: float, rows: float) -> None:
+        if self.view is not None:
+            self._look(self.view.panned(columns, rows))
+
+    def pan_part(self, right: int, up: int) -> None:
+        if self.view is not None:
+            self.pan(right * max(1, self.view.columns // 8), up * max(1, self.view.rows // 4))
+
+    def step(self, right: int, up: int) -> None:
+        row, column = self.cursor[0] - up, self.cursor[1] + right
+        if self.holds((row, column)):
+            self.cursor = row, column
+        else:
+            self.pan(right, up)
+
+    def holds(self, cell: Cell) -> bool:
+        return self.view is not None and 0 <= cell[0] < self.view.rows and 0 <= cell[1] < self.view.columns
+
+    def center_on(self, x: float, y: float) -> None:
+        if self.view is not None:
+            self._look(self.view.around(x, y))
+            self.cursor = self.view.cell(x, y) or self.cursor
+
+    def _look(self, view: View) -> None:
+        self.fitted, self.view = False, view

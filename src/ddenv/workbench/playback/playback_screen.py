@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import time
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import ClassVar
 
+import numpy as np
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
@@ -17,21 +19,23 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
-from ddenv.runfile.state import Test
+from ddenv.runfile.snapshot import Snapshot
+from ddenv.runfile.state import PersistentTuple, Round, RunState, Split, Test, Trial
 from ddenv.runfile.store import RunFile
+from ddenv.runfile.supports import Names
 from ddenv.runfile.tested import purpose
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
 from ddenv.text import count, padded, plain, shortened
 from ddenv.words.signs import outcome
+from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.pick import Pick
-from ddenv.workbench.map.place import Limits, MovedPrints, Place, Point, read_world
+from ddenv.workbench.map.map_words import MapLines
+from ddenv.workbench.map.place import Limits, MovedPrints, Place, Point, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
-from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
-from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
+from ddenv.workbench.playback.timeline import ROBOTS, Timeline
 from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.world.pose import pose_at
@@ -141,11 +145,11 @@ class Playback(Screen[None]):
         with Horizontal(id="playback-body"):
             with Framed("World", id="playback-world", classes="panel"):
                 yield self.map
-                yield Static("", id="playback-legend", markup=False)
+                yield MapLines(only_signs=True, id="playback-legend")
             with Framed("What the robot meets", id="playback-met", classes="panel"):
                 yield Met(id="met")
         with Framed("", id="playback-time", classes="panel"):
-            yield Timeline(id="timeline")
+            yield Timeline(self._go, self.action_frame, id="timeline")
         yield KeyFooter(FIRST)
         yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
@@ -163,14 +167,11 @@ class Playback(Screen[None]):
         self.map.set_place(place, notice)
         self._show()
 
-    def on_resize(self) -> None:
-        self.call_after_refresh(self._show_legend)
-
     def _take(self, numbers: Sequence[int]) -> None:
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
         self._tests, self._parting = tests, None
-        self._ways = tuple(RobotWay(one, called(one) if len(tests) == 2 else "its way") for one in tests)
+        self._ways = tuple(way_of(one, called(one) if len(tests) == 2 else "its way") for one in tests)
         self._prints = MovedPrints(self._place)
         if len(tests) == 2 and all(one.rows for one in tests):
             _, at, place = parted(tests[0].rows, tests[1].rows)
@@ -223,33 +224,21 @@ class Playback(Screen[None]):
         moving = self._tests[0].moving
         prints = self._prints.at({name: pose_at(samples, at) for name, samples in moving.items()})
         parting, place = self._parting or (None, None)
-        self.map.show_ways(tuple(way.at(at) for way in self._ways), place, self._apart, prints)
-        tests = tuple(one.test for one in self._tests)
-        lengths = tuple(one.length for one in self._tests)
-        self.query_one(Timeline).show(Instant(at, playing.length, tests, lengths, parting))
+        ways = []
+        for one, way in zip(self._tests, self._ways, strict=True):
+            if (pose := one.pose(at)) is not None:
+                gone = int(np.searchsorted(one.robot[:, 0], at, side="right"))
+                way = replace(way, robot=(*pose.position[:2], pose.yaw()), gone=gone)
+            ways.append(way)
+        self.map.show_ways(tuple(ways), place, self._apart, prints)
+        self.query_one(Timeline).show(at, self._tests, parting)
         self.query_one(Met).show(at)
-        self.query_one("#playback-time").border_title = Text(self._words())
-        self._show_legend()
-
-    def _words(self) -> str:
-        playing = self.playing
-        if not playing.length:
-            return "no path is stored"
-        words = f"{'▶' if playing.on else '‖'} {playing.time:.1f} s of {playing.length:.1f} s · {playing.speed:g} × real time"
-        ends = [place for way in self._ways if (place := way.place(playing.time)) is not None]
+        words = f"{'▶' if playing.on else '‖'} {at:.1f} s of {playing.length:.1f} s · {playing.speed:g} × real time"
+        ends = [way.robot[:2] for way in ways if way.robot is not None]
         if len(ends) == 2:
             words += f" · {math.dist(*ends):.2f} m apart"
-        return words
-
-    def _show_legend(self) -> None:
-        legend = self.query_one("#playback-legend", Static)
-        legend.update(self.map.legend(legend.size.width), layout=False)
-
-    def on_timeline_moved(self, event: Timeline.Moved) -> None:
-        self._go(event.seconds)
-
-    def on_timeline_turned(self, event: Timeline.Turned) -> None:
-        self.action_frame(event.frames)
+        self.query_one("#playback-time").border_title = Text(words if playing.length else "no path is stored")
+        self.query_one(MapLines).show(self.map.shown)
 
     def _go(self, time: float) -> None:
         self.playing.go(time)
@@ -287,16 +276,19 @@ class Playback(Screen[None]):
         first, state = self._tests[0].test, self._position.end
         tests = others(state.tests, first)
 
-        def line(test: Test) -> Text:
-            same = "= " if test.seed == first.seed else ""
-            return _line(str(test.id), purpose(state, test), f"{same}{test.seed}", outcome(test))
+        def line(number: str, words: str, seed: str, end: str) -> Text:
+            what = padded(shortened(words, WORDS), WORDS)
+            return Text(f"{number:>{NUMBER}}  {what}{seed:>{SEED}}  {shortened(end, OUTCOME)}", no_wrap=True)
 
         def chosen(row: int | None) -> None:
             if row is not None:
                 self._change([first.id, tests[row - 1].id] if row else [first.id])
 
-        lines = [Text(f"test {first.id} alone"), *map(line, tests)]
-        head, at = _line("test", "of", "seed", "end"), min(1, len(tests))
+        lines = [Text(f"test {first.id} alone")]
+        for test in tests:
+            seed = f"{'= ' if test.seed == first.seed else ''}{test.seed}"
+            lines.append(line(str(test.id), purpose(state, test), seed, outcome(test)))
+        head, at = line("test", "of", "seed", "end"), min(1, len(tests))
         self.app.push_screen(Pick(f"Play beside test {first.id}", "plays both", lines, head=head, at=at), chosen)
 
     def action_swap(self) -> None:
@@ -327,6 +319,18 @@ def others(tests: Sequence[Test], one: Test) -> list[Test]:
     return sorted(latest, key=lambda test: test.seed != one.seed)[:LISTED]
 
 
-def _line(number: str, words: str, seed: str, end: str) -> Text:
-    what = padded(shortened(words, WORDS), WORDS)
-    return Text(f"{number:>{NUMBER}}  {what}{seed:>{SEED}}  {shortened(end, OUTCOME)}", no_wrap=True)
+def way_of(one: Played, name: str) -> Way:
+    """The robot's whole way in a test, without the robot."""
+    return Way(name, np.ascontiguousarray(one.robot[:, 1:3]))
+
+
+def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
+    """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
+    round = Round(0, len(groups), Split(there, groups), PersistentTuple()) if groups else None
+    bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
+    return Snapshot(bare, past=True)
+
+
+def without(there: Names, gone: Collection[str]) -> Trial:
+    """What the map takes for a candidate: the others of these models stand back, in small letters."""
+    return Trial(0, tuple(name for name in there if name not in gone), 0)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import contextvars
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from typing import Any
 
 from textual.screen import Screen
@@ -54,12 +52,12 @@ class Asking:
         self._mine: dict[int, str] = {}
         # The id of the last command that needs an engine, 0 once one was started for it.
         self._due = 0
-        self._sender: ThreadPoolExecutor | None = None
+        # One thread: commands arrive in the order they were sent.
+        self._sender = ThreadPoolExecutor(1, "send")
 
     def close(self) -> None:
         """Commands that were sent are still written."""
-        if self._sender is not None:
-            self._sender.shutdown(wait=False)
+        self._sender.shutdown(wait=False)
 
     @property
     def situation(self) -> Situation:
@@ -76,10 +74,6 @@ class Asking:
         if snapshot.gone:
             return "the run file is gone: it can no longer be guided; q leaves"
         return "this run file cannot be read" if snapshot.error else ""
-
-    @property
-    def trouble(self) -> str:
-        return self._engine.trouble if self._poll.snapshot.engine == "absent" else ""
 
     def waiting_for(self) -> str:
         (id, command), snapshot = self._last, self._poll.snapshot
@@ -161,10 +155,12 @@ class Asking:
         self._last, self._asked_at = (0, command), time.monotonic()
         self._changed()
 
-        def sent(id: int, error: str) -> None:
+        def sent(written: asyncio.Future[int]) -> None:
             self.sending -= 1
-            if error:
-                self._screen.notify(error, severity="error", markup=False)
+            try:
+                id = written.result()
+            except UserError as error:
+                self._screen.notify(str(error), severity="error", markup=False)
             else:
                 self._mine[id] = command.words(now.state).brief
                 self._last = id, command
@@ -176,20 +172,8 @@ class Asking:
             if self._screen.is_attached:
                 self._changed()
 
-        def write(loop: asyncio.AbstractEventLoop, context: contextvars.Context) -> None:
-            id, error = 0, ""
-            try:
-                id = send(self._poll.file, command)
-            except UserError as trouble:
-                error = str(trouble)
-            # The screen may be gone by now.
-            with suppress(RuntimeError):
-                loop.call_soon_threadsafe(sent, id, error, context=context)
-
-        if self._sender is None:
-            # One thread: commands arrive in the order they were sent.
-            self._sender = ThreadPoolExecutor(1, "send")
-        self._sender.submit(write, asyncio.get_running_loop(), contextvars.copy_context())
+        loop = asyncio.get_running_loop()
+        loop.run_in_executor(self._sender, send, self._poll.file, command).add_done_callback(sent)
 
     def go_on(self) -> None:
         """Starts an engine for the last command if none is running, or if the last one ended without reading it."""

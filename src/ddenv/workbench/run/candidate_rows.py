@@ -19,8 +19,8 @@ from ddenv.words.claims import made_of_usual, short
 from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
 from ddenv.words.slices import implied_words
 
-# Maximum width of a model's name, in cells.
-NAME = 8
+# Maximum widths of a model's name as a verdict and as a row, in cells.
+NAME, MODEL_WIDTH = 8, 18
 # The latest judged tries that stay in the table.
 TRIALS = 3
 
@@ -28,8 +28,6 @@ Item = Trial | Candidate | Test | FreshRuns
 Words = Mapping[str, str]
 # Columns that only candidates fill.
 OF_CANDIDATES = ("distance", "evidence")
-# Maximum width of a model's name, in cells.
-MODEL_WIDTH = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +77,6 @@ class Listed:
             return None
         return self.trials[row] if row < len(self.trials) else self.rest[row - len(self.trials)]
 
-    def row(self, item: Trial | Candidate) -> int | None:
-        if isinstance(item, Candidate):
-            return len(self.trials) + item.index if self.of[:1] == ("round",) else None
-        return next((row for row, each in enumerate(self.trials) if each.number == item.number), None)
-
 
 def listed(snapshot: Snapshot) -> Listed:
     state = snapshot.state
@@ -99,8 +92,14 @@ def listed(snapshot: Snapshot) -> Listed:
 
 
 def round_title(state: RunState) -> tuple[str, str]:
-    if state.certificate is not None:
-        return certificate_title(state)
+    if (certificate := state.certificate) is not None:
+        number = f" {certificate.number}" if certificate.number > 1 else ""
+        rows, aim = fresh_runs(state), percent(certificate.certify_rate)
+        keeps = f"keeps {rows[0].shows_at_least}, aim {aim}" if rows[0].shows_at_least else f"has to show {aim}"
+        keeps = "chosen seeds" if certificate.seeds else keeps
+        made = sum(one.runs for one in rows)
+        far = made_of_usual(state, certificate) if in_the_making(state) else count(made, "run")
+        return f"Certificate{number}: {keeps}", far
     if state.round is None:
         return "Baseline: the whole world", ""
     candidates = state.round.candidates
@@ -142,7 +141,14 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     if item is None:
         return {}
     if isinstance(item, Test):
-        return _run(snapshot, item, row + 1 - len(listing.trials))
+        return {
+            "#": str(row + 1 - len(listing.trials)),
+            "candidate": f"run {item.run + 1}",
+            "models": str(len(snapshot.state.environment)),
+            "to f": metres(item.distance),
+            "real": brief(item.wall_seconds) if item.is_finished else "",
+            "verdict": _running(snapshot, [item]) or outcome(item),
+        }
     if isinstance(item, FreshRuns):
         return _certificate_words(snapshot, item, listing)
     tests = snapshot.state.tests_of(item.tests)
@@ -152,6 +158,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     seconds = sum(test.wall_seconds for test in done)
     candidate = item if isinstance(item, Candidate) else None
     fallen = drops(snapshot.state, item)
+    dropped = f"drops {len(fallen)} models" if len(fallen) > 1 else dropping(fallen, NAME)
     ended = signs(Counter(test.outcome for test in done))
     # More runs are made of what shows f until it is clear that it keeps the rate.
     options = settings(snapshot.state)
@@ -170,7 +177,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         "evidence": ended,
         "to f": metres(min(distances)) if distances else "",
         "real": brief(seconds) if done else "",
-        "verdict": _verdict(snapshot, item, tests) or _fallen(fallen),
+        "verdict": _verdict(snapshot, item, tests) or dropped,
     }
 
 
@@ -194,22 +201,6 @@ def _running(snapshot: Snapshot, tests: Sequence[Test]) -> str:
     return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)
 
 
-def _fallen(models: Sequence[str]) -> str:
-    return f"drops {len(models)} models" if len(models) > 1 else dropping(models, NAME)
-
-
-def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
-    return {
-        "#": str(number),
-        "candidate": f"run {test.run + 1}",
-        "models": str(len(snapshot.state.environment)),
-        "tests": "",
-        "to f": metres(test.distance),
-        "real": brief(test.wall_seconds) if test.is_finished else "",
-        "verdict": _running(snapshot, [test]) or outcome(test),
-    }
-
-
 def _environment(one: FreshRuns, listing: Listed) -> str:
     if one.without is not None:
         models = (each.without for each in listing.rest if isinstance(each, FreshRuns))
@@ -221,20 +212,7 @@ def _environment(one: FreshRuns, listing: Listed) -> str:
     return "whole world" if one.node == 0 else f"step {one.node}"
 
 
-def certificate_title(state: RunState) -> tuple[str, str]:
-    certificate = state.certificate
-    if certificate is None:
-        return "", ""
-    number = f" {certificate.number}" if certificate.number > 1 else ""
-    rows, aim = fresh_runs(state), percent(certificate.certify_rate)
-    left = rows[0]
-    keeps = f"keeps {left.shows_at_least}, aim {aim}" if left.shows_at_least else f"has to show {aim}"
-    keeps = "chosen seeds" if certificate.seeds else keeps
-    far = made_of_usual(state, certificate) if in_the_making(state) else count(sum(one.runs for one in rows), "run")
-    return f"Certificate{number}: {keeps}", far
-
-
-def _certificate_words(snapshot: Snapshot, one: FreshRuns, listing: Listed) -> Mapping[str, str]:
+def _certificate_words(snapshot: Snapshot, one: FreshRuns, listing: Listed) -> Words:
     return {
         "environment": _environment(one, listing),
         "runs": str(one.runs) if one.runs else "",

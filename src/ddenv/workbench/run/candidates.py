@@ -20,6 +20,8 @@ from ddenv.workbench.run.candidate_rows import Column, Item, Listed, Words, fitt
 from ddenv.workbench.shared.bindings import keys
 
 STRONG, WEAK = Style(bold=True), Style(dim=True)
+# More rows than there are.
+FAR = 1_000_000_000
 
 
 class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
@@ -37,8 +39,8 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         ("down", "down", "move(1)", "", "the candidate below: the map shows its models"),
         ("page_up", "pageup", "page(-1)", "", "one page of candidates up"),
         ("page_down", "pagedown", "page(1)", "", "one page of candidates down"),
-        ("first", "home,ctrl+home", "first", "", "the first candidate"),
-        ("last", "end,ctrl+end", "last", "", "the last candidate"),
+        ("first", "home,ctrl+home", f"move({-FAR})", "", "the first candidate"),
+        ("last", "end,ctrl+end", f"move({FAR})", "", "the last candidate"),
         ("choose", "enter", "move(0)", "", "stay on this candidate"),
     )
 
@@ -81,8 +83,8 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
                 self.scroll_to(y=self.scroll_offset.y + shift, animate=False, force=True)
         self.cursor_row = min(self.cursor_row, max(0, len(self._listed) - 1))
         self._arrange()
-        if self.following and snapshot.focus is not None:
-            self._put(self._listed.row(snapshot.focus))
+        if self.following and snapshot.focus is not None and self._listed.of[0] == "round":
+            self._put(len(self._listed.trials) + snapshot.focus.index)
         self.refresh()
 
     def follow(self) -> None:
@@ -94,12 +96,6 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     def action_page(self, pages: int) -> None:
         self._by_hand(self.cursor_row + pages * self._page)
-
-    def action_first(self) -> None:
-        self._by_hand(0)
-
-    def action_last(self) -> None:
-        self._by_hand(len(self._listed) - 1)
 
     def on_click(self, event: events.Click) -> None:
         row = event.y - 1 + self.scroll_offset.y
@@ -122,15 +118,14 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _in_sight(self) -> bool:
         return self.scroll_offset.y <= self.cursor_row < self.scroll_offset.y + self._page
 
-    def _put(self, row: int | None, reveal: bool = False) -> None:
+    def _put(self, row: int, reveal: bool = False) -> None:
         """Moves the cursor. The view goes with it, if the cursor was in sight."""
-        if row is not None:
-            reveal = reveal or self._in_sight
-            lines = (each + 1 - self.scroll_offset.y for each in (self.cursor_row, row))
-            self.cursor_row = row
-            self.refresh(*(Region(0, y, self.size.width, 1) for y in lines if y > 0))
-            if reveal:
-                self._reveal()
+        reveal = reveal or self._in_sight
+        lines = (each + 1 - self.scroll_offset.y for each in (self.cursor_row, row))
+        self.cursor_row = row
+        self.refresh(*(Region(0, y, self.size.width, 1) for y in lines if y > 0))
+        if reveal:
+            self._reveal()
 
     def _reveal(self) -> None:
         if self.size.height and not self._in_sight:
@@ -161,8 +156,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
-        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
-        segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
+        words = cells.get(last.name, "")
+        emphasis = STRONG if words.startswith(("●", "▶", "?")) else WEAK if words.startswith(("○", "⊘")) else Style()
+        segments = [Segment(row, style), Segment(_aligned(last, f"  {words}"), style + emphasis)]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 
 
@@ -173,9 +169,3 @@ def _aligned(column: Column, text: str) -> str:
     before = "" if column.name in ("#", "environment", "verdict") else " "
     room = column.width - len(before)
     return before + (set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…")
-
-
-def _emphasis(words: str) -> Style:
-    if words.startswith(("●", "▶", "?")):
-        return STRONG
-    return WEAK if words.startswith(("○", "⊘")) else Style.null()

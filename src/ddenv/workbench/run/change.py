@@ -16,10 +16,10 @@ from ddenv.guiding import commands
 from ddenv.guiding.commands import Situation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.schemas import Kind, names
-from ddenv.settings import Setting, Value
+from ddenv.schemas import names
+from ddenv.settings import Value
 from ddenv.text import plain
-from ddenv.words.methods import KINDS, note, paragraph
+from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.entry import Entry
@@ -41,49 +41,32 @@ class Change(ModalScreen[commands.Change | None]):
     def __init__(self, state: RunState) -> None:
         super().__init__()
         self._state = state
-        options = settings(state)
-        partitioning, _, prioritization = options.pair.partition("/")
-        self._now: dict[Kind, str] = {
-            "algorithm": options.algorithm,
-            "partitioning": partitioning,
-            "prioritization": prioritization,
-        }
-        now = {one.name: getattr(options, one.name) for one in OTHERS}
-        self._texts = {name: "" if value is None else str(value) for name, value in now.items()}
 
     def compose(self) -> ComposeResult:
+        options = settings(self._state)
+        used = chosen(options.algorithm, options.pair)
         with Framed("Change settings, from the next round on", "ctrl+s changes   escape cancels"):
             with VerticalScroll(can_focus=False, classes="fields"):
                 for kind in KINDS:
                     with Horizontal(classes="row"):
                         yield Static(kind, classes="label", markup=False)
-                        yield self._select(kind)
+                        now = used[kind]
+                        # A schema of another package may not be installed here: it can stay.
+                        known = (*names(kind), *(() if now in names(kind) else (now,)))
+                        yield _select(kind, [(Text(plain(name)), name) for name in known], now)
                     yield Static("", id=f"{kind}-meaning", classes="meaning", markup=False)
                 for one in OTHERS:
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
-                        yield self._field(one)
+                        now = "" if (value := getattr(options, one.name)) is None else str(value)
+                        choices = [(Text(name), name) for name in one.choices]
+                        yield _select(one.name, choices, now) if one.choices else Entry(now, id=one.name)
                     empty = "; empty: no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Change", id="apply", variant="primary")
                 yield Button("Cancel", id="cancel")
-
-    def _select(self, kind: Kind) -> Select[str]:
-        now = self._now[kind]
-        # A schema of another package may not be installed here: it can stay.
-        known = (*names(kind), *(() if now in names(kind) else (now,)))
-        return Select(
-            [(Text(plain(name)), name) for name in known], value=now, allow_blank=False, id=kind, compact=True
-        )
-
-    def _field(self, one: Setting) -> Select[str] | Entry:
-        now = self._texts[one.name]
-        if one.choices:
-            names = [(name, name) for name in one.choices]
-            return Select(names, value=now, allow_blank=False, id=one.name, compact=True)
-        return Entry(now, id=one.name)
 
     @on(Select.Changed)
     def _explain(self) -> None:
@@ -92,10 +75,6 @@ class Change(ModalScreen[commands.Change | None]):
             name = str(self.query_one(f"#{kind}", Select).value)
             words = note(kind, algorithm) or paragraph(kind, name)
             self.query_one(f"#{kind}-meaning", Static).update(Text(words))
-
-    def _text(self, one: Setting) -> str:
-        field = self.query_one(f"#{one.name}", Select) if one.choices else self.query_one(f"#{one.name}", Input)
-        return str(field.value)
 
     def _command(self) -> commands.Change:
         """The command for the settings in the dialog. Raises UserError, which begins with the name of the first wrong field."""
@@ -106,8 +85,10 @@ class Change(ModalScreen[commands.Change | None]):
         }
         wrong = []
         for one in OTHERS:
+            id = f"#{one.name}"
+            field = self.query_one(id, Select) if one.choices else self.query_one(id, Input)
             try:
-                asked[one.name] = commands.typed(one.name, self._text(one))
+                asked[one.name] = commands.typed(one.name, str(field.value))
             except UserError as error:
                 wrong.append(str(error))
         if wrong:
@@ -134,3 +115,7 @@ class Change(ModalScreen[commands.Change | None]):
             self.action_apply()
         else:
             self.dismiss(None)
+
+
+def _select(name: str, options: list[tuple[Text, str]], now: str) -> Select[str]:
+    return Select(options, value=now, allow_blank=False, id=name, compact=True)

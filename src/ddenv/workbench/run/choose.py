@@ -1,4 +1,4 @@
-"""Lists to choose from: models by their names, the layers of the map, texts to copy."""
+"""Lists to choose from: models by their names, and the layers of the map."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.text import count, plain, shortened, truncated
+from ddenv.text import count, shortened
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.bindings import keys
 
@@ -27,7 +28,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = keys(
         "choose",
-        ("cancel", "escape", "cancel", "cancel", "choose nothing"),
+        ("cancel", "escape", "close", "cancel", "choose nothing"),
         ("down", "down", "move(1)", "", "next name"),
         ("up", "up", "move(-1)", "", "previous name"),
         ("toggle", "tab", "mark", "", "choose this model, or take it out again"),
@@ -52,9 +53,8 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._pinned = frozenset(pinned)
         self._chosen = set(chosen)
         self._names = tuple(sorted(names, key=lambda name: name not in self._chosen))
-        # The names that are listed, and how many there are with the typed part.
-        self._listed: list[str] = []
-        self._found = 0
+        # The names with the typed part: the first ones are listed.
+        self._found: list[str] = []
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
@@ -85,20 +85,18 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         if part == self._part:
             return
         self._part = part
-        found = [name for name in self._names if part in name.casefold()]
-        self._listed, self._found = found[:LISTED], len(found)
+        self._found = [name for name in self._names if part in name.casefold()]
         options = self.query_one(OptionList)
-        options.set_options(Option(self._prompt(name)) for name in self._listed)
-        if self._listed:
-            options.highlighted = 0
+        options.set_options(Option(self._prompt(name)) for name in self._found[:LISTED])
+        options.highlighted = 0 if self._found else None
         self._show_found()
 
     def _show_found(self) -> None:
         words = [f"{count(len(self._chosen), 'model')} chosen"] if self._several else []
         if not self._found:
             words.append("no name contains this")
-        elif more := self._found - len(self._listed):
-            words.append(f"{more} more: type to see them")
+        elif len(self._found) > LISTED:
+            words.append(f"{len(self._found) - LISTED} more: type to see them")
         self.query_one("#found", Static).update(Text("   ".join(words)))
 
     def _prompt(self, name: str) -> Text:
@@ -114,54 +112,34 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._several and place is not None:
-            self._toggle(place)
-
-    def _toggle(self, place: int) -> None:
-        name = self._listed[place]
-        self._chosen ^= {name}
-        self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
-        self._show_found()
+            self._chosen ^= {self._found[place]}
+            self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(self._found[place]))
+            self._show_found()
 
     @on(OptionList.OptionHighlighted)
     def _show_on_map(self, event: OptionList.OptionHighlighted) -> None:
-        self._mark(self._listed[event.option_index])
+        self._mark(self._found[event.option_index])
 
     @on(Input.Submitted)
     def _take(self) -> None:
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._chosen:
-            self._close(tuple(name for name in self._names if name in self._chosen))
+            self.action_close(tuple(name for name in self._names if name in self._chosen))
         elif place is not None:
-            self._close((self._listed[place],))
+            self.action_close((self._found[place],))
 
     @on(OptionList.OptionSelected)
     def _clicked(self, event: OptionList.OptionSelected) -> None:
         if self._several:
-            self._toggle(event.option_index)
+            self.action_mark()
             self.query_one(Input).focus()
         else:
-            self._close((self._listed[event.option_index],))
+            self.action_close((self._found[event.option_index],))
 
-    def _close(self, chosen: tuple[str, ...] | None) -> None:
+    def action_close(self, chosen: tuple[str, ...] | None = None) -> None:
         self._mark(None)
         self.dismiss(chosen)
-
-    def action_cancel(self) -> None:
-        self._close(None)
-
-
-MEANINGS = {
-    "partitions": "the parts of this round, by letter and colour",
-    "removed": "where removed models stood",
-    "pinned": "which models are pinned",
-    "sensed": "the order in which the robot sensed the models",
-    "participants": "models that affected the last similar run",
-    "path": "the robot's path on the last similar run",
-    "original": "the robot's path in f itself",
-    "failure": "where the robot ended in f",
-    "names": "the models' names, as n does on every map",
-}
 
 
 class Layers(ModalScreen[None]):
@@ -174,28 +152,22 @@ class Layers(ModalScreen[None]):
         ("close", "escape,l,q", "dismiss", "close", "back to the map"),
     )
 
-    def __init__(self, world: WorldMap, names: tuple[str, ...]) -> None:
+    def __init__(self, world: WorldMap) -> None:
         super().__init__()
-        self._world, self._names = world, names
+        self._world = world
 
     def compose(self) -> ComposeResult:
         with Framed("What the map shows", "space or click shows or hides   escape closes"):
-            yield OptionList(*(Option(self._prompt(name)) for name in self._names), compact=True, markup=False)
+            yield OptionList(*(Option(self._prompt(name)) for name in LAYERS), compact=True, markup=False)
 
     def _prompt(self, name: str) -> Text:
         mark = "[x]" if name in self._world.shown.layers else "[ ]"
-        return Text(f"{mark} {name:<12} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
+        return Text(f"{mark} {name:<12} ", no_wrap=True).append(LAYERS[name], "dim")
 
     @on(OptionList.OptionSelected)
     def action_switch(self) -> None:
         options = self.query_one(OptionList)
         if (place := options.highlighted) is not None:
-            self._world.toggle_layer(self._names[place])
-            options.replace_option_prompt_at_index(place, self._prompt(self._names[place]))
-
-
-def copied(what: str, text: str) -> Text:
-    lines = text.splitlines()
-    more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
-    shown = truncated(plain(lines[0]), 40) if lines else ""
-    return Text(f"{what:<26} ", no_wrap=True).append(f"{shown}{more}", "dim")
+            name = list(LAYERS)[place]
+            self._world.toggle_layer(name)
+            options.replace_option_prompt_at_index(place, self._prompt(name))

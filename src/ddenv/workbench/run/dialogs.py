@@ -18,9 +18,8 @@ from ddenv.runfile.failures import OtherFailure
 from ddenv.runfile.position import Chapter
 from ddenv.text import count, plain
 from ddenv.words.methods import chosen, note, paragraph
+from ddenv.workbench.help.dialogs import Pick, Reading
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.pick import Pick
-from ddenv.workbench.help.shortcuts import Reading
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.processes import Scene
 from ddenv.workbench.widgets.question import Choice
@@ -95,18 +94,15 @@ class SceneDialog(ModalScreen[None]):
         self.refresh_address()
 
     def refresh_address(self) -> None:
-        self.query_one("#address", Static).update(self._words())
-
-    def _words(self) -> Text:
+        text = Text("The scene starts ...", "dim")
         if self._scene.trouble:
-            return Text(self._scene.trouble, Style.parse(self.app.theme_variables["text-error"]))
-        url = self._scene.url
-        if not url:
-            return Text("The scene starts ...", "dim")
-        text = Text("Open in a browser on this machine:\n\n  ")
-        text.append(url, Style(bold=True, underline=True, link=url))
-        text.append("\n\nFrom another machine, first type there:\n\n  ")
-        return text.append(ssh_line(url), "bold").append("\n\nand open the same address.")
+            text = Text(self._scene.trouble, Style.parse(self.app.theme_variables["text-error"]))
+        elif url := self._scene.url:
+            text = Text("Open in a browser on this machine:\n\n  ")
+            text.append(url, Style(bold=True, underline=True, link=url))
+            text.append("\n\nFrom another machine, first type there:\n\n  ")
+            text.append(ssh_line(url), "bold").append("\n\nand open the same address.")
+        self.query_one("#address", Static).update(text)
 
     def action_copy(self, what: str) -> None:
         if url := self._scene.url:
@@ -136,17 +132,15 @@ def failures(found: Sequence[OtherFailure]) -> Pick:
 
 def rounds(chapters: Sequence[Chapter], at: int | None) -> Pick:
     """The list of rounds. The cursor starts on the chapter with the event `at`, or on the last one."""
+
+    def line(name: str, models: str, left: str, tests: str) -> Text:
+        return Text(f"{name:<16}{models:>8}{left:>10}{tests:>14}", no_wrap=True)
+
+    lines = []
+    for one in chapters:
+        left = f"{'○' if one.left == one.models else '●'} {one.left}" if one.kind == "round" else ""
+        name = "baseline" if one.kind == "baseline" else f"{one.kind} {one.number}"
+        lines.append(line(name, str(one.models), left, count(one.tests, "test")))
     start = next((row for row, each in enumerate(chapters) if at and at <= each.last), len(chapters) - 1)
-    head = _line("", "models", "left", "after")
-    return Pick("Rounds so far", "goes to its end", list(map(_chapter, chapters)), head=head, at=start)
-
-
-def _chapter(chapter: Chapter) -> Text:
-    less = chapter.left != chapter.models
-    left = f"{'●' if less else '○'} {chapter.left}" if chapter.kind == "round" else ""
-    name = "baseline" if chapter.kind == "baseline" else f"{chapter.kind} {chapter.number}"
-    return _line(name, str(chapter.models), left, count(chapter.tests, "test"))
-
-
-def _line(name: str, models: str, left: str, tests: str) -> Text:
-    return Text(f"{name:<16}{models:>8}{left:>10}{tests:>14}", no_wrap=True)
+    head = line("", "models", "left", "after")
+    return Pick("Rounds so far", "goes to its end", lines, head=head, at=start)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from rich.text import Text
@@ -36,21 +36,29 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
     if start is None:
         return None
     state, test = position.end, position.end.tests[number - 1]
-    models = state.models_of(test)
+    models, place, took = state.models_of(test), "", ""
     again = f" · re-run {test.run}" if test.phase == "round" and test.run else ""
-    said = (
-        ("end", how_it_ended(test)),
-        ("place", _place(test)),
-        ("seed", f"{test.seed} (run {test.run})"),
-        ("time", _took(test)),
-        ("started", time.strftime("%-d %b %Y, %H:%M:%S", time.localtime(start.recorded.time))),
-        ("models", f"{len(models)} of {count(len(state.elements), 'model')}: {_names(models)}"),
-        ("touched", _names([name for name, _ in test.first_touched])),
-        ("counts in", _counts(position, state, test)),
-    )
+    if test.end_pose is not None:
+        (x, y, z), away = test.end_pose[:3], metres(test.distance, 2)
+        place = f"({x:.2f}, {y:.2f}, {z:.2f}) m{f', {away} from the end of f' if away else ''}"
+    if test.implied_by is not None:
+        took = f"not simulated: no model that it lacks can have affected test {test.implied_by}, which implies it"
+    elif test.is_finished:
+        computed = "its result was copied from another run" if test.taken else f"{test.wall_seconds:.1f} s of computing"
+        took = f"{test.simulated_seconds:.1f} s simulated, {computed}"
+    said = {
+        "end": how_it_ended(test),
+        "place": place,
+        "seed": f"{test.seed} (run {test.run})",
+        "time": took,
+        "started": time.strftime("%-d %b %Y, %H:%M:%S", time.localtime(start.recorded.time)),
+        "models": f"{len(models)} of {count(len(state.elements), 'model')}: {_names(models)}",
+        "touched": _names([name for name, _ in test.first_touched]),
+        "counts in": _counts(position, state, test),
+    }
     title = f"Test {number} of {len(state.tests)} · {purpose(start.after, test)}{again}"
     text = Text()
-    for name, words in said:
+    for name, words in said.items():
         if words:
             text.append(f"{name:<{WIDTH}}", "dim").append(f"{words}\n")
     text.append("\nlog\n", "bold")
@@ -59,28 +67,12 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
     return title, text.append("\nto repeat it\n", "bold").append(f"  {command}")
 
 
-def _place(test: Test) -> str:
-    if test.end_pose is None:
-        return ""
-    x, y, z = test.end_pose[:3]
-    away = metres(test.distance, 2)
-    return f"({x:.2f}, {y:.2f}, {z:.2f}) m{f', {away} from the end of f' if away else ''}"
-
-
-def _took(test: Test) -> str:
-    if not test.is_finished:
-        return ""
-    if test.implied_by is not None:
-        return f"not simulated: no model that it lacks can have affected test {test.implied_by}, which implies it"
-    computed = "its result was copied from another run" if test.taken else f"{test.wall_seconds:.1f} s of computing"
-    return f"{test.simulated_seconds:.1f} s simulated, {computed}"
-
-
-def _names(models: tuple[str, ...] | list[str]) -> str:
+def _names(models: Sequence[str]) -> str:
     return first_of([plain(name) for name in models], NAMED) or "none"
 
 
 def _counts(position: Position, state: RunState, test: Test) -> str:
+    """What the test counts in, with the verdict on that."""
     if test.trial is not None and 0 < test.trial <= len(state.trials):
         trial = state.trials[test.trial - 1]
         return f"{trial.label}: {trial.verdict or 'not judged yet'}, {count(len(trial.tests), 'test')}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
@@ -35,70 +35,53 @@ DIM = Style(dim=True)
 
 
 class ModelsLeft(Vertical):
-    """The list of models; it is filled only while it is in sight."""
+    """The list of models, the nearest to f first; it is filled only while it is in sight."""
 
-    def __init__(self, *, id: str) -> None:
+    def __init__(self, find: Callable[[str], None], *, id: str) -> None:
+        """`find` is called with the name of a model that was clicked."""
         super().__init__(id=id, classes="panel")
-        self.border_title = "Models left"
+        self.border_title, self._find = "Models left", find
         self._made_of: tuple[object, ...] = ()
+        # The part of each model, its footprint, and when it was sensed, simulated s; where f ended, m.
+        self._parts: dict[str, str] = {}
+        self._prints: dict[str, Footprint] = {}
+        self._sensed: dict[str, float] = {}
+        self._f: tuple[float, float] | None = None
 
     def compose(self) -> ComposeResult:
         yield Static("", id="models-heading", markup=False)
-        yield Lines(line, nothing="none", id="models")
+        yield Lines(self._line, nothing="none", clicked=self._find, id="models")
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
         split = None if state.round is None or state.round.done else state.round.split
         made_of = (state.environment, split, state.pinned, state.evidence_test, state.baseline, prints)
         lines = self.query_one("#models", Lines)
-        same = bool(self._made_of) and all(a is b for a, b in zip(made_of, self._made_of, strict=True))
-        if same or not lines.size.width:
+        if made_of == self._made_of or not (width := lines.size.width):
             return
         self._made_of = made_of
-        self.query_one("#models-heading", Static).update(heading(lines.size.width))
-        lines.show(rows(state, prints))
+        heading = f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
+        self.query_one("#models-heading", Static).update(heading)
+        parts = {} if split is None else split.letter_of
+        self._parts = {name: partition_letter(part) for name, part in parts.items()} | dict.fromkeys(state.pinned, "+")
+        self._prints = {each.name: each for each in prints}
+        self._sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
+        self._f = None if state.f_position is None else state.f_position[:2]
+        lines.show(sorted(state.environment, key=self._nearly))
 
+    def _nearly(self, name: str) -> float:
+        """How far from f the rectangle around a model is, m: exact distances only for models in sight, of thousands."""
+        stands = self._prints.get(name)
+        if stands is None or self._f is None:
+            return math.inf
+        sides = zip(stands.low, self._f, stands.high, strict=True)
+        return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in sides))
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """`part` is its letter, "+" if it is pinned, "" in no part; `stands` its footprint, `f` its end, m; `sensed` in simulated s."""
-
-    name: str
-    part: str
-    stands: Footprint | None
-    f: tuple[float, float] | None
-    sensed: float | None
-
-
-def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
-    parts = state.round.split.letter_of if state.round is not None and not state.round.done else {}
-    sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
-    places = {each.name: each for each in prints}
-    f = None if state.f_position is None else state.f_position[:2]
-    found = []
-    for name in state.environment:
-        part = "+" if name in state.pinned else partition_letter(parts[name]) if name in parts else ""
-        found.append(Row(name, part, places.get(name), f, sensed.get(name)))
-    return tuple(sorted(found, key=_nearly))
-
-
-def _nearly(row: Row) -> float:
-    """How far from f the rectangle around a model is, m: exact distances only for models in sight, of thousands."""
-    if row.stands is None or row.f is None:
-        return math.inf
-    sides = zip(row.stands.low, row.f, row.stands.high, strict=True)
-    return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in sides))
-
-
-def line(row: Row, width: int) -> Text:
-    room = max(4, width - REST)
-    away = "" if row.stands is None or row.f is None else f"{row.stands.distance(row.f):.1f} m"
-    sensed = "never" if row.sensed is None else f"{row.sensed:.1f} s"
-    text = Text(padded(shortened(row.name, room), room), no_wrap=True)
-    return text.append(f"{row.part:>3}", "bold").append(f"{away:>9}").append(f"{sensed:>9}", "dim")
-
-
-def heading(width: int) -> str:
-    return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
+    def _line(self, name: str, width: int) -> Text:
+        room, stands = max(4, width - REST), self._prints.get(name)
+        away = "" if stands is None or self._f is None else f"{stands.distance(self._f):.1f} m"
+        sensed = f"{self._sensed[name]:.1f} s" if name in self._sensed else "never"
+        text = Text(padded(shortened(name, room), room), no_wrap=True)
+        return text.append(f"{self._parts.get(name, ''):>3}", "bold").append(f"{away:>9}").append(f"{sensed:>9}", "dim")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,74 +122,48 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
 
     The styles are those of the tops of the steps, of what is below, and of the line of needed models.
     """
-    if not course.points or width < 12 or height < 3:
+    points = course.points
+    if not points or width < 12 or height < 3:
         return Text("")
-    most = max(1, max(point.models for point in course.points))
-    last = max(1, course.tests, course.points[-1].tests)
+    most = max(1, max(point.models for point in points))
+    last = max(1, course.tests, points[-1].tests)
     margin = len(str(most)) + 1
     columns = width - margin - 1
     ruled = height >= 6 or (height >= 4 and bool(course.decided))
     rows = height - 1 - ruled
-    at = [_at(course, last * column / max(1, columns - 1)) for column in range(columns)]
-    marks = _marks(most, rows)
-    levels = [_row_of(needed, most, rows) for _, needed in at]
-    if course.needed and at[-1][1]:
+    # For each column, how many models were left, and in which row the line of needed ones is: below the chart without any.
+    left, levels = [], []
+    for column in range(columns):
+        at = last * column / max(1, columns - 1)
+        place = max(0, bisect_right(points, at, key=lambda point: point.tests) - 1)
+        needed = max(points[place].needed, course.needed if place == len(points) - 1 else 0)
+        left.append(points[place].models)
+        levels.append(min(rows - 1, rows - 1 - int((needed / most) * rows - 1e-9)) if needed else rows)
+    marks, middle = {0: str(most), rows - 1: "0"}, rows // 2
+    if rows >= 5 and (words := str(round(most * (1 - middle / rows)))) not in marks.values():
+        marks[middle] = words
+    if course.needed and levels[-1] < rows:
         marks.setdefault(levels[-1], str(course.needed))
     text = Text(no_wrap=True)
     for row in range(rows):
         text.append(f"{marks.get(row, ''):>{margin - 1}}{'┤' if row in marks else '│'}", "dim")
-        for kind, chars in groupby(_line(at, levels, most, rows, row), itemgetter(1)):
+        cells = []
+        for models, level in zip(left, levels, strict=True):
+            eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
+            char, full = LEVELS[min(8, max(0, eighths))], eighths > 8
+            # Where steps and line meet in one row, the steps are drawn.
+            cells.append((NEEDED, 2) if level == row and full else (char, int(full)))
+        for kind, chars in groupby(cells, itemgetter(1)):
             text.append("".join(char for char, _ in chars), styles[kind])
         text.append("\n")
     if ruled:
-        text.append_text(_rule(course, margin, columns, last, styles[2]))
-    return text.append_text(_axis(course, margin, columns))
-
-
-def _marks(most: int, rows: int) -> dict[int, str]:
-    marks = {0: str(most), rows - 1: "0"}
-    middle = rows // 2
-    if rows >= 5 and (words := str(round(most * (1 - middle / rows)))) not in marks.values():
-        marks[middle] = words
-    return marks
-
-
-def _at(course: Course, tests: float) -> tuple[int, int]:
-    """How many models were left after `tests` tests, and how many seemed to be needed."""
-    place = bisect_right(course.points, tests, key=lambda point: point.tests) - 1
-    point = course.points[max(0, place)]
-    needed = max(point.needed, course.needed) if place == len(course.points) - 1 else point.needed
-    return point.models, needed
-
-
-def _row_of(models: int, most: int, rows: int) -> int:
-    """The row in which the top of `models` models is; for 0 the one below the chart."""
-    return rows if not models else min(rows - 1, rows - 1 - int((models / most) * rows - 1e-9))
-
-
-def _line(
-    at: Sequence[tuple[int, int]], levels: Sequence[int], most: int, rows: int, row: int
-) -> Iterator[tuple[str, int]]:
-    for (models, _), level in zip(at, levels, strict=True):
-        eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
-        # Where steps and line meet in one row, the steps are drawn.
-        if level == row and eighths > 8:
-            yield NEEDED, 2
-        else:
-            yield LEVELS[min(8, max(0, eighths))], int(eighths > 8)
-
-
-def _rule(course: Course, margin: int, columns: int, last: int, marked: Style) -> Text:
-    places = {round(min(tests, last) * (columns - 1) / last) for tests in course.decided}
-    text = Text(f"{'':>{margin - 1}}└", "dim", no_wrap=True)
-    for column in range(columns):
-        text.append(*((DECIDED, marked) if column in places else ("─", DIM)))
-    return text.append("\n")
-
-
-def _axis(course: Course, margin: int, columns: int) -> Text:
-    end, left = count(course.tests, "test"), f"{count(course.points[-1].models, 'model')} left"
+        decided = {round(min(tests, last) * (columns - 1) / last) for tests in course.decided}
+        rule = Text(f"{'':>{margin - 1}}└", "dim")
+        for column in range(columns):
+            rule.append(*((DECIDED, styles[2]) if column in decided else ("─", DIM)))
+        text.append_text(rule).append("\n")
+    end, words = count(course.tests, "test"), f"{count(points[-1].models, 'model')} left"
     space = columns - 1 - len(end)
-    least = f"{left}, at least {course.needed} needed" if course.needed else left
-    words = next((each for each in (least, left) if len(each) + 2 <= space), "")
-    return Text(f"{'':>{margin - 1}}0{words.center(space)}{end}", "dim", no_wrap=True)
+    least = f"{words}, at least {course.needed} needed" if course.needed else words
+    fitting = next((each for each in (least, words) if len(each) + 2 <= space), "")
+    return text.append(f"{'':>{margin - 1}}0{fitting.center(space)}{end}", "dim")

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rich.text import Text
+from textual.screen import Screen
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import FreshRuns
 from ddenv.guiding.commands import AcceptOther, GoBack, Stop
 from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name, run_path
-from ddenv.workbench.help.pick import Pick
-from ddenv.workbench.map.place import LAYERS
+from ddenv.text import plain, truncated
+from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
-from ddenv.workbench.run.choose import ChooseModels, Layers, copied
+from ddenv.workbench.run.choose import ChooseModels, Layers
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, failures, rounds
 from ddenv.workbench.run.facts import FactsDialog
 from ddenv.workbench.shared.background import call_if_open, is_open
@@ -30,6 +29,7 @@ from ddenv.workbench.shared.messages import ShowRun
 if TYPE_CHECKING:
     from ddenv.workbench.run.run_screen import RunScreen
 
+Answer = TypeVar("Answer")
 # The maximum number of other failures in a list.
 LISTED = 200
 
@@ -40,6 +40,15 @@ class Opening:
     def __init__(self, screen: RunScreen) -> None:
         self._screen = screen
         self._poll, self._asking, self._scene = screen.poll, screen.asking, screen.scene
+
+    def _open(self, dialog: Screen[Answer | None], then: Callable[[Answer], object]) -> None:
+        """Calls `then` with the answer, unless the dialog is cancelled."""
+
+        def answered(answer: Answer | None) -> None:
+            if answer is not None:
+                then(answer)
+
+        self._screen.app.push_screen(dialog, answered)
 
     def choose(
         self,
@@ -55,49 +64,33 @@ class Opening:
         if not self._screen.world.is_on_screen:
             # The map shows the model under the cursor.
             self._screen.action_pane("map")
-        pinned = self._poll.snapshot.state.pinned
-        dialog = ChooseModels(title, names, several=several, mark=self._screen.world.mark, pinned=pinned, chosen=chosen)
-        self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
+        pinned, mark = self._poll.snapshot.state.pinned, self._screen.world.mark
+        self._open(ChooseModels(title, names, several=several, mark=mark, pinned=pinned, chosen=chosen), then)
 
     def find(self) -> None:
         names = [each.name for each in self._screen.world.place.prints]
         self.choose("Find a model on the map", names, False, lambda chosen: self._screen.find(chosen[0]))
 
     def change(self) -> None:
-        dialog = Change(self._poll.snapshot.state)
-        self._screen.app.push_screen(dialog, lambda command: self._asking.ask(command) if command else None)
+        self._open(Change(self._poll.snapshot.state), self._asking.ask)
 
     def history(self) -> None:
         from ddenv.workbench.history import History
 
-        def chosen(node: int | None) -> None:
-            if node is not None:
-                # The history asked the question already.
-                self._asking.ask(GoBack(node), sure=True)
-
-        self._screen.app.push_screen(History(lambda: self._asking.situation), chosen)
+        # It asks the question itself.
+        self._open(History(lambda: self._asking.situation), lambda node: self._asking.ask(GoBack(node), sure=True))
 
     def failures(self) -> None:
         found = atlas(self._poll.snapshot.state)[:LISTED]
         if not found:
             self._asking.refuse("no test shows a failure other than f")
             return
-
-        def chosen(row: int | None) -> None:
-            if row is not None:
-                self._asking.ask(AcceptOther(found[row].smallest, instead=True))
-
-        self._screen.app.push_screen(failures(found), chosen)
+        self._open(failures(found), lambda row: self._asking.ask(AcceptOther(found[row].smallest, instead=True)))
 
     def rounds(self) -> None:
         position = self._screen.browsing.position
         chapters = tuple(position.chapters)
-
-        def chosen(row: int | None) -> None:
-            if row is not None:
-                self._screen.go(chapters[row].last)
-
-        self._screen.app.push_screen(rounds(chapters, position.at), chosen)
+        self._open(rounds(chapters, position.at), lambda row: self._screen.go(chapters[row].last))
 
     def facts(self) -> None:
         position = self._screen.browsing.position
@@ -129,32 +122,36 @@ class Opening:
         return ""
 
     def why(self) -> None:
-        from ddenv.workbench.why.why_screen import Look, WhyScreen
+        from ddenv.workbench.why.why_screen import WhyScreen
+
+        def engine() -> tuple[bool, str]:
+            works = self._poll.snapshot.engine != "absent"
+            return works, "" if works else self._screen.engine.trouble
 
         position, place = self._screen.browsing.position, self._screen.world.place
-
-        def look() -> Look:
-            return Look(position.now, self._poll.snapshot.engine != "absent", self._asking.trouble)
-
-        self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, look, self._asking.ask))
+        self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, engine, self._asking.ask))
 
     def layers(self) -> None:
-        self._screen.app.push_screen(Layers(self._screen.world, LAYERS), lambda _: self._screen.show_legend())
+        self._screen.app.push_screen(Layers(self._screen.world), lambda _: self._screen.show_legend())
 
     def copy(self) -> None:
         path, name = self._poll.path, attach_name(self._poll.path)
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
-        if selected := self._screen.keys.pointed.models:
+        if selected := self._screen.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
         texts += [("to come back", f"ddenv open {name}"), ("to go on without a screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]
 
-        def chosen(row: int | None) -> None:
-            if row is not None:
-                self._screen.app.copy_to_clipboard(texts[row][1])
-                self._asking.say(f"{texts[row][0]} copied, if the terminal allows it")
+        def chosen(row: int) -> None:
+            self._screen.app.copy_to_clipboard(texts[row][1])
+            self._asking.say(f"{texts[row][0]} copied, if the terminal allows it")
 
-        self._screen.app.push_screen(Pick("Copy", "or click copies", [copied(*each) for each in texts]), chosen)
+        lines = []
+        for what, text in texts:
+            first, *more = text.splitlines() or [""]
+            begin = f"{truncated(plain(first), 40)}{f' and {len(more)} more lines' if more else ''}"
+            lines.append(Text(f"{what:<26} ", no_wrap=True).append(begin, "dim"))
+        self._open(Pick("Copy", "or click copies", lines), chosen)
 
     def export(self) -> None:
         from ddenv.workbench.export import ExportScreen
@@ -164,25 +161,30 @@ class Opening:
 
     def inside(self) -> None:
         """Begins a run inside the models that are left, and shows it."""
-        snapshot = self._poll.snapshot
+        state, works = self._poll.snapshot.state, self._poll.snapshot.engine != "absent"
         if why := self._asking.barred:
             self._asking.refuse(why)
             return
-        if snapshot.engine != "absent" or not snapshot.state.ended:
-            self._asking.refuse(_not_over(snapshot))
+        if works or not state.ended:
+            what = "the reduction" if state.margining is None else "the search for margins"
+            then = "" if works else "; r goes on with it"
+            if state.isolating is not None:
+                what, then = "the search for a world that passes", "; i stops it" if works else then
+            self._asking.refuse(f"I works once {what} is over{then}")
             return
-        self._screen.run_worker(self._begin_inside, group="inside", exclusive=True, thread=True)
 
-    def _begin_inside(self) -> None:
-        from ddenv.runs.creation import create_inside
+        def begin() -> None:
+            from ddenv.runs.creation import create_inside
 
-        try:
-            path = run_path(f"{self._poll.path.stem}-inside", None, None)
-            create_inside(self._poll.path, path)
-        except UserError as error:
-            call_if_open(self._screen, self._asking.refuse, str(error))
-            return
-        call_if_open(self._screen, self._screen.post_message, ShowRun(path))
+            try:
+                path = run_path(f"{self._poll.path.stem}-inside", None, None)
+                create_inside(self._poll.path, path)
+            except UserError as error:
+                call_if_open(self._screen, self._asking.refuse, str(error))
+            else:
+                call_if_open(self._screen, self._screen.post_message, ShowRun(path))
+
+        self._screen.run_worker(begin, group="inside", exclusive=True, thread=True)
 
     def method(self) -> None:
         options = settings(self._poll.snapshot.state)
@@ -190,20 +192,21 @@ class Opening:
 
     def scene(self) -> None:
         dialog = SceneDialog(self._scene)
+
+        def answered() -> None:
+            if is_open(dialog):
+                dialog.refresh_address()
+            elif self._scene.trouble:
+                self._screen.notify(self._scene.trouble, severity="error", markup=False)
+
+        def wait() -> None:
+            self._scene.wait()
+            self._screen.app.call_from_thread(answered)
+
         if not self._scene.on:
             self._scene.start()
-            self._screen.run_worker(partial(self._await_scene, dialog), group="scene", thread=True)
+            self._screen.run_worker(wait, group="scene", thread=True)
         self._screen.app.push_screen(dialog)
-
-    def _await_scene(self, dialog: SceneDialog) -> None:
-        self._scene.wait()
-        self._screen.app.call_from_thread(self._scene_answered, dialog)
-
-    def _scene_answered(self, dialog: SceneDialog) -> None:
-        if is_open(dialog):
-            dialog.refresh_address()
-        elif self._scene.trouble:
-            self._screen.notify(self._scene.trouble, severity="error", markup=False)
 
     def detach(self) -> None:
         works = "The engine goes on" if self._poll.snapshot.engine != "absent" else "No engine is running"
@@ -212,35 +215,23 @@ class Opening:
 
     def quit(self) -> None:
         snapshot = self._poll.snapshot
+
+        def answered(answer: str | None) -> None:
+            if answer == "leave":
+                self.detach()
+            elif answer == "stop":
+                resume = f"ddenv resume {attach_name(self._poll.path)}"
+                self._asking.send(Stop(), then=lambda: self._exit(f"The engine stops. Go on later with: {resume}"))
+
         if snapshot.engine == "absent" or snapshot.gone:
             self._screen.app.exit(0)
         elif self._poll.watch:
             self.detach()
         else:
-            self._screen.app.push_screen(Quit(), self._quit)
-
-    def _quit(self, answer: str | None) -> None:
-        if answer == "leave":
-            self.detach()
-        elif answer == "stop":
-            resume = f"ddenv resume {attach_name(self._poll.path)}"
-            self._asking.send(Stop(), then=lambda: self._exit(f"The engine stops. Go on later with: {resume}"))
+            self._screen.app.push_screen(Quit(), answered)
 
     def _exit(self, words: str) -> None:
         self._screen.app.exit(0, message=Text(words))
-
-
-def _not_over(snapshot: Snapshot) -> str:
-    """Why no run inside what is left can begin yet: what is going on, and what ends it."""
-    what, state = "the reduction", snapshot.state
-    if state.isolating is not None:
-        what = "the search for a world that passes"
-    elif state.margining is not None:
-        what = "the search for margins"
-    then = (
-        "; r goes on with it" if snapshot.engine == "absent" else "; i stops it" if state.isolating is not None else ""
-    )
-    return f"I works once {what} is over{then}"
 
 
 def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tuple[int | None, int | None]:
@@ -250,7 +241,11 @@ def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tup
     whose partner with the same seed, in what is left, showed f where it did not, and before it that partner. With `finished`, only
     finished tests count.
     """
-    tests = [test for test in _tests(state, item) if test.is_finished or not finished]
+    if isinstance(item, FreshRuns):
+        own = _fresh(state, item.node, item.without)
+    else:
+        own = [item] if isinstance(item, Test) else state.tests_of(item.tests if item else ())
+    tests = [test for test in own if test.is_finished or not finished]
     if isinstance(item, FreshRuns) and item.without is not None:
         left = {test.run: test for test in _fresh(state, item.node, None) if test.outcome == "similar"}
         pairs = ((left[test.run], test) for test in tests if test.run in left and test.outcome != "similar")
@@ -262,14 +257,6 @@ def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tup
         return (similar or tests)[-1].id, None
     last = (test.id for test in reversed(state.tests) if test.is_finished or not finished)
     return next(last, None), None
-
-
-def _tests(state: RunState, item: Item | None) -> list[Test]:
-    if isinstance(item, Test):
-        return [item]
-    if isinstance(item, FreshRuns):
-        return _fresh(state, item.node, item.without)
-    return [] if item is None else state.tests_of(item.tests)
 
 
 def _fresh(state: RunState, node: int, without: str | None) -> list[Test]:

@@ -5,20 +5,9 @@ A key that guides the run has the action `guide`, with its name in `ddenv.guidin
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from functools import partial
-from typing import TYPE_CHECKING
-
 from textual.binding import Binding, BindingType
 
-from ddenv.guiding.offers import Offer, Pointed, offer
-from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.run.snapshot import NOT_NOW
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
-
-if TYPE_CHECKING:
-    from ddenv.workbench.run.run_screen import RunScreen
-
 
 # The footer's keys by priority; the last ones fit on wide screens only.
 FIRST = ids(
@@ -88,7 +77,7 @@ KEYS: list[BindingType] = [
         ),
         ("why", "W", "open('why')", "why", "why the robot fails: what happens without each model that is left"),
         HELP,
-        ("quit", "q", "quit", "quit", "leave; asks whether to stop the engine"),
+        ("quit", "q", "open('quit')", "quit", "leave; asks whether to stop the engine"),
         ("failures", "f", "open('failures')", "failures", "other failures that the tests met; reduce one in a branch"),
         ("find", "slash", "open('find')", "find", "find a model by its name, and show it on the map", "/"),
         ("layers", "l", "open('layers')", "layers", "choose what the map shows"),
@@ -105,22 +94,8 @@ KEYS: list[BindingType] = [
         *MAP_KEYS,
         ("back", "comma", "browse('moment', -1)", "back", "back in the run: to the moment before this one", ","),
         ("on", "full_stop", "browse('moment', 1)", "on", "on to the next moment; after the last one, back to now", "."),
-        (
-            "round_before",
-            "less_than_sign",
-            "browse('round', -1)",
-            "round before",
-            "to the end of the round before",
-            "<",
-        ),
-        (
-            "next_round",
-            "greater_than_sign",
-            "browse('round', 1)",
-            "next round",
-            "to the end of this or the next round",
-            ">",
-        ),
+        ("round_before", "<", "browse('round', -1)", "round before", "to the end of the round before", "<"),
+        ("next_round", ">", "browse('round', 1)", "next round", "to the end of this or the next round", ">"),
         ("decision_before", "(", "browse('decision', -1)", "", "to the verdict or decision before", "("),
         ("next_decision", ")", "browse('decision', 1)", "", "to the next verdict or decision", ")"),
         ("reduction_before", "{", "browse('reduction', -1)", "", "to the reduction before", "{"),
@@ -133,64 +108,3 @@ KEYS: list[BindingType] = [
         ("detach", "d", "detach", "detach", "leave the workbench; the engine goes on"),
     ),
 ]
-
-
-class KeyOffers:
-    """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in the table and on the map."""
-
-    def __init__(self, screen: RunScreen) -> None:
-        self._screen = screen
-
-    def offer(self, name: str) -> Offer:
-        if self._screen.browsing.is_past:
-            return Offer(why_not=NOT_NOW)
-        return offer(name, self._screen.asking.situation, self.pointed)
-
-    @property
-    def pointed(self) -> Pointed:
-        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
-        names, elements, table = self._selection(), self._screen.poll.snapshot.state.elements, self._screen.table
-        known = tuple(name for name in elements if name in names) if names else ()
-        row = table.under_cursor if table.is_attached and table.is_on_screen else None
-        return Pointed(row, table.following, (*known, *sorted(names.difference(known))))
-
-    def _selection(self) -> frozenset[str]:
-        world = self._screen.world
-        if world.selection:
-            return frozenset(world.selection)
-        name = world.model_at_cursor if world.has_focus else None
-        return frozenset() if name is None else frozenset((name,))
-
-    def show(self, footer: KeyFooter) -> None:
-        now, pointed = self._screen.asking.situation, self.pointed
-        for name, binding in GUIDING.items():
-            offered = offer(name, now, pointed)
-            footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
-
-    def pressed(self, key: str) -> None:
-        # To list what all keys do now takes longer than most keys take.
-        if any(each in GUIDING.values() for each in self._screen._bindings.key_to_bindings.get(key, ())):
-            active = self._screen.active_bindings.get(key)
-            if active is not None and not active.enabled and active.node is self._screen:
-                name = next(name for name, each in GUIDING.items() if each.id == active.binding.id)
-                self._screen.asking.refuse(self.offer(name).why_not)
-
-    def use(self, name: str) -> None:
-        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
-        offered, asking, opening = self.offer(name), self._screen.asking, self._screen.opening
-        if self._screen.browsing.is_past:
-            asking.refuse(offered.why_not)
-        elif offered.command is not None and name != "pin":
-            asking.ask(offered.command)
-        elif name == "change":
-            opening.change()
-        elif name in TITLES:
-            environment = self._screen.poll.snapshot.state.environment
-            opening.choose(TITLES[name], environment, True, partial(self._chosen, name), self.pointed.models)
-
-    def _chosen(self, name: str, models: Collection[str]) -> None:
-        now = offer(name, self._screen.asking.situation, Pointed(models=tuple(models)))
-        if now.command is None:
-            self._screen.asking.refuse(now.why_not)
-        else:
-            self._screen.asking.ask(now.command)

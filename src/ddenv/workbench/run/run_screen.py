@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
@@ -16,10 +17,10 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.runfile.position import Step
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
-from ddenv.runfile.supports import drops, drops_without
 from ddenv.runfile.tested import Wanted
 from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
@@ -32,8 +33,8 @@ from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
-from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, KEYS, LOOKING, ON_MAP, KeyOffers
-from ddenv.workbench.run.snapshot import Browsing, Following
+from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, GUIDING, KEYS, LOOKING, ON_MAP, TITLES
+from ddenv.workbench.run.snapshot import NOT_NOW, Browsing
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_lines
 from ddenv.workbench.shared.messages import Attention
@@ -49,6 +50,10 @@ SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
 # The panes and their words, in the order of the keys 1 to 5.
 PANES = {"map": "map", "round": "round", "chart": "chart", "now": "what is happening", "log": "log"}
+# How often the run file is read, s. While it catches up with a long run: the time to the next look, and between two updates.
+PERIOD, AT_ONCE, CATCHING_UP = 0.1, 0.002, 0.5
+# The map stays with a candidate for at least this time, s.
+CALM = 4.0
 # Where map, table and chart stand side by side, and where models and decisions do too.
 WIDE, HUGE = 110, 170
 
@@ -78,9 +83,11 @@ class RunScreen(Screen[None]):
         self._legend = MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
-        self.following = Following(self, self.poll, self._seen, self._show)
-        self.keys = KeyOffers(self)
         self._pane = "map"
+        # Whether something is not shown yet, whether the next look comes soon, and when the run was shown last.
+        self._stale, self._coming, self._shown_at = False, False, time.monotonic()
+        # The round and the candidate that the map stays with, and until when.
+        self._stays: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
 
     @cached_property
     def opening(self) -> Opening:
@@ -112,7 +119,7 @@ class RunScreen(Screen[None]):
                     with _panel("now", "What is happening", "e explains the method"):
                         yield Happening(id="happening")
             with Vertical(id="run-more"):
-                yield ModelsLeft(id="models-panel")
+                yield ModelsLeft(self.find, id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
                     yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         if self.poll.watch:
@@ -124,7 +131,8 @@ class RunScreen(Screen[None]):
     def on_mount(self) -> None:
         self.query_one(Panes).mark(self._pane)
         # The first picture does not wait for what reads a run to be loaded.
-        self.call_after_refresh(self.following.begin)
+        self.call_after_refresh(self.look)
+        self.call_after_refresh(self.set_interval, PERIOD, self.look)
         read_world(self, self.run, self._placed)
 
     def on_unmount(self) -> None:
@@ -144,12 +152,44 @@ class RunScreen(Screen[None]):
 
     # From the run file to the screen.
 
-    def _seen(self, before: Snapshot, live: bool) -> None:
-        if self.poll.snapshot.engine == "alive":
-            self.engine.seen_at_work()
-        self.asking.show_refusal(before)
-        if live and (why := worth_a_look(before, self.poll.snapshot)):
-            self.post_message(Attention(plain(self.run.stem), why))
+    def look(self) -> None:
+        """Shows what is new; while it catches up with a long run, whose events are old, only now and then."""
+        poll, before, live = self.poll, self.poll.snapshot, not self.poll.catching_up
+        if poll.look() is not None:
+            self._stale = True
+            if poll.snapshot.engine == "alive":
+                self.engine.seen_at_work()
+            self.asking.show_refusal(before)
+            if live and (why := worth_a_look(before, poll.snapshot)):
+                self.post_message(Attention(plain(self.run.stem), why))
+        if poll.catching_up and not self._coming:
+            # Soon, but after the keys that were pressed meanwhile.
+            self._coming = True
+            self.set_timer(AT_ONCE, self._look_on)
+        if not poll.catching_up or time.monotonic() - self._shown_at >= CATCHING_UP:
+            changed, self._stale = self._stale, False
+            if changed:
+                self._shown_at = time.monotonic()
+            self._show(changed)
+
+    def _look_on(self) -> None:
+        self._coming = False
+        self.look()
+
+    def _focus(self) -> Candidate | None:
+        """The candidate to show. However fast the current one changes, it stays for `CALM` seconds, so that it can be read."""
+        snapshot, moment = self.snapshot, time.monotonic()
+        state, focus = snapshot.state, snapshot.focus
+        if snapshot.past:
+            return focus
+        round, index, until = self._stays
+        now = (state.node, state.round.number) if state.round and not state.round.done else None
+        waits = state.waiting_candidate is not None
+        if state.round and now == round and moment < until and not waits and snapshot.engine == "alive":
+            return state.round.candidates[index]
+        if focus is not None and (now, focus.index) != (round, index):
+            self._stays = now, focus.index, moment + CALM
+        return focus
 
     def _show(self, changed: bool) -> None:
         if changed:
@@ -187,46 +227,80 @@ class RunScreen(Screen[None]):
         self._show_keys()
 
     def _show_map(self) -> None:
-        snapshot = self.snapshot
-        focus = snapshot.focus if snapshot.past else self.following.candidate
+        snapshot, focus = self.snapshot, self._focus()
         self.world.show(snapshot, self.table.chosen or focus)
         self.show_legend()
-        self._show_scene(self.table.chosen or (focus if snapshot.past else None))
-
-    def _show_scene(self, row: Candidate | Trial | None) -> None:
-        at, round = self.browsing.position.at, self.snapshot.state.round
+        at, round = self.browsing.position.at, snapshot.state.round
+        row, wanted = self.table.chosen or (focus if snapshot.past else None), Wanted(at)
         if isinstance(row, Trial):
-            self.scene.show(Wanted(at, trial=row.number))
+            wanted = Wanted(at, trial=row.number)
         elif row is not None and round is not None:
-            self.scene.show(Wanted(at, round.number, row.index))
-        else:
-            self.scene.show(Wanted(at))
+            wanted = Wanted(at, round.number, row.index)
+        self.scene.show(wanted)
 
     def show_legend(self) -> None:
-        selection, candidate, state = self.world.selection, self.world.shown.candidate, self.world.snapshot.state
-        fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
-        self._legend.show(len(selection), candidate, fallen, self.world.legend)
+        self._legend.show(self.world.shown)
 
     def _show_models(self) -> None:
         self.query_one(ModelsLeft).show(self.snapshot.state, self.world.place.prints)
 
     # The keys that guide the run.
 
+    @property
+    def pointed(self) -> Pointed:
+        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
+        names = self.world.selection
+        if not names and self.world.has_focus and (name := self.world.model_at_cursor) is not None:
+            names = frozenset((name,))
+        known = tuple(name for name in self.poll.snapshot.state.elements if name in names) if names else ()
+        row = self.table.under_cursor if self.table.is_attached and self.table.is_on_screen else None
+        return Pointed(row, self.table.following, (*known, *sorted(names.difference(known))))
+
+    def _offer(self, name: str) -> Offer:
+        """What a key does now, by its name in `ddenv.guiding.offers.ACTIONS`."""
+        if self.browsing.is_past:
+            return Offer(why_not=NOT_NOW)
+        return offer(name, self.asking.situation, self.pointed)
+
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action != "guide":
             return True
-        return None if self.keys.offer(str(parameters[0])).why_not else True
+        return None if self._offer(str(parameters[0])).why_not else True
 
     def action_guide(self, name: str) -> None:
-        self.keys.use(name)
+        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
+        offered = self._offer(name)
+        if self.browsing.is_past:
+            self.asking.refuse(offered.why_not)
+        elif offered.command is not None and name != "pin":
+            self.asking.ask(offered.command)
+        elif name == "change":
+            self.opening.change()
+        elif name in TITLES:
+
+            def chosen(models: tuple[str, ...]) -> None:
+                now = offer(name, self.asking.situation, Pointed(models=models))
+                self.asking.refuse(now.why_not) if now.command is None else self.asking.ask(now.command)
+
+            self.opening.choose(TITLES[name], self.poll.snapshot.state.environment, True, chosen, self.pointed.models)
 
     def on_key(self, event: events.Key) -> None:
-        self.keys.pressed(event.key)
+        """Says why a key does nothing."""
+        # To list what all keys do now takes longer than most keys take.
+        if any(each in GUIDING.values() for each in self._bindings.key_to_bindings.get(event.key, ())):
+            active = self.active_bindings.get(event.key)
+            if active is not None and not active.enabled and active.node is self:
+                name = next(name for name, each in GUIDING.items() if each.id == active.binding.id)
+                self.asking.refuse(self._offer(name).why_not)
 
     @on(WorldMap.Pointed)
     def _show_keys(self) -> None:
-        if not self.poll.watch and self._footer.is_attached:
-            self.keys.show(self._footer)
+        if self.poll.watch or not self._footer.is_attached:
+            return
+        now, pointed = self.asking.situation, self.pointed
+        for name, binding in GUIDING.items():
+            offered = offer(name, now, pointed)
+            self._footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
     def _keys_here(self) -> tuple[str, ...]:
         if self.browsing.is_past:
@@ -269,9 +343,6 @@ class RunScreen(Screen[None]):
     def action_detach(self) -> None:
         self.opening.detach()
 
-    def action_quit(self) -> None:
-        self.opening.quit()
-
     # Panes and the map.
 
     def _row_chosen(self) -> None:
@@ -282,10 +353,6 @@ class RunScreen(Screen[None]):
     def _selected(self) -> None:
         self.show_legend()
         self._show_keys()
-
-    @on(Lines.Clicked, "#models")
-    def _model_clicked(self, event: Lines.Clicked) -> None:
-        self.find(event.item.name)
 
     def find(self, name: str) -> None:
         self.action_pane("map")

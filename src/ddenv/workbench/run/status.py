@@ -40,22 +40,21 @@ class Header(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._lefts: tuple[str, ...] = ()
-        self._rights: tuple[str, ...] = ("",)
+        self._heading: tuple[tuple[str, ...], tuple[str, ...]] = ("",), ("",)
 
     def show(self, snapshot: Snapshot) -> None:
         now = heading(snapshot.state)
-        if now != (self._lefts, self._rights):
-            self._lefts, self._rights = now
+        if now != self._heading:
+            self._heading = now
             self.refresh()
 
     def render(self) -> Text:
-        name, room = "ddenv", self.size.width - 9
-        shortest = len(min(self._lefts, key=len, default=""))
-        right = next((each for each in self._rights if shortest + len(each) + 2 <= room), self._rights[-1])
+        (lefts, rights), room = self._heading, self.size.width - 9
+        shortest = min(map(len, lefts))
+        right = next((each for each in rights if shortest + len(each) + 2 <= room), rights[-1])
         room = max(0, room - len(right) - 2)
-        left = next((each for each in self._lefts if len(each) <= room), truncated((self._lefts or ("",))[-1], room))
-        text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
+        left = next((each for each in lefts if len(each) <= room), truncated(lefts[-1], room))
+        text = Text(" ", no_wrap=True).append("ddenv", ink(self.app.theme_variables, "primary", bold=True))
         return text.append(f"  {left:<{room}}  ", "bold").append(right)
 
 
@@ -73,8 +72,6 @@ class Status(Widget):
 
         At an earlier moment of the run, `place` is its number, and the number of moments.
         """
-        if (scene, asked, place) == self._besides and snapshot is self._snapshot:
-            return
         self._snapshot, self._besides = snapshot, (scene, asked, place)
         now = facts(snapshot, scene, asked) if place is None else facts_of_past(snapshot, scene, *place)
         if now != self._facts:
@@ -221,16 +218,9 @@ def title(snapshot: Snapshot) -> str:
     sign, word = STATUS.get(snapshot.status, ("·", snapshot.status))
     models = f"{len(state.environment)} of {count(len(state.elements), 'model')}"
     said = "" if snapshot.status in ("running", "baseline") else f", {word}"
-    return f"{sign} {_done(snapshot)}{name}: {models}{said}"
-
-
-def _done(snapshot: Snapshot) -> str:
-    left = remaining(snapshot.state, snapshot.engine == "alive")
-    if left is None:
-        return ""
-    done = snapshot.state.tests_done
-    part = 100 * done / max(1, done + left.tests[1])
-    return f"{STEP * int(part / STEP)} % "
+    left, done = remaining(state, snapshot.engine == "alive"), state.tests_done
+    part = "" if left is None else f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
+    return f"{sign} {part}{name}: {models}{said}"
 
 
 def worth_a_look(before: Snapshot, now: Snapshot) -> str:

@@ -20,9 +20,9 @@ from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
 from ddenv.runs.folder import SUFFIX
 from ddenv.text import count, plain, shortened
+from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
 from ddenv.workbench.shared.background import call_if_open, is_open, refuse

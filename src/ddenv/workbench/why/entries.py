@@ -16,14 +16,14 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import Names
 from ddenv.runs.changes import changes
 from ddenv.runs.folder import attach_name
-from ddenv.runs.reasons import Nearest, Parting, Reason, nearest, no_reasons, parting_sentence, reasons, sentence
+from ddenv.runs.reasons import Parting, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.runs.subject import read_parts
 from ddenv.text import as_sentence, padded, percent, plain, shortened, told_apart
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
 from ddenv.words.signs import CLAIM
 from ddenv.workbench.map.place import Limits
-from ddenv.workbench.playback.moving import snapshot_with
+from ddenv.workbench.playback.playback_screen import snapshot_with
 
 # The maximum number of models in the list.
 LISTED = 200
@@ -52,19 +52,26 @@ class Entry:
     limits: Limits = ()
     figures: str = ""
 
-    @property
-    def text(self) -> str:
-        return " ".join(part for part in (self.sentence, *self.more) if part)
-
 
 def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
-    found = reasons(file, state) if current(state) is not None else ()
+    certificate = current(state)
+    found = () if certificate is None else reasons(file, state)
+    claims = {} if certificate is None else {each.without: each for each in certificate.claims}
     listed = found[:LISTED]
     snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
-    models = tuple(_of_model(state, letter, each, snapshot) for letter, each in enumerate(listed))
-    passing = nearest(file, state)
-    last = () if passing is None else (_of_nearest(state, passing),)
+    models, last = [], []
+    for number, each in enumerate(listed):
+        claim, sign, ways = claims.get(each.without), partition_letter(number), ("with", "without")
+        rates = (
+            f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
+        )
+        more = rates, parting_sentence(each)
+        models.append(Entry(each.without, sign, each.gone, sentence(each), more, each.parting, ways, snapshot, claim))
+    if (one := nearest(file, state)) is not None:
+        # The whole world fails, and without these it passes.
+        whole, ways = snapshot_with(state, state.elements, (one.gone,) if one.gone else ()), ("fails", "passes")
+        last = [Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ways, whole)]
     return (*models, *last, *_of_numbers(file, state)), len(found) - len(listed)
 
 
@@ -87,30 +94,6 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
         yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
 
 
-def _of_model(state: RunState, letter: int, reason: Reason, snapshot: Snapshot) -> Entry:
-    certificate = current(state)
-    claims = () if certificate is None else certificate.claims
-    claim = next((each for each in claims if each.without == reason.without), None)
-    rates = f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
-    return Entry(
-        reason.without,
-        partition_letter(letter),
-        reason.gone,
-        sentence(reason),
-        (rates, parting_sentence(reason)),
-        reason.parting,
-        ("with", "without"),
-        snapshot,
-        claim,
-    )
-
-
-def _of_nearest(state: RunState, one: Nearest) -> Entry:
-    """The whole world fails, and without `gone` it passes."""
-    snapshot = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
-    return Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ("fails", "passes"), snapshot)
-
-
 def head(width: int) -> Text:
     return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
 
@@ -118,19 +101,21 @@ def head(width: int) -> Text:
 def listed(entries: Sequence[Entry], width: int) -> Iterator[Text]:
     """The letter of each model on the map, its name, how often f shows without it, and the interval of that in %."""
     names = told_apart(tuple(one.name for one in entries if one.claim is not None), _name(width))
-    return (_row(one, width, names.get(one.name, "")) for one in entries)
-
-
-def _row(one: Entry, width: int, name: str) -> Text:
-    if one.figures:
-        room = max(4, width - len(one.figures) - 4)
-        return Text(f"   {padded(shortened(one.name, room), room)} {one.figures}", no_wrap=True)
-    if one.claim is None:
-        return Text(f"{'○' if one.name == NEAREST else ' '}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
-    name, claim = padded(name, _name(width)), one.claim
-    interval = f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}" if claim.runs and not claim.is_exact else ""
-    figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
-    return Text(f"{one.letter:<3}", "bold", no_wrap=True).append(f"{name}{figures}", "not bold")
+    for one in entries:
+        claim = one.claim
+        if one.figures:
+            room = max(4, width - len(one.figures) - 4)
+            text = Text(f"   {padded(shortened(one.name, room), room)} {one.figures}", no_wrap=True)
+        elif claim is None:
+            sign = "○" if one.name == NEAREST else " "
+            text = Text(f"{sign}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
+        else:
+            exact = claim.is_exact or not claim.runs
+            interval = "" if exact else f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}"
+            figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
+            text = Text(f"{one.letter:<3}", "bold", no_wrap=True)
+            text.append(f"{padded(names[one.name], _name(width))}{figures}", "not bold")
+        yield text
 
 
 def _name(width: int) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from rich.text import Text
@@ -24,13 +23,13 @@ from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
 from ddenv.text import plain, shortened
 from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
+from ddenv.workbench.help.dialogs import Reading
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.help.shortcuts import Reading
+from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.playback.moving import RobotWay, without
-from ddenv.workbench.playback.playback_screen import Playback
+from ddenv.workbench.playback.playback_screen import Playback, way_of, without
 from ddenv.workbench.shared.background import call_if_open, refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
@@ -48,21 +47,10 @@ FIRST = ids("why", "help close play isolate margins copy signs closer farther fi
 BEGIN, GO_ON, STOP = "world that passes", "go on", "stop"
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
-    """The run as it is shown, whether an engine works on it, and the error that ended the last one, or ""."""
-
-    state: RunState
-    works: bool
-    trouble: str = ""
-
-    @property
-    def isolates(self) -> bool:
-        return self.works and self.state.isolating is not None
-
-
 class WhyScreen(Screen[None]):
-    """`ask` starts and stops engines, or says why not; `place` is the run's world, if it is read already."""
+    """`look` says whether an engine works on the run, and the error that ended the last one, or "". `ask` starts and stops engines,
+    or says why not; `place` is the run's world, if it is read already.
+    """
 
     CSS_PATH = "why.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
@@ -93,13 +81,13 @@ class WhyScreen(Screen[None]):
         file: RunFile,
         position: Position,
         place: Place,
-        look: Callable[[], Look],
+        look: Callable[[], tuple[bool, str]],
         ask: Callable[[Isolate | Stop], None],
     ) -> None:
         super().__init__()
-        self._file, self._position, self._place, self._look_at, self._ask = file, position, place, look, ask
+        self._file, self._position, self._place, self._engine, self._ask = file, position, place, look, ask
         self._seen: tuple[object, ...] = ()
-        self._head = self._trouble = ""
+        self._trouble = ""
         self._state = RunState()
         self._entries: tuple[Entry, ...] = ()
         self.map = WorldMap(id="why-map")
@@ -115,7 +103,7 @@ class WhyScreen(Screen[None]):
                     yield Static("", id="why-said", markup=False)
             with Framed("World", id="why-world", classes="panel"):
                 yield self.map
-                yield Static("", id="why-legend", markup=False)
+                yield MapLines(only_signs=True, id="why-legend")
         with VerticalScroll(id="why-nothing"):
             yield Static("", id="why-empty", markup=False)
         yield KeyFooter(FIRST)
@@ -139,9 +127,17 @@ class WhyScreen(Screen[None]):
 
     def _look(self) -> None:
         """Reads all again once there is another certificate, or another nearest world that passes."""
-        now = self._look_at()
-        state, works = now.state, now.works
-        self._show_isolation(now)
+        state, (works, trouble) = self._position.now, self._engine()
+        self.query_one("#why-header", Static).update(
+            Text(f" {plain(head_of(state, works))}", no_wrap=True, overflow="ellipsis")
+        )
+        # What the key of isolation does.
+        begun, known = state.isolating is not None, state.isolated is not None
+        does = (STOP if works else GO_ON) if begun else "" if known else BEGIN
+        self.query_one(KeyFooter).say("why.isolate", does)
+        if trouble and trouble != self._trouble:
+            self.notify(plain(trouble), severity="error", markup=False)
+        self._trouble = trouble
         # Margins are shown once their search is over.
         margins = state.margins if state.margining is None else None
         known = current(state) is not None or state.isolated is not None or margins is not None
@@ -153,22 +149,6 @@ class WhyScreen(Screen[None]):
             self._read(state)
         else:
             self._found((), 0, "")
-
-    def _show_isolation(self, now: Look) -> None:
-        """How far the search for the nearest world that passes is, and what its key does."""
-        begun = now.state.isolating is not None
-        head = head_of(now.state, now.works)
-        if head != self._head:
-            self._head = head
-            self.query_one("#why-header", Static).update(Text(f" {plain(head)}", no_wrap=True, overflow="ellipsis"))
-        done = now.state.isolated is not None and not begun
-        self.query_one(KeyFooter).say(
-            "why.isolate", STOP if now.isolates else GO_ON if begun else "" if done else BEGIN
-        )
-        if now.trouble != self._trouble:
-            self._trouble = now.trouble
-            if now.trouble:
-                self.notify(plain(now.trouble), severity="error", markup=False)
 
     @work(thread=True, group="why", exclusive=True)
     def _read(self, state: RunState) -> None:
@@ -186,7 +166,7 @@ class WhyScreen(Screen[None]):
         self._entries = found
         self.set_class(not found, "-empty")
         if not found:
-            words = trouble or nothing_yet(self._state, self._look_at().works, attach_name(self._file.path))
+            words = trouble or nothing_yet(self._state, self._engine()[0], attach_name(self._file.path))
             self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
             return
         beyond = f" · {more} more are not listed" if more else ""
@@ -225,8 +205,7 @@ class WhyScreen(Screen[None]):
         self.map.show_ways(ways, parting, apart, self._place.prints)
         title = "World" if one.parting is None or not ways else f"The two paths, seed {one.parting.seed}"
         self.query_one("#why-world").border_title = Text(title)
-        legend = self.query_one("#why-legend", Static)
-        legend.update(self.map.legend(legend.size.width))
+        self.query_one(MapLines).show(self.map.shown)
 
     def _ways(self, one: Entry) -> tuple[tuple[Way, ...], Sequence[str]]:
         """The ways of the two runs that are compared, and what the run file lacks of them."""
@@ -238,16 +217,13 @@ class WhyScreen(Screen[None]):
         except UserError as error:
             return (), (str(error),)
         lacks = dict.fromkeys(line for each in found for line in each.lacks)
-        ways = tuple(RobotWay(each, name).whole for each, name in zip(found, one.ways, strict=True) if each.rows)
+        ways = tuple(way_of(each, name) for each, name in zip(found, one.ways, strict=True) if each.rows)
         return (ways if len(ways) == 2 else ()), tuple(lacks)
 
     def action_play(self) -> None:
         one = self.entry
         if one is None or one.parting is None:
-            refuse(
-                self,
-                "there are no two runs to play: none that share a seed and end differently are stored",
-            )
+            refuse(self, "there are no two runs to play: none that share a seed and end differently are stored")
             return
         try:
             both = one.parting.with_test, one.parting.without_test
@@ -256,14 +232,14 @@ class WhyScreen(Screen[None]):
             refuse(self, str(error))
 
     def action_isolate(self) -> None:
-        self._ask(Stop() if self._look_at().isolates else Isolate())
+        self._ask(Stop() if self._engine()[0] and self._position.now.isolating is not None else Isolate())
 
     def action_margins(self) -> None:
-        self.app.push_screen(MarginsDialog(self._look_at().state, attach_name(self._file.path)))
+        self.app.push_screen(MarginsDialog(self._position.now, attach_name(self._file.path)))
 
     def action_copy(self) -> None:
-        command = remedy(self._state, self._look_at().works, attach_name(self._file.path))
-        lines = [one.text for one in self._entries]
+        command = remedy(self._state, self._engine()[0], attach_name(self._file.path))
+        lines = [" ".join(filter(None, (one.sentence, *one.more))) for one in self._entries]
         if not lines and not command:
             refuse(self, "there is nothing to copy yet")
             return
@@ -278,21 +254,15 @@ class MarginsDialog(Reading):
 
     def __init__(self, state: RunState, run: str) -> None:
         known = state.margins
-        found = () if known is None else rows(known)
+        if known is None or not (found := rows(known)):
+            command = f"ddenv margins {plain(run)} finds how far each number can change"
+            super().__init__("Margins", [("Not looked for yet", [("", command)])])
+            return
         lines = []
         for one in found:
             name, now, until, goal, runs = map(plain, one.cells)
-            lines += [
-                (shortened(name, 24), bar(one.margin, 41)),
-                ("", f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"),
-            ]
-        groups = [("How far each number can change before f disappears", lines)]
-        if not lines:
-            groups = [
-                ("Not looked for yet", [("", f"ddenv margins {plain(run)} finds how far each number can change")])
-            ]
-        if known is not None and found:
-            groups += [
-                ("What this means", [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)])
-            ]
-        super().__init__("Margins", groups)
+            words = f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"
+            lines += [(shortened(name, 24), bar(one.margin, 41)), ("", words)]
+        means = [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)]
+        title = "How far each number can change before f disappears"
+        super().__init__("Margins", [(title, lines), ("What this means", means)])

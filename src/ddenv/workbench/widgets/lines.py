@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from rich.segment import Segment
 from rich.text import Text
 from textual import events
 from textual.geometry import Size
-from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
@@ -21,17 +19,6 @@ class Lines(ScrollView, can_focus=True):
     With `parts` an item takes several lines: `parts(item, width)` are what `line` is called with.
     """
 
-    @dataclass
-    class Clicked(Message):
-        """A line was clicked; `item` is what it shows."""
-
-        lines: Lines
-        item: Any
-
-        @property
-        def control(self) -> Lines:
-            return self.lines
-
     def __init__(
         self,
         line: Callable[[Any, int], Text],
@@ -39,23 +26,20 @@ class Lines(ScrollView, can_focus=True):
         nothing: str = "",
         tail: bool = False,
         parts: Callable[[Any, int], Sequence[Any]] | None = None,
+        clicked: Callable[[Any], object] = lambda _: None,
         id: str | None = None,
     ) -> None:
-        """`nothing` is shown when there are no items."""
+        """`nothing` is shown when there are no items; `clicked` is called with what a line shows that was clicked."""
         super().__init__(id=id)
-        self._line, self._nothing, self._tail, self._parts = line, nothing, tail, parts
-        self._items: Sequence[Any] = ()
+        self._line, self._nothing, self._tail, self._parts, self._clicked = line, nothing, tail, parts, clicked
+        self.items: Sequence[Any] = ()
         # What each line is made of, and how many columns the items were taken apart for.
         self._rows: Sequence[Any] = ()
         self._columns = 0
 
-    @property
-    def items(self) -> Sequence[Any]:
-        return self._items
-
     def show(self, items: Sequence[Any]) -> None:
         at_end = self.scroll_offset.y >= self.max_scroll_y
-        before, self._items = self._items, items
+        before, self.items = self.items, items
         if not self.size.width:
             # Not visible: the screen needs no new layout for each line.
             self._columns = 0
@@ -70,14 +54,14 @@ class Lines(ScrollView, can_focus=True):
     def _take_apart(self, before: Sequence[Any]) -> None:
         """Makes the rows; only those of new items where the ones `before` are still the first."""
         if self._parts is None:
-            self._rows = self._items
+            self._rows = self.items
             return
         # The scroll bar may come and go.
         columns = max(1, self.size.width - self.styles.scrollbar_size_vertical)
         known = len(before)
-        goes_on = columns == self._columns and known <= len(self._items) and known > 0
-        goes_on = goes_on and before[0] is self._items[0] and before[-1] is self._items[known - 1]
-        new = self._items[known:] if goes_on else self._items
+        goes_on = columns == self._columns and known <= len(self.items) and known > 0
+        goes_on = goes_on and before[0] is self.items[0] and before[-1] is self.items[known - 1]
+        new = self.items[known:] if goes_on else self.items
         rows = [row for item in new for row in self._parts(item, columns)]
         self._rows, self._columns = [*self._rows, *rows] if goes_on else rows, columns
 
@@ -94,7 +78,7 @@ class Lines(ScrollView, can_focus=True):
     def on_click(self, event: events.Click) -> None:
         place = int(event.y + self.scroll_offset.y)
         if 0 <= place < len(self._rows):
-            self.post_message(self.Clicked(self, self._rows[place]))
+            self._clicked(self._rows[place])
 
     def render_line(self, y: int) -> Strip:
         width, base = self.scrollable_content_region.width, self.rich_style
