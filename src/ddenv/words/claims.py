@@ -41,8 +41,8 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
         shown = f"; it keeps at least {percent(left.bound)}" if left.bound else ""
         return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
-    without = {str(claim.without): claim.verdict for claim in removals}
-    if doubt := _doubt(without, "not shown that each model is needed", "not minimal: f shows", "without"):
+    verdicts = {str(claim.without): claim.verdict for claim in removals}
+    if doubt := _doubt(verdicts, "not shown that each model is needed", "not minimal: f shows", "without"):
         return f"{doubt}; with everything that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
     if certificate.seeds:
@@ -247,8 +247,10 @@ def of_passing(state: RunState, one: Isolation) -> str:
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(one, first)}"
     said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(one, first)}"
-    back = {str(claim.back): claim.verdict for claim in backs}
-    if doubt := _doubt(back, "not shown that each of them has to go", "not a nearest one: the robot passes", "with"):
+    verdicts = {str(claim.back): claim.verdict for claim in backs}
+    if doubt := _doubt(
+        verdicts, "not shown that each of them has to go", "not a nearest one: the robot passes", "with"
+    ):
         return f"{said}; {doubt} put back"
     most = max(backs, key=lambda claim: claim.high)
     back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
