@@ -231,8 +231,8 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     fewest = [min((row.certain for row in rows if row.certain is not None), default=None) for rows in scenarios]
     head = ("method", *(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios), "times the bound, mean")
     # As a range, since cells may differ in how many models are left.
-    bounds = ({result.bound for row in rows for result in row.minimal} or {"–"} for rows in scenarios)
-    least = (" to ".join(map(str, sorted({min(each), max(each)}))) for each in bounds)
+    bounds = (sorted({result.bound for row in rows for result in row.minimal}) for rows in scenarios)
+    least = (" to ".join(map(str, dict.fromkeys((each[0], each[-1])))) if each else "–" for each in bounds)
     table: list[tuple[Cell, ...]] = [("minimum for a search that ends there", *least, "1.0")]
     ranked = []
     for rows in zip(*scenarios, strict=True):

@@ -305,7 +305,7 @@ def _next(state: RunState, candidate: Candidate, place: str, options: Settings) 
     return f"Next is re-run {len(candidate.tests)} of {options.most_runs - 1} of {place}: {again}"
 
 
-def _of_run(state: RunState, candidate: Candidate, number: int, place: str, options: Settings) -> tuple[str, str]:
+def _of_run(state: RunState, candidate: Candidate, number: int, place: str, options: Settings) -> tuple[str, ...]:
     """What a run of a candidate is for, its `number` counted from 0."""
     if not number:
         return (
