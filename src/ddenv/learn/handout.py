@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from ddenv.learn.lesson import MISCONCEPTIONS, blocks
 from ddenv.learn.shelf import Opened
-from ddenv.page.blocks import Block, Name, Paragraph, Picture, Report, Section, Strong, Table, say
+from ddenv.page.blocks import Block, Name, Paragraph, Part, Picture, Report, Section, Strong, Table, say
 from ddenv.page.step_chart import chart
 
 FIGURES = (("models", "models"), ("left", "left"), ("search_tests", "tests of candidates"), ("rounds", "rounds"))
-AS = {"strong": Strong, "code": Name}
+AS: dict[str, type[Strong] | type[Name]] = {"strong": Strong, "code": Name}
 
 
 def handout(opened: Opened) -> Report:
@@ -19,7 +19,7 @@ def handout(opened: Opened) -> Report:
     seen, asked = list[Block](), list[Block]()
     for step, at in zip(lesson.steps, opened.places, strict=True):
         for block in blocks(opened.text(step.text, at)):
-            parts = (AS[style](words) if style in AS else words for words, style in block.spans)
+            parts: list[Part] = [AS[style](words) if style in AS else words for words, style in block.spans]
             seen.append(Paragraph(("• " * block.listed, *parts)))
         if (question := step.question) is not None:
             rows = tuple(
