@@ -93,8 +93,8 @@ def create_inside(run: Path, path: Path) -> World:
     reading = scenario.reading.model_copy(update={"inside": True})
     world = parse_world(documents["world"], scenario.world, reading, stored)
     documents["world"] = world.text
-    update = {"reading": reading, "whole": whole_of(whole, scenario)}
-    update["protected"] = renamed(scenario.protected, whole, removed, world)
+    protected = renamed(scenario.protected, whole, removed, world)
+    update = {"reading": reading, "whole": whole_of(whole, scenario), "protected": protected}
     scenario = scenario.model_copy(update=update)
     check_parts(scenario, world, robot)
     _write(scenario, world, path, documents, world.resources)

@@ -75,11 +75,11 @@ def export_world(
     data["whole"] = whole_of(world, scenario).model_dump(mode="json")
     data["protected"] = renamed(scenario.protected, world, removed, minimal)
     # Those folders of the original world and robot that the exported files still need, and the robot's packages.
-    there, asked_by_robot = scenario.robot.model, Resources(documents)
-    parse_model(robot, there, scenario.reading, asked_by_robot)
-    both = ((scenario.world.parent, asked), (there.parent, asked_by_robot))
+    own, asked_by_robot = scenario.robot.model, Resources(documents)
+    parse_model(robot, own, scenario.reading, asked_by_robot)
+    both = ((scenario.world.parent, asked), (own.parent, asked_by_robot))
     needed = [each for each, by in both if any(_leans_on(each, uri, base) for uri, base in by.asked)]
-    around = (each for each in there.absolute().parents if each.name and each.is_dir())
+    around = (each for each in own.absolute().parents if each.name and each.is_dir())
     needed += [each for each in around if f"package://{each.name}/".encode() in robot]
     data["reading"]["inside"] = False
     model_path = (*scenario.reading.model_path, *needed)
