@@ -63,6 +63,7 @@ def test_what_is_not_shown_is_not_called_minimal(run):
     assert (found["minimal"], found["certificate"]["minimal"]) == (False, False)
     assert "environment, not shown to be minimal: 2 of 11 models" in lines
     assert "without crate_01: f in 1 of 2 fresh runs (1 % to 99 %): unknown: too many runs broke" in lines
+    assert " tests broke; the last one: " in lines
 
 
 def test_files_without_a_certificate_claim_nothing(run):

@@ -11,6 +11,7 @@ import click
 from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
+from ddenv.runs.folder import find_run, run_path
 from ddenv.settings import SETTINGS
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_world
@@ -91,7 +92,6 @@ def resume_command(
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like
-    from ddenv.runs.folder import find_run, run_path
     from ddenv.runs.programs import start_engine
     from ddenv.runs.trust import trusted_scenario
 
@@ -155,7 +155,6 @@ def idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
     from ddenv.runs.trust import trusted_scenario
 
     path = find_run(run)

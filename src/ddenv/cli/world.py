@@ -16,7 +16,7 @@ import click
 from ddenv.cli.options import Numbers, reading_options, remembered_option, scenarios, together
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
-from ddenv.runs.folder import find_run
+from ddenv.runs.folder import find_run, named_file
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_directives
 
@@ -47,7 +47,6 @@ def world_command() -> None:
 
 def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
-    from ddenv.runs.folder import named_file
     from ddenv.runs.remedies import with_remembered
     from ddenv.runs.subject import reading_of
     from ddenv.world.load import load_scenario
