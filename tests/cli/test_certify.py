@@ -7,7 +7,7 @@ import pytest
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.runfile.fold import fold
 from ddenv.runs.folder import runs_folder
-from tests.command import in_process, is_one_line
+from tests.command import is_one_line
 from tests.workbench import fake_moments, fake_run
 
 
@@ -72,11 +72,11 @@ def test_files_without_a_certificate_claim_nothing(run):
     assert "f in 1 of 1 here, 3 of 4 in the whole world; no fresh runs were made" in lines
 
 
-def test_an_engine_makes_at_least_so_many_runs(run, started, monkeypatch, capsys):
+def test_an_engine_makes_at_least_so_many_runs(run, started, command):
     fake_moments.finished(run)
-    in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
-    in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)
-    in_process(monkeypatch, capsys, "certify", run.path, "--certify-rate", 0.8, "--jobs", 1)
+    command("certify", run.path, "--runs", 40, "--jobs", 1)
+    command("certify", run.path, "--jobs", 1)
+    command("certify", run.path, "--certify-rate", 0.8, "--jobs", 1)
     # As often as the baseline, if not said otherwise.
     assert started == [
         (run.path, 1, {"certify": 40, "certify_rate": None, "cluster": None}),
@@ -85,9 +85,9 @@ def test_an_engine_makes_at_least_so_many_runs(run, started, monkeypatch, capsys
     ]
 
 
-def test_what_cannot_be_certified_is_refused_in_one_line(run, monkeypatch, capsys):
+def test_what_cannot_be_certified_is_refused_in_one_line(run, command):
     run.created()
-    is_one_line(in_process(monkeypatch, capsys, "certify", run.path), f"ddenv: {run.path}: f is not known yet")
+    is_one_line(command("certify", run.path), f"ddenv: {run.path}: f is not known yet")
     fake_run.FakeRun.baseline(run)
     with run.engine():
-        is_one_line(in_process(monkeypatch, capsys, "certify", run.path), "another engine is working on this run")
+        is_one_line(command("certify", run.path), "another engine is working on this run")

@@ -96,21 +96,6 @@ def test_a_search_tells_nothing_of_a_race_before_the_bet_on_it():
     assert {play.name for play in walk.plays} >= set(race.race)
 
 
-@pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
-def test_every_wrong_answer_says_what_is_wrong_with_it(number):
-    walk = course(number)
-    while walk.step < walk.last:
-        if walk.page.question is not None and walk.page.chosen is None:
-            question = walk.page.question
-            assert sum(each.right for each in question.answers) == 1
-            assert all(each.why and each.text and "{" not in each.text + each.why for each in question.answers)
-            walk.answer(question.right)
-            assert walk.page.remarks
-        if walk.due:
-            walk.skip()
-        walk.go_on()
-
-
 def test_the_place_of_an_answer_does_not_give_it_away():
     places = [
         [step.question.right for step in opened(number).lesson.steps if step.question is not None] for number in NUMBERS

@@ -77,22 +77,6 @@ def test_methods_that_differ_only_in_what_is_not_looked_at_are_one(tmp_path):
     ]
 
 
-def test_what_makes_fewer_tests_is_asked_for_where_nobody_says_otherwise(tmp_path):
-    plain = crates(tmp_path)
-    said = crates(tmp_path, "said", growth="paper", skip="known", accept_rate="first", early_stop=False, slice=False)
-
-    def asked(file, **options):
-        reduction = plan_of(file, **options).cells[0].scenario.reduction
-        return reduction.growth, reduction.skip
-
-    assert asked(plain) == ("steady", "implied")
-    assert asked(said) == ("paper", "known")
-    assert asked(said, growth="steady") == ("steady", "known")
-    assert asked(plain, growth="paper", skip=None) == ("paper", "implied")
-    assert asked(plain, as_printed=True) == ("paper", "known")
-    assert asked(said, as_printed=False) == ("steady", "implied")
-
-
 @pytest.mark.parametrize(("baseline_runs", "iterations"), [(10, 3), (1000, 1000), (1, 0)])
 def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterations):
     plan = plan_of(
