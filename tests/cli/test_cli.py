@@ -87,15 +87,6 @@ def _outcomes(done):
 
 
 @pytest.mark.programs
-def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
-    _, summary = reduced
-    done = ddenv("export", summary["run_file"], "--sdf", tmp_path / "m.sdf", "--scenario", tmp_path / "m.yaml")
-    assert done.returncode == 0, done.stderr
-    assert b"far_box" not in (tmp_path / "m.sdf").read_bytes()
-    assert _outcomes(ddenv("test", tmp_path / "m.yaml", "--json")) == ["failed"]
-
-
-@pytest.mark.programs
 def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
     _, summary = reduced
     done = ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap")
@@ -187,44 +178,6 @@ def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
     assert not engine_is_alive(path)
     done = ddenv("resume", "wall-1", "--json")
     assert json.loads(done.stdout)["tests"] == 12
-
-
-@pytest.mark.programs
-def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced):
-    """kill -9 of the engine at different moments: the same end, and no finished test is made twice."""
-    _, undisturbed = reduced
-    run = home / "killed.ddenv"
-    # Re-runs enough that there is still something to do when the last engine is killed, also on a busy machine.
-    start = [sys.executable, "-m", "ddenv", "run", WALL, "--output", str(run), "--jobs", "2", "--iterations", "9"]
-    for engines, moment in enumerate((3, 9, 15), start=1):
-        process = subprocess.Popen(start, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        # The one before may have made more tests than this one waits for.
-        wait_until(
-            lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least
-        )
-        os.kill(_engines(run)[-1], signal.SIGKILL)
-        _, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 2
-        assert err.count("\n") == 1
-        assert "ddenv resume" in err
-        start = [sys.executable, "-m", "ddenv", "resume", str(run), "--jobs", "2"]
-    done = ddenv("resume", run, "--json")
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
-    assert summary["kept"] == undisturbed["kept"]
-    assert len(_finished(run)) == len(set(_finished(run)))
-
-
-def _engines(run):
-    """The processes of all engines so far."""
-    with RunFile(run) as file:
-        return [one.event.pid for one in file.events() if one.kind == "engine_started"]
-
-
-def _finished(run):
-    """Each finished test as (environment, run)."""
-    with RunFile(run) as file:
-        return [(test.environment, test.run) for test in fold(file.events()).finished_tests]
 
 
 def test_a_second_engine_is_refused(reduced, tmp_path, command):

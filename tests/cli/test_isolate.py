@@ -1,18 +1,12 @@
 """`ddenv isolate`, and what `ddenv why` says of its result."""
 
 import json
-import shutil
-import signal
-import subprocess
 
 import pytest
 
-from tests.command import DDENV, ddenv, is_one_line
-from tests.conftest import ROOT
-from tests.waiting import PATIENCE
+from ddenv.cli.follow import Interrupted
+from tests.command import is_one_line
 from tests.workbench import fake_moments, fake_run
-
-EXAMPLE = ROOT / "docs/examples/any_simulator"
 
 
 def test_what_is_known_is_said_without_a_test(run, started, command):
@@ -34,6 +28,19 @@ def test_one_that_was_stopped_goes_on(run, started, command):
     # No engine works here.
     stopped = f"the search for a world that passes was stopped; continue with: ddenv isolate {run.path}"
     assert (done.returncode, done.stderr) == (2, f"ddenv: {run.path}: {stopped}\n")
+
+
+def test_who_is_interrupted_reads_how_to_go_on(run, started, monkeypatch, command):
+    fake_moments.isolating(run)
+    state = run.state
+
+    def interrupted(*_):
+        raise Interrupted(state)
+
+    monkeypatch.setattr("ddenv.cli.follow.follow", interrupted)
+    done = command("isolate", run.path, "--jobs", 1)
+    assert (done.returncode, started) == (130, [(run.path, 1, {"isolate": 0, "cluster": None})])
+    assert f"continue with: ddenv isolate {run.path}" in done.stderr
 
 
 def test_one_that_was_interrupted_can_be_given_up(run, started, command):
@@ -81,24 +88,3 @@ def test_where_no_such_world_is_known_one_line_says_how_to_find_it(run, tmp_path
     done = command(*(there.get(word, word) for word in words))
     is_one_line(done, f"ddenv isolate {run.path}")
     assert not there["OUT"].exists()
-
-
-@pytest.mark.programs
-def test_it_stops_on_ctrl_c_and_goes_on_to_the_same_end(tmp_path, home):
-    """By the programs that a user starts, with a simulator of the user's own."""
-    start = ("run", EXAMPLE / "scenario.yaml", "--trust", "--jobs", "2")
-    assert ddenv(*start, "--output", tmp_path / "one.ddenv").returncode == 0
-    shutil.copy(tmp_path / "one.ddenv", tmp_path / "two.ddenv")
-    once = json.loads(ddenv("isolate", tmp_path / "one.ddenv", "--json", "--jobs", "2").stdout)["nearest"]
-    assert once["shown"]
-    assert once["parting"]["apart"] is not None
-    again = [*DDENV, "isolate", str(tmp_path / "two.ddenv"), "--jobs", "1"]
-    with subprocess.Popen(again, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        # Its first finished candidate has a line.
-        while "passes after" not in process.stdout.readline():
-            assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        said = process.communicate(timeout=PATIENCE)[1]
-    assert (process.returncode, f"continue with: ddenv isolate {tmp_path / 'two.ddenv'}" in said) == (130, True)
-    twice = json.loads(ddenv("isolate", tmp_path / "two.ddenv", "--json", "--jobs", "2").stdout)["nearest"]
-    assert (twice["gone"], twice["words"]) == (once["gone"], once["words"])

@@ -2,22 +2,13 @@
 
 import json
 import re
-import signal
-import subprocess
 from collections import Counter
-
-import pytest
 
 from ddenv.cli.follow import Interrupted
 from ddenv.report.bundle import write_bundle
 from ddenv.report.report import write_report
-from ddenv.runfile.events import MarginRan
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
-from ddenv.words.margins import bar, lines, rows
-from tests.command import DDENV, is_one_line
-from tests.conftest import ROOT
-from tests.waiting import PATIENCE
+from ddenv.words.margins import bar, rows
+from tests.command import is_one_line
 from tests.workbench import fake_moments
 
 FRICTION = (
@@ -143,38 +134,3 @@ def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, command):
     command("margins", run.path)
     command("margins", run.path, "--budget", 70)
     assert asked == [{"cluster": None}, {"cluster": None, "margins": "[]", "most_runs": 70}]
-
-
-@pytest.mark.programs
-def test_a_real_search_that_is_killed_and_interrupted_comes_to_its_end(tmp_path):
-    """In the user's own simulator, which reads the changed number in the world's text."""
-    run = tmp_path / "one.ddenv"
-    words = [
-        *DDENV,
-        "run",
-        ROOT / "docs/examples/any_simulator/scenario.yaml",
-        "--output",
-        run,
-        "--trust",
-        "--jobs",
-        "2",
-    ]
-    assert subprocess.run(words, capture_output=True, text=True).returncode == 0
-    with RunFile(run) as file:
-        left = fold(file.events()).environment
-    margins = [*DDENV, "margins", run, "--number", f"{left[0]}.y", "--budget", "40", "--jobs", "2"]
-    program = subprocess.Popen(margins, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert program.stdout is not None
-    # A value is decided.
-    next(line for line in program.stdout if f"{left[0]}.y = " in line)
-    program.send_signal(signal.SIGINT)
-    program.communicate(timeout=PATIENCE)
-    with RunFile(run) as file:
-        kept = [each.event for each in file.events() if isinstance(each.event, MarginRan)]
-    assert kept
-    done = subprocess.run([*DDENV, "margins", run], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    with RunFile(run) as file:
-        state = fold(file.events())
-    assert list(state.margins.runs[: len(kept)]) == kept
-    assert done.stdout.endswith("\n".join(lines(state.margins)) + "\n")

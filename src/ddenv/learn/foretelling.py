@@ -163,7 +163,6 @@ def _candidate_answer(one: Candidate, round: Round) -> Answer:
 
 
 def _name(one: Candidate) -> str:
-    """Its label at the beginning of a sentence."""
     return one.label[:1].upper() + one.label[1:]
 
 

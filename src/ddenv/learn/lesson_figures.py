@@ -76,7 +76,6 @@ def _bound(state: RunState, without: str | None = None) -> str:
 
 
 def _left(state: RunState) -> str:
-    """How often f showed in its runs of what is left, by now."""
     now = _now(state)
     runs = [test for test in state.confirm_tests if test.run >= now.first_run and test.without is None]
     ended = [test.outcome for test in runs if test.node == now.node and test.is_finished]

@@ -156,7 +156,6 @@ def _beside(node: _Node) -> Path:
 
 
 def _others(node: _Node) -> dict[str, Path]:
-    """Other runs by name."""
     if not isinstance(node.node, yaml.MappingNode):
         raise node.wrong("expected names, each with a file")
     return {str(key.value): _beside(_Node(node.file, value, f"beside.{key.value}")) for key, value in node.node.value}

@@ -58,7 +58,6 @@ def _names(names: Sequence[str]) -> str:
 
 
 def _result(test: Test) -> str:
-    """How a test ended, in words; `result` is empty while it runs."""
     if test.outcome in ("running", "lost"):
         return "..."
     if test.outcome == "pass":

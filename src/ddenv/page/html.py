@@ -1,12 +1,15 @@
-"""A report as one HTML page that needs nothing else: no script, no other file."""
+"""A report as one HTML page that needs nothing else: no script, no other file; and what our pages may load and run."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
 from ddenv.page.blocks import Block, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts
-from ddenv.page.policy import hashed, policy
 from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent
@@ -79,3 +82,22 @@ def _part(part: Part) -> str:
 
 def _text(text: str) -> str:
     return escape(plain(text))
+
+
+# Nothing that is not named, whatever a run file contains.
+_NOTHING = {"default-src": "'none'", "base-uri": "'none'", "form-action": "'none'"}
+
+
+def policy(allowed: Mapping[str, str]) -> str:
+    """A Content-Security-Policy that allows only what `allowed` names, by directive."""
+    return "; ".join(f"{directive} {sources}" for directive, sources in {**_NOTHING, **allowed}.items())
+
+
+def of_scripts(page: str) -> str:
+    """The sources of the `<script>` elements that a page has itself."""
+    return " ".join(hashed(text) for text in re.findall(r"<script>(.*?)</script>", page, re.DOTALL))
+
+
+def hashed(text: str) -> str:
+    """The source that allows exactly `text`."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -47,7 +47,6 @@ def _file(stem: str, picture: Picture) -> str:
 
 
 def _alone(svg: str, style: str) -> str:
-    """A picture that contains its own colours."""
     start = svg.index(">") + 1
     ground = '<rect width="100%" height="100%" style="fill: var(--page)"/>'
     return f"{svg[:start]}\n<style>\n{style}</style>\n{ground}{svg[start:]}\n"

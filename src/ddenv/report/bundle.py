@@ -116,7 +116,6 @@ def _world(record: Record) -> str:
 
 
 def _filled(template: str, **words: str) -> bytes:
-    """A file of `TEMPLATES` with these words."""
     return Template((TEMPLATES / template).read_text()).substitute(words).encode(errors="replace")
 
 

@@ -77,7 +77,6 @@ def _baseline(state: RunState) -> list[Block]:
 
 
 def _tests(state: RunState) -> list[Block]:
-    """A row for each outcome, with a column for each kind of test in the run."""
     finished = state.finished_tests
     counts = Counter((test.outcome, test.phase) for test in finished)
     phases = [(phase, words) for phase, words in PHASES if any(test.phase == phase for test in finished)]

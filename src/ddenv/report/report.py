@@ -61,7 +61,6 @@ def _verdict(state: RunState) -> str:
 
 
 def _standing(record: Record) -> Paragraph:
-    """Whether it is over, and why it ended."""
     state = record.state
     why = plain(ended(state) if state.status == "finished" else state.reason).rstrip(".")
     if state.status == "finished" and state.certified:

@@ -122,7 +122,6 @@ def _places(record: Record) -> dict[str, Point]:
 
 
 def _sort(record: Record, name: str) -> str:
-    """The class of a model: kept, gone, or always there."""
     if name not in record.elements:
         return "still"
     kept = "kept" if name in record.kept else "gone"
@@ -138,7 +137,6 @@ def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:
 
 
 def _way(samples: array[float] | None, frame: Frame) -> str:
-    """The robot's path, or "" if unknown."""
     if not samples:
         return ""
     points = table(samples)[:, 1:3]

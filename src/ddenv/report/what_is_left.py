@@ -41,7 +41,6 @@ def what_is_left(record: Record) -> Section:
 
 
 def _models(record: Record) -> list[Block]:
-    """A row for each model that is left, in the file's order."""
     state, names = record.state, record.state.environment[:MOST_MODELS]
     if not names:
         return []

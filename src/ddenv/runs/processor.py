@@ -95,7 +95,6 @@ def _share(quota: str = "", period: str = "") -> float:
 
 
 def _bytes(text: str) -> float:
-    """A number of bytes, or infinite for none."""
     return float(text) if text.isdecimal() and int(text) > 0 else math.inf
 
 

@@ -150,7 +150,6 @@ class Runner:
             self._record()
 
     def _ends(self, work: Work) -> None:
-        """Says what a cell came to that no engine works on any more."""
         self.running.remove(work)
         self._ended.append(work)
         work.file.close()

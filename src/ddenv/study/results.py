@@ -127,7 +127,6 @@ def read_cell(folder: Path, cell: Cell) -> Result:
 
 
 def _read(file: RunFile, cell: Cell) -> Result:
-    """What the events of a cell's run add up to. Raises UserError."""
     state = RunState()
     # The numbers of the tests that the search and the certificates rest on, in order.
     search, fresh = dict[int, None](), dict[int, None]()

@@ -194,7 +194,6 @@ def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], f
 
 
 def _settings(plan: Plan) -> Table:
-    """The settings that any method uses, with a column for each scenario."""
     used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
     rows = [
         (item.label, *(value_words(getattr(getattr(scenario, item.section), item.name)) for scenario in plan.scenarios))

@@ -201,7 +201,6 @@ def _rate(parts: Sequence[tuple[int, int]]) -> str:
 
 
 def _left(results: Sequence[Result]) -> Cell:
-    """Each set of models that is left, the most frequent first."""
     if not results:
         return "–"
     sets = Counter(result.left for result in results)

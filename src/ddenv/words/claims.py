@@ -143,7 +143,6 @@ def uncertified(state: RunState, run: object) -> str:
 
 
 def _stayed(pinned: int) -> str:
-    """That nothing is claimed of models that were never left out."""
     return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
 
 

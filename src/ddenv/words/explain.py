@@ -108,7 +108,6 @@ def _offered(state: RunState) -> tuple[str, ...]:
 
 
 def _by_hand(state: RunState) -> tuple[str, ...]:
-    """Tries that are not judged yet, and models that are pinned."""
     said = []
     for trial in (one for one in state.trials if not one.verdict):
         what = f"{trial.label} ({count(trial.size, 'model')})"
@@ -135,7 +134,6 @@ def _arrival(state: RunState) -> str:
 
 
 def _happening(snapshot: Snapshot) -> Happening:
-    """The step the run is at, and the sentences on it."""
     state, options = snapshot.state, settings(snapshot.state)
     if snapshot.gone:
         return None, (
@@ -179,7 +177,6 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
 
 
 def _standing(state: RunState, status: str) -> tuple[str, ...]:
-    """Why the run stands still, and what goes on from there; none if it does not."""
     reason = plain(state.reason).rstrip(".")
     match status:
         case "starting":
@@ -200,7 +197,6 @@ def _standing(state: RunState, status: str) -> tuple[str, ...]:
 
 
 def _out_of_budget(state: RunState) -> tuple[str, ...]:
-    """What to do when all tests of the budget were made."""
     budget = state.budget
     if budget is None or state.made < budget:
         return ()
@@ -440,7 +436,6 @@ def _certifying(snapshot: Snapshot) -> tuple[str, ...]:
 
 
 def _so_far(rows: Sequence[FreshRuns]) -> tuple[str, ...]:
-    """How often f showed in what is left and in the whole world."""
     if not rows or not rows[0].runs:
         return ()
     left, whole = rows[0], rows[-1]

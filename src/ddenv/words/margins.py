@@ -72,7 +72,6 @@ def _from(side: Side) -> str:
 
 
 def _said(side: Side) -> str:
-    """What the values on one side show: only of these."""
     words = []
     if side.until is not None:
         all_of_them = ", the farthest value tried" if _all(side) else ""
