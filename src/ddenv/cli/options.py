@@ -104,24 +104,23 @@ def together(*options: Option) -> Option:
 
 def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) -> Option:
     """An option for each setting that has one, which replaces the scenario's value."""
-    chosen = (one for one in OPTIONS if (not only or one.name in only) and one.name not in without)
-    return together(*map(_option, chosen))
+    found = []
+    for one in OPTIONS:
+        if (only and one.name not in only) or one.name in without:
+            continue
+        words = f"{_sentence(one)}{'; 0: no limit' if one.none else ''}."
+        if one.kind is bool:
+            found.append(click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words))
+            continue
+        # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
+        kind = whole(0) if one.none else one.kind if one.kind is str else Number(one, checked=True)
+        words += f" {one.more}" if one.shown == "method" else ""
+        found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=words))
+    return together(*found)
 
 
 def _sentence(one: Setting) -> str:
     return f"{one.summary[:1].upper()}{one.summary[1:]}"
-
-
-def _option(one: Setting) -> Option:
-    words = _sentence(one)
-    if one.none:
-        words += "; 0: no limit"
-    if one.kind is bool:
-        return click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=f"{words}.")
-    # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
-    kind = whole(0) if one.none else one.kind if one.kind is str else Number(one, checked=True)
-    more = f" {one.more}" if one.shown == "method" else ""
-    return click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=f"{words}.{more}")
 
 
 def jobs_option(what: str = "Tests") -> Option:
