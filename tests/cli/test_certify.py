@@ -5,15 +5,13 @@ from dataclasses import replace
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
-from ddenv.runfile.fold import fold
 from ddenv.runs.folder import runs_folder
 from tests.command import is_one_line
 from tests.workbench import fake_moments, fake_run
 
 
 def told(run) -> tuple[dict, str]:
-    state = fold(run.file.events())
-    return summary(state, run.path), "\n".join(summary_lines(state, run.path))
+    return summary(run.state, run.path), "\n".join(summary_lines(run.state, run.path))
 
 
 def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
@@ -38,7 +36,7 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
 
 
 def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
-    state = fold(fake_moments.finished(run).file.events())
+    state = fake_moments.finished(run).state
     elsewhere = summary_lines(state, run.path)[-1]
     assert elsewhere.startswith(f"next: 'ddenv open {run.path}' shows it")
     assert summary_lines(state, runs_folder() / "crates-1.ddenv")[-1] == (

@@ -63,13 +63,6 @@ class Page(HTMLParser):
         return " ".join("".join(self.words).split())
 
 
-@pytest.fixture
-def run(tmp_path):
-    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
-    yield made
-    made.close()
-
-
 def page(run, tmp_path):
     (file,) = write_report(run.path, tmp_path / "report.html", force=True)
     return Page(file.read_text())

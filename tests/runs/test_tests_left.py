@@ -6,7 +6,6 @@ from statistics import median
 import pytest
 
 from ddenv.evidence.certificate import Terms, certificate_tests, error_of, falls, keeps, settle
-from ddenv.runfile.fold import fold
 from ddenv.runs.tests_left import LATE, left_said, remaining, rough_run, search_tests
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
@@ -31,12 +30,8 @@ def first(algorithm, iterations, as_printed=False):
     return load_scenario(DATA / "wall.yaml").reduction.model_copy(update=changes | growth)
 
 
-def state_of(run):
-    return fold(run.file.events())
-
-
 def left(run, at_work=True):
-    return remaining(state_of(run), at_work)
+    return remaining(run.state, at_work)
 
 
 @pytest.mark.parametrize(("algorithm", "as_printed", "cells"), MEASURED)
@@ -125,7 +120,7 @@ CERTIFICATE = certificate_tests(3.5 / 5, 2 / 3, 3, 4, 4)
 
 
 def test_the_certificate_is_left_after_the_search(run):
-    state = state_of(fake_moments.mid_round(run))
+    state = fake_moments.mid_round(run).state
     search = (max(0, each - state.tests_done + state.forecast.tests_done) for each in state.forecast.tests)
     assert left(run).tests == tuple(a + b for a, b in zip(search, CERTIFICATE, strict=True))
 
@@ -138,7 +133,7 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
     assert left(run).tests == (low, likely, high)
 
     def make(number):
-        test = 1 + len(state_of(run).tests)
+        test = 1 + len(run.state.tests)
         place = {"phase": "certify", "round": None, "candidate": None, "node": 1}
         run.write("test_started", test=test, **place, run=number, seed=number)
         run.finish(test, "similar", 0.1)
@@ -151,9 +146,9 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
     assert left(run).tests == (2, 2, 2)
     make(10_000 + high)
     assert left(run) is None
-    assert left_said(state_of(run), True)[0] == "more tests than forecast"
+    assert left_said(run.state, True)[0] == "more tests than forecast"
     run.write("engine_stopped", reason="")
-    assert not left_said(state_of(run), False), "nothing is left of what was stopped"
+    assert not left_said(run.state, False), "nothing is left of what was stopped"
 
 
 def test_no_time_is_said_while_nothing_runs(run):
@@ -175,7 +170,7 @@ def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(ru
     fake_moments.mid_round(run)
     run.write("forecast", round=2, tests=[0, 1, 2], tests_done=1)
     assert left(run) is None
-    assert left_said(state_of(run), True)[0] == "more tests than forecast"
+    assert left_said(run.state, True)[0] == "more tests than forecast"
     run.write("forecast", round=2, tests=[1, 5, 9], tests_done=9)
     assert left(run) is not None
     run.go_back(0)
@@ -184,7 +179,7 @@ def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(ru
 
 @pytest.mark.parametrize("value", [13, "x", None, float("inf"), float("nan"), -3, 10**30, True])
 def test_a_budget_ends_it_and_one_that_makes_no_sense_does_no_harm(run, value):
-    state = state_of(fake_moments.mid_round(run))
+    state = fake_moments.mid_round(run).state
     scenario = state.scenario | {"reduction": state.scenario["reduction"] | {"budget": value}}
     for each in (scenario, {"reduction": {"budget": value}}):
         low, likely, high = remaining(state.changed(scenario=each), True).tests

@@ -46,7 +46,10 @@ def _block(block: Block) -> str:
         case Picture():
             words = escape(plain(block.alternative))
             return f'<figure class="{block.name}" aria-label="{words}">\n{block.svg}\n</figure>'
-    return _code(block)
+        case Code():
+            text = escape("\n".join(map(printable, block.lines)))
+            shown = f"<pre>{text}</pre>"
+            return f"<details><summary>{_text(block.folded)}</summary>{shown}</details>" if block.folded else shown
 
 
 def _paragraph(block: Paragraph) -> str:
@@ -63,12 +66,6 @@ def _table(table: Table) -> str:
         cells = (f"<td{side}>{''.join(map(_part, parts(cell)))}</td>" for side, cell in zip(sides, row, strict=True))
         rows.append(f"<tr{strong}>{''.join(cells)}</tr>\n")
     return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
-
-
-def _code(code: Code) -> str:
-    text = "\n".join(escape(printable(line)) for line in code.lines)
-    shown = f"<pre>{text}</pre>"
-    return f"<details><summary>{_text(code.folded)}</summary>{shown}</details>" if code.folded else shown
 
 
 def _part(part: Part) -> str:
