@@ -68,28 +68,6 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
         return numbers
 
 
-class Number(click.ParamType):  # type: ignore[type-arg]  # as above
-    """A number as a setting has it. Only one that is not `checked` later has to be in the setting's range."""
-
-    name = "number"
-
-    def __init__(self, one: Setting, *, checked: bool = False) -> None:
-        self._one, self._checked = one, checked
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> int | float:
-        try:
-            number: int | float = int(value) if self._one.kind is int else float(value)
-        except ValueError:
-            self.fail(f"expected {self._one.wanted}, found '{value}'", param, ctx)
-        if not self._checked and not self._one.allows(number):
-            self.fail(f"expected {self._one.wanted}, found {value}", param, ctx)
-        return number
-
-
-def whole(least: int, most: int | None = None) -> Number:
-    return Number(Setting(None, "", least=least, most=most, kind=int))
-
-
 # Options.
 
 
@@ -113,7 +91,7 @@ def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) ->
             found.append(click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words))
             continue
         # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
-        kind = whole(0) if one.none else one.kind if one.kind is str else Number(one, checked=True)
+        kind = click.IntRange(0) if one.none else one.kind
         words += f" {one.more}" if one.shown == "method" else ""
         found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=words))
     return together(*found)
@@ -125,7 +103,9 @@ def _sentence(one: Setting) -> str:
 
 def jobs_option(what: str = "Tests") -> Option:
     words = f"{what} at the same time."
-    return click.option("--jobs", type=Number(JOBS), default=processor.usable_cores(), show_default=True, help=words)
+    return click.option(
+        "--jobs", type=click.IntRange(JOBS.least, JOBS.most), default=processor.usable_cores(), show_default=True, help=words
+    )
 
 
 # Where the tests of a run that is there are made from now on.

@@ -119,13 +119,13 @@ def resume_command(
 @options.run_argument
 @click.option(
     "--runs",
-    type=options.whole(1),
+    type=click.IntRange(1),
     metavar="N",
     help="Minimum number of runs of what is left; by default as many as the baseline has.",
 )
 @click.option(
     "--certify-rate",
-    type=options.Number(SETTINGS["certify_rate"]),
+    type=float,
     metavar="PART",
     help="Continue the last certificate, with all of its runs, until it shows that this share of the rate is kept.",
 )
@@ -139,6 +139,9 @@ def certify_command(
     from ddenv.runs.programs import start_engine
 
     path, state = idle_run(run, trust, cluster)
+    share = SETTINGS["certify_rate"]
+    if certify_rate is not None and not share.allows(certify_rate):
+        raise UserError(f"--certify-rate: expected {share.wanted}, found {certify_rate}")
     if state.baseline is None:
         raise UserError(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
@@ -172,7 +175,7 @@ def certify_command(
     help="Algorithms separated by commas, or 'all'.",
 )
 @click.option(
-    "--seeds", type=options.whole(1, 1000), default=1, show_default=True, help="Seeds per scenario and method."
+    "--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Seeds per scenario and method."
 )
 @options.jobs_option()
 @click.option(

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ddenv.cli.options import given_reading, reading_options, runs, runs_and_scenarios, whole
+from ddenv.cli.options import given_reading, reading_options, runs, runs_and_scenarios
 from ddenv.cli.terminal import say_written
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named
@@ -61,9 +61,13 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 
 @click.command("serve")
 @click.argument("run", required=False, shell_complete=runs)
-@click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
+@click.option("--port", type=click.IntRange(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
 @click.option(
-    "--font-size", type=whole(6, 72), default=16, show_default=True, help="Text size in pixels; 28 for a projector."
+    "--font-size",
+    type=click.IntRange(6, 72),
+    default=16,
+    show_default=True,
+    help="Text size in pixels; 28 for a projector.",
 )
 @click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
 def serve_command(run: str | None, port: int, font_size: int) -> int:
