@@ -104,7 +104,11 @@ def _sentence(one: Setting) -> str:
 def jobs_option(what: str = "Tests") -> Option:
     words = f"{what} at the same time."
     return click.option(
-        "--jobs", type=click.IntRange(JOBS.least, JOBS.most), default=processor.usable_cores(), show_default=True, help=words
+        "--jobs",
+        type=click.IntRange(1, int(JOBS.most or 1)),
+        default=processor.usable_cores(),
+        show_default=True,
+        help=words,
     )
 
 
