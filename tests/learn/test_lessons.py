@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import zipfile
 from dataclasses import asdict
 
 import pytest
@@ -165,13 +164,6 @@ def test_a_lesson_has_a_page_to_hand_out(number):
     page = html(handout(opened(number)))
     assert opened(number).lesson.title in page
     assert "<svg" in page and "{" not in page.partition("</style>")[2]
-
-
-def test_all_lessons_together_are_small(tmp_path):
-    with zipfile.ZipFile(tmp_path / "wheel.zip", "w", zipfile.ZIP_DEFLATED) as wheel:
-        for file in LESSONS.iterdir():
-            wheel.write(file, file.name)
-    assert (tmp_path / "wheel.zip").stat().st_size < 2_000_000
 
 
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)

@@ -12,7 +12,7 @@ from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.plan import PAIRS, make_plan
 from ddenv.study.results import Result, rows_of
 from ddenv.study.study_page import content
-from ddenv.study.tables import behind, best, chart, numbers, section
+from ddenv.study.tables import best, chart, numbers, section
 from tests.study.made import crates, plan_of
 
 MODELS = tuple(f"m{number}" for number in range(16))
@@ -108,17 +108,6 @@ def test_the_claim_counts_what_is_better_than_the_paper():
         "the same 3 cells of the paper: at least as much removed in 2, no more tests in 2. They took 17 hours" in told
     )
     assert report.verdict == "Every world is minimal: 88 % smaller on average"
-
-
-def test_seeds_of_a_method_make_one_row(tmp_path):
-    _, _, (one, two) = cells(tmp_path, 40, 30, 50, 20, 21, None, pairs="model2model/random", seeds=3)
-    assert numbers(one).rows == (
-        ("model2model/random", "3 of 3", "40 (30 to 50)", "40", "94 %", "2.0 (1.5 to 2.5)", "2.0"),
-    )
-    assert numbers(two).rows == (
-        ("model2model/random", "2 of 3", "20.5 (20 to 21)", "40", "94 %", "1.0 (1.0 to 1.1)", "2.0"),
-    )
-    assert behind(two).rows[0][:2] == ("model2model/random", "49 % (48 % to 50 %)")
 
 
 def test_what_is_not_certified_is_shown_and_is_no_success(tmp_path):
