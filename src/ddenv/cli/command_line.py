@@ -57,8 +57,7 @@ class Commands(click.Group):
             return super().resolve_command(ctx, args)
         # While a line is typed, the shell only asks what can follow.
         path = Path(word)
-        is_file = bool(path.suffix) or len(path.parts) > 1 or path.exists()
-        if not (ctx.resilient_parsing or is_file or named(word)):
+        if not (ctx.resilient_parsing or path.suffix or len(path.parts) > 1 or path.exists() or named(word)):
             from ddenv.world.load import bundled_names
 
             known = [*self.list_commands(ctx), *bundled_names()]
