@@ -150,20 +150,17 @@ def worth(record: Record) -> Section | None:
     state = record.state
     if state.baseline is None or not state.nodes:
         return None
-    found = current(state)
-    blocks = _without(state) if found is None else _with(state, found)
-    return Section("What the result is worth", tuple(blocks))
-
-
-def _without(state: RunState) -> list[Block]:
-    so_far, words = drift(state), missing(state)
-    rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
+    found, rows = current(state), [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
+    if found is not None:
+        return Section("What the result is worth", tuple(_with(state, found)))
     claimed = "what its runs have shown so far still holds" if rows else "nothing is claimed about what is left"
-    first = as_sentence(f"{words}: {claimed}")
-    block = say(first, f" From all runs so far: {so_far[0]}." if so_far else "")
-    shown = ((_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows)
-    table = Table(("environment", "runs", "with f", "shown"), tuple(shown), {1, 2})
-    return [block, table] if rows else [block]
+    so_far = drift(state)
+    first = as_sentence(f"{missing(state)}: {claimed}")
+    blocks: list[Block] = [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
+    if rows:
+        shown = [(_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows]
+        blocks.append(Table(("environment", "runs", "with f", "shown"), shown, {1, 2}))
+    return Section("What the result is worth", tuple(blocks))
 
 
 def _with(state: RunState, found: Certificate) -> list[Block]:
