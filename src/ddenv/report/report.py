@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.page.blocks import Name, Paragraph, Part, Report, Strong, duration, moment, percent, say, thousands
+from ddenv.page.blocks import Paragraph, Part, Report, Strong, duration, moment, named, percent, say, thousands
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
@@ -173,13 +172,9 @@ def in_short(record: Record) -> list[Paragraph]:
         enough = (f"It also fails with all {whole} of its world removed: {always}",)
     elif len(left) < len(state.elements):
         these = "1 is" if len(left) == 1 else f"{len(left)} are"
-        enough = (f"Of the {whole} in its world, {these} enough to make it fail this way: ", *_names(left), ".")
+        enough = (
+            f"Of the {whole} in its world, {these} enough to make it fail this way: ",
+            *named(left, MOST_NAMES),
+            ".",
+        )
     return [say(Strong("In short:"), what, *enough, f" {sure} {cost}")]
-
-
-def _names(left: Sequence[str]) -> Iterator[Part]:
-    for number, name in enumerate(left[:MOST_NAMES]):
-        yield "" if not number else " and " if number == len(left) - 1 else ", "
-        yield Name(plain(name))
-    if len(left) > MOST_NAMES:
-        yield f" and {len(left) - MOST_NAMES} more"
