@@ -159,10 +159,7 @@ TRUE_RATES = ("whole_rate", "here_rate", "end_rate")
 _ABOUT_CLAIM = re.compile(r"(without|verdict on|here_bound without) (\S.*)")
 _BESIDE = re.compile(r"([\w-]+)\.(.+)")
 _OF_SET = re.compile(r"(rate|chance) of (\S.*)")
-
-
-def names() -> tuple[str, ...]:
-    return (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
+NAMES = (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
 
 
 def check(text: str) -> None:
@@ -170,8 +167,8 @@ def check(text: str) -> None:
     for name in _FIGURE.findall(text):
         other, bare = _parts(name)
         about = _ABOUT_CLAIM.fullmatch(bare) or _OF_SET.fullmatch(name)
-        if bare not in (OF_RUN if other else names()) and not about:
-            meant = nearest(name, names()) or f"; known figures are {', '.join(names())}"
+        if bare not in (OF_RUN if other else NAMES) and not about:
+            meant = nearest(name, NAMES) or f"; known figures are {', '.join(NAMES)}"
             raise UserError(f"unknown figure '{{{name}}}'{meant}")
     bare = _FIGURE.sub("", text)
     for term in TERMS:
