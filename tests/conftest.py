@@ -7,12 +7,14 @@ import shutil
 import signal
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from ddenv.runs import processor
+from tests.command import Said, in_process
 from tests.tiers import SLOW
 
 settings.load_profile("quick")
@@ -41,6 +43,12 @@ def home(tmp_path, monkeypatch) -> Path:
     """A folder of its own for runs."""
     monkeypatch.setenv("DDENV_HOME", str(tmp_path))
     return tmp_path
+
+
+@pytest.fixture
+def command(monkeypatch, capsys) -> Callable[..., Said]:
+    """`ddenv` with these words, in this process."""
+    return partial(in_process, monkeypatch, capsys)
 
 
 @pytest.fixture

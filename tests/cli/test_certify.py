@@ -5,15 +5,13 @@ from dataclasses import replace
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
-from ddenv.runfile.fold import fold
 from ddenv.runs.folder import runs_folder
-from tests.command import in_process, is_one_line
+from tests.command import is_one_line
 from tests.workbench import fake_moments, fake_run
 
 
 def told(run) -> tuple[dict, str]:
-    state = fold(run.file.events())
-    return summary(state, run.path), "\n".join(summary_lines(state, run.path))
+    return summary(run.state, run.path), "\n".join(summary_lines(run.state, run.path))
 
 
 def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
@@ -38,7 +36,7 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
 
 
 def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
-    state = fold(fake_moments.finished(run).file.events())
+    state = fake_moments.finished(run).state
     elsewhere = summary_lines(state, run.path)[-1]
     assert elsewhere.startswith(f"next: 'ddenv open {run.path}' shows it")
     assert summary_lines(state, runs_folder() / "crates-1.ddenv")[-1] == (
@@ -63,6 +61,7 @@ def test_what_is_not_shown_is_not_called_minimal(run):
     assert (found["minimal"], found["certificate"]["minimal"]) == (False, False)
     assert "environment, not shown to be minimal: 2 of 11 models" in lines
     assert "without crate_01: f in 1 of 2 fresh runs (1 % to 99 %): unknown: too many runs broke" in lines
+    assert " tests broke; the last one: " in lines
 
 
 def test_files_without_a_certificate_claim_nothing(run):
@@ -71,11 +70,11 @@ def test_files_without_a_certificate_claim_nothing(run):
     assert "f in 1 of 1 here, 3 of 4 in the whole world; no fresh runs were made" in lines
 
 
-def test_an_engine_makes_at_least_so_many_runs(run, started, monkeypatch, capsys):
+def test_an_engine_makes_at_least_so_many_runs(run, started, command):
     fake_moments.finished(run)
-    in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
-    in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)
-    in_process(monkeypatch, capsys, "certify", run.path, "--certify-rate", 0.8, "--jobs", 1)
+    command("certify", run.path, "--runs", 40, "--jobs", 1)
+    command("certify", run.path, "--jobs", 1)
+    command("certify", run.path, "--certify-rate", 0.8, "--jobs", 1)
     # As often as the baseline, if not said otherwise.
     assert started == [
         (run.path, 1, {"certify": 40, "certify_rate": None, "cluster": None}),
@@ -84,9 +83,9 @@ def test_an_engine_makes_at_least_so_many_runs(run, started, monkeypatch, capsys
     ]
 
 
-def test_what_cannot_be_certified_is_refused_in_one_line(run, monkeypatch, capsys):
+def test_what_cannot_be_certified_is_refused_in_one_line(run, command):
     run.created()
-    is_one_line(in_process(monkeypatch, capsys, "certify", run.path), f"ddenv: {run.path}: f is not known yet")
+    is_one_line(command("certify", run.path), f"ddenv: {run.path}: f is not known yet")
     fake_run.FakeRun.baseline(run)
     with run.engine():
-        is_one_line(in_process(monkeypatch, capsys, "certify", run.path), "another engine is working on this run")
+        is_one_line(command("certify", run.path), "another engine is working on this run")

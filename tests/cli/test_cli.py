@@ -1,5 +1,6 @@
 """The command line on the real robot, end to end, and its one line for each mistake."""
 
+import io
 import json
 import os
 import shutil
@@ -8,20 +9,26 @@ import sqlite3
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from ddenv.cli.follow import follow
+from ddenv.cli.run import announce_notes
+from ddenv.cli.terminal import CANNOT_SAY
+from ddenv.engine import single_test
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
 from ddenv.schemas import names
 from ddenv.words.claims import shown
-from tests.command import ddenv, in_process, is_one_line
+from tests.command import ddenv, is_one_line
 from tests.conftest import DATA
 from tests.waiting import PATIENCE, wait_until
+from tests.workbench import fake_moments
 
 WALL = str(DATA / "wall.yaml")
 
@@ -80,22 +87,6 @@ def _outcomes(done):
 
 
 @pytest.mark.programs
-def test_the_same_seed_gives_the_same_end_to_the_last_bit():
-    one, two = (json.loads(ddenv("test", WALL, "--seed", 5, "--json").stdout)["runs"][0] for _ in range(2))
-    assert one["end_pose"] == two["end_pose"]
-    assert one["seed"] == 5
-
-
-@pytest.mark.programs
-def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
-    _, summary = reduced
-    done = ddenv("export", summary["run_file"], "--sdf", tmp_path / "m.sdf", "--scenario", tmp_path / "m.yaml")
-    assert done.returncode == 0, done.stderr
-    assert b"far_box" not in (tmp_path / "m.sdf").read_bytes()
-    assert _outcomes(ddenv("test", tmp_path / "m.yaml", "--json")) == ["failed"]
-
-
-@pytest.mark.programs
 def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
     _, summary = reduced
     done = ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap")
@@ -132,11 +123,11 @@ def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
     assert "certificate 1: fresh runs of what is left (2 models)" in done.stderr
 
 
-def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(home, reduced, monkeypatch, capsys):
+def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(home, reduced, command):
     (home / "runs").mkdir()
     shutil.copy(reduced[1]["run_file"], home / "runs")
     (home / "runs" / "broken.ddenv").write_text("no run file")
-    done = in_process(monkeypatch, capsys, "runs")
+    done = command("runs")
     assert done.returncode == 0
     assert "wall-1" in done.stdout
     assert "2 of 6 models" in done.stdout
@@ -149,14 +140,6 @@ def test_a_finished_run_resumes_to_its_summary(reduced):
     done = ddenv("resume", summary["run_file"], "--json")
     assert done.returncode == 0
     assert json.loads(done.stdout) == summary
-
-
-@pytest.mark.programs
-def test_an_sdf_world_runs_with_a_spawn_and_a_goal(home):
-    done = ddenv("test", DATA / "wall.sdf", "--spawn", "0,0,0.45,0", "--goal", "4,0", "--timeout", 5)
-    assert done.returncode == 0, done.stderr
-    assert "failed" in done.stdout
-    assert "stuck" in done.stdout
 
 
 @pytest.mark.programs
@@ -189,49 +172,11 @@ def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
     assert json.loads(done.stdout)["tests"] == 12
 
 
-@pytest.mark.programs
-def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced):
-    """kill -9 of the engine at different moments: the same end, and no finished test is made twice."""
-    _, undisturbed = reduced
-    run = home / "killed.ddenv"
-    # Re-runs enough that there is still something to do when the last engine is killed, also on a busy machine.
-    start = [sys.executable, "-m", "ddenv", "run", WALL, "--output", str(run), "--jobs", "2", "--iterations", "9"]
-    for engines, moment in enumerate((3, 9, 15), start=1):
-        process = subprocess.Popen(start, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        # The one before may have made more tests than this one waits for.
-        wait_until(
-            lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least
-        )
-        os.kill(_engines(run)[-1], signal.SIGKILL)
-        _, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 2
-        assert err.count("\n") == 1
-        assert "ddenv resume" in err
-        start = [sys.executable, "-m", "ddenv", "resume", str(run), "--jobs", "2"]
-    done = ddenv("resume", run, "--json")
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
-    assert summary["kept"] == undisturbed["kept"]
-    assert len(_finished(run)) == len(set(_finished(run)))
-
-
-def _engines(run):
-    """The processes of all engines so far."""
-    with RunFile(run) as file:
-        return [one.event.pid for one in file.events() if one.kind == "engine_started"]
-
-
-def _finished(run):
-    """Each finished test as (environment, run)."""
-    with RunFile(run) as file:
-        return [(test.environment, test.run) for test in fold(file.events()).finished_tests]
-
-
-def test_a_second_engine_is_refused(reduced, tmp_path, monkeypatch, capsys):
+def test_a_second_engine_is_refused(reduced, tmp_path, command):
     # Another process may be looking at the run that all share.
     run = Path(shutil.copy(reduced[1]["run_file"], tmp_path))
     with engine_lock(run):
-        is_one_line(in_process(monkeypatch, capsys, "resume", run), "another engine is working on this run")
+        is_one_line(command("resume", run), "another engine is working on this run")
 
 
 MISTAKES = {
@@ -244,14 +189,10 @@ MISTAKES = {
         f"ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of {', '.join(names('algorithm'))}",
     ),
     "epsilon": (["run", WALL, "--epsilon", "0"], "--epsilon: expected 0.001 to 1000, found 0"),
-    "similarity": (
-        ["run", WALL, "--similarity", "end"],
-        "ddenv: --similarity: 'end' is not allowed",
-    ),
     "iterations": (["run", WALL, "--iterations", "-1"], "--iterations: expected 0 to 1000, found -1"),
     "timeout": (["run", WALL, "--timeout", "0"], "--timeout: expected 0.01 to 100000, found 0"),
-    "not a number": (["run", WALL, "--seed", "x"], "'--seed': expected a whole number from 0 to 2147483647, found 'x'"),
-    "jobs": (["run", WALL, "--jobs", "0"], "'--jobs': expected a whole number from 1 to 1024, found 0"),
+    "not a number": (["run", WALL, "--seed", "x"], "'--seed': 'x' is not a valid integer"),
+    "jobs": (["run", WALL, "--jobs", "0"], "'--jobs': 0 is not in the range 1<=x<=1024"),
     "unknown option": (["run", WALL, "--fast"], "No such option"),
     "nearly an option": (["run", WALL, "--sped", "1"], "Did you mean '--seed'?; see"),
     "unlike any option": (["world", "check", WALL, "--spawn", "1"], "No such option '--spawn'; see"),
@@ -259,11 +200,9 @@ MISTAKES = {
     "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "no number may exceed"),
     "unknown command": (["certfy"], "no command, run, scenario or world 'certfy' (did you mean certify?)"),
     "missing world": (["depot.world"], "ddenv: depot.world: no such file"),
-    "missing world to open": (["open", "depot.world"], "ddenv: depot.world: no such file"),
     "missing run": (["there/depot.ddenv"], "ddenv: there/depot.ddenv: no such run file"),
     "folder to run": (["run", DATA], "is a folder; expected a scenario's name or file"),
     "folder to open": (["open", DATA], "is a folder; expected a run, a scenario or a world"),
-    "folder alone": ([DATA], "is a folder; expected a run, a scenario or a world"),
     "spawn inside": (["run", DATA / "wall.sdf", "--spawn", "2,0,0.5,0", "--goal", "4,0"], "inside model 'wall'"),
     "no spawn": (
         ["run", DATA / "wall.sdf"],
@@ -272,17 +211,13 @@ MISTAKES = {
     "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
     "name": (["run", WALL, "--name", "../x"], "is not a valid file name"),
     "no run": (["open", "nothing"], "no such run file"),
-    "no run to certify": (["certify", "nothing"], "no such run file"),
-    "no runs": (["certify", "nothing", "--runs", "0"], "expected a whole number, 1 or more, found 0"),
+    "no runs": (["certify", "nothing", "--runs", "0"], "'--runs': 0 is not in the range x>=1"),
     "not a run": (["resume", __file__], "is not a ddenv run file"),
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
     "minimal": (["test", WALL, "--minimal"], "needs a run"),
     "test": (["test", WALL, "--test", 1], "--test: needs a run"),
     "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),
-    "export of no run": (["export", "nothing"], "no such run file"),
     "report of no run": (["report", "nothing"], "no such run file"),
-    "no file to run": (["run", "x.world"], "x.world: no such file"),
-    "accept rate": (["run", WALL, "--accept-rate", "all"], "ddenv: --accept-rate: 'all' is not allowed"),
     "world twice": (
         ["test", DATA / "wall.sdf", "--spawn", "0,0,0.5", "--goal", "4,0", "--world", "x.sdf"],
         "--world: only for a scenario",
@@ -298,9 +233,9 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize(("words", "told"), MISTAKES.values(), ids=MISTAKES.keys())
-def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, words, told):
+def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, words, told, command):
     monkeypatch.chdir(home)
-    is_one_line(in_process(monkeypatch, capsys, *words), told)
+    is_one_line(command(*words), told)
     assert list(home.rglob("*")) == []
 
 
@@ -363,38 +298,34 @@ def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
     assert summary["run_file"] == str(home / "in" / "---esc-1.ddenv")
 
 
-def test_a_malformed_world_is_told_with_its_line(home, monkeypatch, capsys):
+def test_a_malformed_world_is_told_with_its_line(home, command):
     data = yaml.safe_load((DATA / "wall.yaml").read_text())
     (home / "w.sdf").write_text("<sdf version='1.9'>\n<world name='w'>\n<model name='m'>\n</world></sdf>")
     data["world"] = "w.sdf"
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
-    is_one_line(in_process(monkeypatch, capsys, "run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
+    is_one_line(command("run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
 
 
-def test_a_newer_run_file_is_refused(reduced, tmp_path, monkeypatch, capsys):
+def test_a_newer_run_file_is_refused(reduced, tmp_path, command):
     copy = tmp_path / "newer.ddenv"
     copy.write_bytes(Path(reduced[1]["run_file"]).read_bytes())
     with sqlite3.connect(copy) as database:
         database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
-    for command in ("open", "resume", "test"):
-        is_one_line(in_process(monkeypatch, capsys, command, copy), "written by a newer ddenv")
+    for word in ("open", "resume", "test"):
+        is_one_line(command(word, copy), "written by a newer ddenv")
 
 
 @pytest.mark.parametrize(
     ("number", "words"), [(1, "1 part of w.sdf was replaced"), (2, "2 parts of w.sdf were replaced")]
 )
 def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
-    from types import SimpleNamespace
-
-    from ddenv.cli.run import announce_notes
-
     announce_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
     assert capsys.readouterr().out.startswith(words)
 
 
 @pytest.mark.parametrize("first", [[], ["open"]], ids=["alone", "open"])
-def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, capsys, first):
+def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, first, command):
     opened = []
     monkeypatch.setattr(
         "ddenv.workbench.launch.run_workbench", lambda *run, **options: opened.append((run, options)) or 0
@@ -402,6 +333,44 @@ def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, caps
     (home / "runs").mkdir()
     (home / "runs" / "mine.ddenv").touch()
     for word in (DATA / "wall.sdf", DATA / "wall.yaml", "mine", "friction"):
-        assert in_process(monkeypatch, capsys, *first, word).returncode == 0
+        assert command(*first, word).returncode == 0
     files = [options["file"].name if "file" in options else run[0].name for run, options in opened]
     assert files == ["wall.sdf", "wall.yaml", "mine.ddenv", "friction.yaml"]
+
+
+class Unread(io.StringIO):
+    """An output that nobody reads any more, as after `| head`."""
+
+    def write(self, _):
+        raise BrokenPipeError
+
+
+def test_where_nobody_reads_any_more_it_says_that_the_engine_goes_on_and_how_to_stop_it(run, monkeypatch, capsys):
+    fake_moments.mid_round(run).hold()
+    monkeypatch.setattr(sys, "stdout", Unread())
+    engine = SimpleNamespace(pid=77, poll=lambda: run.write("paused"))
+    with pytest.raises(BrokenPipeError):
+        follow(run.path, engine, as_json=False)
+    said = capsys.readouterr().err
+    assert f"the engine keeps working on {run.path}" in said and "'kill 77' stops it" in said
+
+
+# Of `ddenv reproduce`, for `git bisect run`: what is no answer is never taken for one.
+
+
+@pytest.mark.parametrize(
+    "words", [["no-such-run"], [], ["--most", "none"], ["--no-such-option"], ["run", "--folder", "/nowhere"]]
+)
+def test_whatever_is_wrong_it_says_that_it_cannot_say(home, words, command):
+    said = command("reproduce", *words)
+    assert said.returncode == CANNOT_SAY
+    assert said.stderr and "Traceback" not in said.stderr
+
+
+@pytest.mark.parametrize("error", [RuntimeError("no simulator"), PermissionError(13, "denied", "file")])
+def test_a_crash_is_no_failure_of_the_robot(monkeypatch, home, error, command):
+    def crash(*_):
+        raise error
+
+    monkeypatch.setattr(single_test, "subject_in", crash)
+    assert command("reproduce", "run").returncode == CANNOT_SAY

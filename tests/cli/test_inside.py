@@ -7,7 +7,7 @@ import pytest
 
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.world.sdf.read import read_world
-from tests.command import ddenv, in_process, is_one_line
+from tests.command import ddenv, is_one_line
 from tests.workbench import fake_moments
 from tests.workbench.attached import Attached
 
@@ -55,19 +55,17 @@ def test_what_a_run_has_left_is_reduced_inside_to_the_part_that_stops_the_robot(
     is_one_line(ddenv("run", tmp_path / "inside.ddenv", "--inside"), "inside models already")
 
 
-def test_a_world_without_models_that_have_parts_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+def test_a_world_without_models_that_have_parts_is_refused_in_one_line(tmp_path, command):
     world = written(tmp_path / "yard.sdf", box("only", 2, 0))
-    done = in_process(monkeypatch, capsys, "run", world, *PLACES, "--inside", "--output", tmp_path / "run.ddenv")
+    done = command("run", world, *PLACES, "--inside", "--output", tmp_path / "run.ddenv")
     is_one_line(done, "no model has parts that can be removed")
     assert not (tmp_path / "run.ddenv").exists()
 
 
-def test_inside_a_run_other_options_are_refused_and_not_ignored(run, monkeypatch, capsys):
+def test_inside_a_run_other_options_are_refused_and_not_ignored(run, command):
     fake_moments.finished(run)
     for option in (("--seed", "5"), ("--cluster", "tcp://there:8786"), ("--exact",), ("--spawn", "0,0,0.2,0")):
-        is_one_line(
-            in_process(monkeypatch, capsys, "run", run.path, "--inside", *option), "a run keeps its own options"
-        )
+        is_one_line(command("run", run.path, "--inside", *option), "a run keeps its own options")
 
 
 async def test_a_key_begins_a_run_inside_what_is_left(run, home):
@@ -80,11 +78,3 @@ async def test_a_key_begins_a_run_inside_what_is_left(run, home):
         assert "no model has parts that can be removed" in session.said()
         assert isinstance(session.app.screen, RunScreen)
         assert not list(home.glob("**/*-inside*"))
-
-
-async def test_the_key_begins_nothing_on_a_screen_that_only_watches(run, home):
-    fake_moments.finished(run)
-    async with Attached(run, watch=True) as session:
-        await session.press("I")
-        await session.app.workers.wait_for_complete()
-        assert "watching only" in session.said()

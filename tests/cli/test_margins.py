@@ -2,22 +2,13 @@
 
 import json
 import re
-import signal
-import subprocess
 from collections import Counter
-
-import pytest
 
 from ddenv.cli.follow import Interrupted
 from ddenv.report.bundle import write_bundle
 from ddenv.report.report import write_report
-from ddenv.runfile.events import MarginRan
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
-from ddenv.words.margins import bar, lines, rows
-from tests.command import DDENV, in_process, is_one_line
-from tests.conftest import ROOT
-from tests.waiting import PATIENCE
+from ddenv.words.margins import bar, rows
+from tests.command import is_one_line
 from tests.workbench import fake_moments
 
 FRICTION = (
@@ -30,9 +21,9 @@ FIX = (
 )
 
 
-def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch, capsys, tmp_path):
+def test_the_table_and_its_sentences_stand_everywhere(run, started, tmp_path, command):
     fake_moments.with_margins(run)
-    done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_0*", "--jobs", 1)
+    done = command("margins", run.path, "--number", "crate_0*", "--jobs", 1)
     asked = {"margins": '["crate_0*"]', "most_runs": 300, "cluster": None}
     assert (done.returncode, started) == (0, [(run.path, 1, asked)])
     said = done.stdout.splitlines()
@@ -43,7 +34,7 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, monkeypatch,
     assert "1.25 is not possible: crate_01 would be 0.20 m inside crate_00" in done.stdout
     assert FIX in done.stdout
     assert "at most 5 %" in said[-1]
-    found = json.loads(in_process(monkeypatch, capsys, "margins", run.path, "--json").stdout)
+    found = json.loads(command("margins", run.path, "--json").stdout)
     assert [one["asked"]["name"] for one in found["margins"]] == ["crate_00.friction", "crate_01.y"]
     assert found["margins"][0]["words"] == FRICTION
     assert (found["fixes"][0]["value"], found["fixes"][0]["confirmed"]) == (0.4, True)
@@ -65,21 +56,19 @@ def test_the_report_outlines_how_far_a_model_may_move_and_has_both_paths(run, tm
     assert Counter(signs) == {"over": 3, "until": 2, "now": 2, "changed": 2}
 
 
-def test_a_value_is_tried_again_in_what_is_left(run, monkeypatch, capsys):
+def test_a_value_is_tried_again_in_what_is_left(run, monkeypatch, command):
     fake_moments.with_margins(run)
     asked = []
     monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *given: asked.append(given) or [])
     words = ["--minimal", "--margin", "crate_01.y=1.5", "--margin", "crate_00.friction", "--repeat", 3]
-    assert in_process(monkeypatch, capsys, "test", run.path, *words).returncode == 0
+    assert command("test", run.path, *words).returncode == 0
     ((subject, trials, _),) = asked
     assert subject.world.model("crate_01").pose.position[1] == 1.5
     # Without a value it is that of the fix.
     assert {one.mu for one in subject.world.model("crate_00").collisions} == {0.4}
     assert [set(trial.keep) for trial in trials] == 3 * [set(run.state.environment)]
-    is_one_line(in_process(monkeypatch, capsys, "test", run.path, "--margin", "crate_01.y"), "no value of crate_01.y")
-    is_one_line(
-        in_process(monkeypatch, capsys, "test", "ditch", "--margin", "asphalt_far.x=4"), "--margin: needs a run"
-    )
+    is_one_line(command("test", run.path, "--margin", "crate_01.y"), "no value of crate_01.y")
+    is_one_line(command("test", "ditch", "--margin", "asphalt_far.x=4"), "--margin: needs a run")
 
 
 def test_bars_stand_on_one_scale(run):
@@ -92,9 +81,9 @@ def test_bars_stand_on_one_scale(run):
     assert lines_of[1].index("·") < lines_of[1].index("|") < lines_of[1].index("█") < lines_of[1].index("x")
 
 
-def test_what_cannot_be_is_refused_in_one_line(run, started, monkeypatch, capsys):
+def test_what_cannot_be_is_refused_in_one_line(run, started, command):
     fake_moments.with_margins(run)
-    is_one_line(in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_00.frction"), "did you mean")
+    is_one_line(command("margins", run.path, "--number", "crate_00.frction"), "did you mean")
     for words, why in (
         (["--bundle", "a.zip", "--margin", "crate_00.x"], "--margin: needs --sdf FILE"),
         (["--sdf", "a.sdf", "--margin", "nothing.x"], "has no number 'nothing.x'"),
@@ -104,20 +93,20 @@ def test_what_cannot_be_is_refused_in_one_line(run, started, monkeypatch, capsys
         (["--sdf", "a.sdf", "--margin", "spawn.x=1"], "also give --scenario FILE"),
         (["--sdf", "a.sdf", "--margin", "crate_01.y=1", "--passes"], "give one of them"),
     ):
-        is_one_line(in_process(monkeypatch, capsys, "export", run.path, *words), why)
+        is_one_line(command("export", run.path, *words), why)
     assert started == []
 
 
-def test_a_run_whose_failure_is_not_known_is_refused(run, started, monkeypatch, capsys):
+def test_a_run_whose_failure_is_not_known_is_refused(run, started, command):
     run.created()
-    is_one_line(in_process(monkeypatch, capsys, "margins", run.path), "f is not known yet")
+    is_one_line(command("margins", run.path), "f is not known yet")
 
 
-def test_the_fix_is_written_as_a_world_that_differs_by_one_number(run, monkeypatch, capsys, tmp_path):
+def test_the_fix_is_written_as_a_world_that_differs_by_one_number(run, tmp_path, command):
     fake_moments.with_margins(run)
     left, fixed = tmp_path / "left.sdf", tmp_path / "fixed.sdf"
-    in_process(monkeypatch, capsys, "export", run.path, "--sdf", left)
-    done = in_process(monkeypatch, capsys, "export", run.path, "--margin", "crate_01.y=1.5", "--output", fixed)
+    command("export", run.path, "--sdf", left)
+    done = command("export", run.path, "--margin", "crate_01.y=1.5", "--output", fixed)
     assert done.returncode == 0, done.stderr
     pairs = list(zip(left.read_text().splitlines(), fixed.read_text().splitlines(), strict=True))
     ((before, after),) = [pair for pair in pairs if pair[0] != pair[1]]
@@ -125,7 +114,7 @@ def test_the_fix_is_written_as_a_world_that_differs_by_one_number(run, monkeypat
     assert [words[1] for words in differ] == ["1.5"]
 
 
-def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, capsys):
+def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, command):
     fake_moments.finished(run)
     numbers = ({"name": "crate_00.y", "now": 0.0, "low": -3.0, "high": 3.0, "scale": 3.0, "resolution": 0.01},)
     began = {"environment": run.state.nodes[run.state.node].id, "rate": 0.9, "error": 0.01, "budget": 50}
@@ -137,46 +126,11 @@ def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, capsys):
 
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **__: None)
     monkeypatch.setattr("ddenv.cli.follow.follow", interrupted)
-    done = in_process(monkeypatch, capsys, "margins", run.path, "--number", "crate_00.y", "--budget", 50)
+    done = command("margins", run.path, "--number", "crate_00.y", "--budget", 50)
     assert done.returncode == 130
     assert f"continue with: ddenv margins {run.path}\n" in done.stderr
     asked = []
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **more: asked.append(more))
-    in_process(monkeypatch, capsys, "margins", run.path)
-    in_process(monkeypatch, capsys, "margins", run.path, "--budget", 70)
+    command("margins", run.path)
+    command("margins", run.path, "--budget", 70)
     assert asked == [{"cluster": None}, {"cluster": None, "margins": "[]", "most_runs": 70}]
-
-
-@pytest.mark.programs
-def test_a_real_search_that_is_killed_and_interrupted_comes_to_its_end(tmp_path):
-    """In the user's own simulator, which reads the changed number in the world's text."""
-    run = tmp_path / "one.ddenv"
-    words = [
-        *DDENV,
-        "run",
-        ROOT / "docs/examples/any_simulator/scenario.yaml",
-        "--output",
-        run,
-        "--trust",
-        "--jobs",
-        "2",
-    ]
-    assert subprocess.run(words, capture_output=True, text=True).returncode == 0
-    with RunFile(run) as file:
-        left = fold(file.events()).environment
-    margins = [*DDENV, "margins", run, "--number", f"{left[0]}.y", "--budget", "40", "--jobs", "2"]
-    program = subprocess.Popen(margins, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert program.stdout is not None
-    # A value is decided.
-    next(line for line in program.stdout if f"{left[0]}.y = " in line)
-    program.send_signal(signal.SIGINT)
-    program.communicate(timeout=PATIENCE)
-    with RunFile(run) as file:
-        kept = [each.event for each in file.events() if isinstance(each.event, MarginRan)]
-    assert kept
-    done = subprocess.run([*DDENV, "margins", run], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    with RunFile(run) as file:
-        state = fold(file.events())
-    assert list(state.margins.runs[: len(kept)]) == kept
-    assert done.stdout.endswith("\n".join(lines(state.margins)) + "\n")

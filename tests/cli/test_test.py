@@ -6,7 +6,6 @@ import pytest
 
 from ddenv.cli.test import elsewhere, lines, summary
 from ddenv.runfile.progress import Claim
-from tests.command import in_process
 from tests.conftest import DATA
 
 
@@ -50,15 +49,15 @@ def test_runs_in_another_simulator_are_compared_with_the_certificate():
     assert elsewhere(runs(None, "error"), here, "MuJoCo") == []
 
 
-def test_the_command_ends_with_it(monkeypatch, capsys):
+def test_the_command_ends_with_it(monkeypatch, command):
     results = [*runs(None, "failed", "failed"), *runs("w\x1b", "pass", "pass")]
     more = {"seed": 1, "end_pose": None, "failure": "", "distance": None}
     monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *_: iter([one | more for one in results]))
-    said = in_process(monkeypatch, capsys, "test", DATA / "wall.yaml", "--repeat", 2).stdout
+    said = command("test", DATA / "wall.yaml", "--repeat", 2).stdout
     assert said.splitlines()[-3:] == [
         "",
         "all 3 models: 2 of 2 runs failed (34 % to 100 %)",
         "without w�: 0 of 2 runs failed (0 % to 66 %)",
     ]
-    told = json.loads(in_process(monkeypatch, capsys, "test", DATA / "wall.yaml", "--repeat", 2, "--json").stdout)
+    told = json.loads(command("test", DATA / "wall.yaml", "--repeat", 2, "--json").stdout)
     assert [row["shown"] for row in told["summary"]] == [2, 0] and len(told["runs"]) == 4

@@ -9,7 +9,7 @@ from ddenv.cli.world import world_lines as lines
 from ddenv.cli.world import world_report as report
 from ddenv.text import width
 from ddenv.world.sdf.read import parse_world, read_world
-from tests.command import ddenv, in_process
+from tests.command import ddenv
 from tests.conftest import DATA, ROOT
 
 WORLD = b"""<sdf version='1.6'><world name='hall'>
@@ -124,28 +124,22 @@ def test_names_never_steer_the_terminal(tmp_path):
     assert not any("\u202e" in line for line in lines(world))
 
 
-def test_the_commands(tmp_path, monkeypatch, capsys):
+def test_the_commands(tmp_path, command):
     wall = DATA / "wall.sdf"
     table = ddenv("world", "check", wall)
     assert table.returncode == 0
     assert table.stdout.rstrip().endswith("7 models, 6 can be removed; nothing was replaced or ignored")
-    assert len(json.loads(in_process(monkeypatch, capsys, "world", "check", wall, "--json").stdout)["models"]) == 7
-    drawn = in_process(monkeypatch, capsys, "world", "show", wall)
+    assert len(json.loads(command("world", "check", wall, "--json").stdout)["models"]) == 7
+    drawn = command("world", "show", wall)
     assert drawn.returncode == 0 and "wall" in drawn.stdout and "\x1b" not in drawn.stdout
-    assert (
-        in_process(monkeypatch, capsys, "world", "show", wall, "--svg", tmp_path / "map.svg").stdout
-        == f"wrote {tmp_path / 'map.svg'}\n"
-    )
+    assert command("world", "show", wall, "--svg", tmp_path / "map.svg").stdout == f"wrote {tmp_path / 'map.svg'}\n"
     assert (tmp_path / "map.svg").read_text().startswith("<svg") or "<svg" in (tmp_path / "map.svg").read_text()[:200]
-    assert (
-        in_process(monkeypatch, capsys, "world", "convert", wall, "-o", tmp_path / "out.sdf").stdout
-        == f"wrote {tmp_path / 'out.sdf'}\n"
-    )
+    assert command("world", "convert", wall, "-o", tmp_path / "out.sdf").stdout == f"wrote {tmp_path / 'out.sdf'}\n"
 
 
-def test_a_scenario_stands_for_its_world(monkeypatch, capsys):
+def test_a_scenario_stands_for_its_world(command):
     for name in (str(DATA / "wall.yaml"), "friction"):
-        done = in_process(monkeypatch, capsys, "world", "check", name)
+        done = command("world", "check", name)
         assert done.returncode == 0 and "can be removed" in done.stdout
 
 
@@ -155,12 +149,12 @@ CRATE = """<model name='{name}'><pose>3 {y} 0.9 0 0 0</pose><link name='l'>
 """
 
 
-def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, monkeypatch, capsys):
+def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, command):
     ground = WORLD[WORLD.index(b"<model name='ground'") : WORLD.index(b"<model name='crate'")]
     crates = CRATE.format(name="falls", y=1) + CRATE.format(name="leans", y=1.2)
     path, out = tmp_path / "hall.world", tmp_path / "settled.world"
     path.write_bytes(b"<sdf version='1.6'><world name='hall'>\n" + ground + crates.encode() + b"</world></sdf>")
-    said = in_process(monkeypatch, capsys, "world", "settle", path, "-o", out)
+    said = command("world", "settle", path, "-o", out)
     assert said.returncode == 0, said.stderr
     assert f"wrote {out}: 2 models moved within " in said.stdout
     assert "settling 2 models that can move" in said.stderr
@@ -169,7 +163,7 @@ def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, monkeypa
     before, after = (re.sub(rb"<pose>[^<]*</pose>", b"", each.read_bytes()) for each in (path, out))
     assert before == after
     # `check` says it, too.
-    checked = in_process(monkeypatch, capsys, "world", "check", path)
+    checked = command("world", "check", path)
     assert checked.stdout.splitlines()[-1].startswith("falls starts 0.80 m inside leans")
-    refused = in_process(monkeypatch, capsys, "world", "settle", path, "-o", path)
+    refused = command("world", "settle", path, "-o", path)
     assert refused.returncode == 2 and "is the world itself; choose another file" in refused.stderr

@@ -47,12 +47,6 @@ def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
 
 
 @pytest.mark.examples
-def test_what_is_left_fails_as_it_did_and_without_either_shelf_the_robot_passes(reduced, tmp_path):
-    done = ddenv("test", reduced[0], "--minimal", "--leave-each-out", "--json", cwd=tmp_path)
-    assert [run["outcome"] for run in json.loads(done.stdout)["runs"]] == ["similar", "pass", "pass"]
-
-
-@pytest.mark.examples
 def test_another_simulator_is_told_from_the_one_of_the_run(reduced, tmp_path):
     """A robot that drives where nothing stands in its way reaches its goal, so that nothing fails there."""
     drive = SCENARIO.with_name("drive.py").read_text()

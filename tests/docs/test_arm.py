@@ -3,7 +3,6 @@
 import os
 import re
 
-import numpy as np
 import pytest
 
 from ddenv.robot.external.python_simulator import PythonSimulator
@@ -29,14 +28,6 @@ def test_the_carton_alone_lets_the_hand_pass_and_the_arm_moves_with_it(simulator
     run = simulator.run(LEFT - {"bin_1", "shelf_1"}, 1)
     assert run.outcome == "pass"
     assert {"arm::forearm", "carton_1"} <= set(run.motions) and "arm::base" not in run.motions
-
-
-@pytest.mark.examples
-def test_equal_seeds_give_equal_bits_and_other_seeds_others(simulator):
-    one, again, other = (simulator.run(LEFT, seed) for seed in (1, 1, 2))
-    assert (one.outcome, one.failure) == ("failed", "stuck")
-    assert np.array_equal(one.trajectory, again.trajectory)
-    assert not np.array_equal(one.trajectory, other.trajectory)
 
 
 @pytest.mark.examples

@@ -13,7 +13,6 @@ from ddenv.runfile.events import AcceptModeChanged, EngineStarted, Paused
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
-from tests.command import in_process
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import story
 from tests.engine.oracles import needs
@@ -163,15 +162,15 @@ def test_a_copy_never_replaces_a_file(run):
     ("words", "code"),
     [((), 0), (("RUN",), 0), (("none",), 2), (("--repair", "x"), 2), (("RUN", "--repair", "RUN"), 2)],
 )
-def test_exit_codes(run, home, monkeypatch, capsys, words, code):
-    said = in_process(monkeypatch, capsys, "doctor", *(str(run) if word == "RUN" else word for word in words))
+def test_exit_codes(run, home, words, code, command):
+    said = command("doctor", *(str(run) if word == "RUN" else word for word in words))
     assert said.returncode == code, said
     assert len(said.stderr.splitlines()) == (1 if code == 2 else 0)
 
 
-def test_what_is_wrong_is_an_exit_code_and_json(run, home, monkeypatch, capsys):
+def test_what_is_wrong_is_an_exit_code_and_json(run, home, command):
     run.write_bytes(b"SQLite format 3\0" + b"x" * 5000)
-    said = in_process(monkeypatch, capsys, "doctor", run, "--json")
+    said = command("doctor", run, "--json")
     told = json.loads(said.stdout)
     assert said.returncode == 1 and told["well"] is False
     assert any(each["state"] == "wrong" and "not a ddenv run file" in each["says"] for each in told["findings"])

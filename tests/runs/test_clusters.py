@@ -9,7 +9,6 @@ from ddenv.runs.programs import how_to_install
 from ddenv.runs.subject import with_options
 from ddenv.runs.trust import check_trusted, trust_cluster
 from ddenv.world.load import load_scenario
-from tests.command import in_process
 from tests.conftest import DATA
 
 
@@ -33,9 +32,9 @@ def test_anything_else_is_refused_in_a_line_and_nothing_is_written(cluster, tmp_
     assert not list(tmp_path.iterdir())
 
 
-def test_without_dask_a_line_says_what_to_install(monkeypatch, capsys, home):
+def test_without_dask_a_line_says_what_to_install(monkeypatch, home, command):
     monkeypatch.setattr(trust, "find_spec", lambda name: None)
-    said = in_process(monkeypatch, capsys, "run", DATA / "wall.yaml", "--cluster", "tcp://head:8786")
+    said = command("run", DATA / "wall.yaml", "--cluster", "tcp://head:8786")
     assert said.returncode == 2
     assert said.stderr.splitlines()[-1].endswith(f"Dask is not installed here: {how_to_install('cluster')}")
 

@@ -14,7 +14,6 @@ from ddenv.runs.export import export_world
 from ddenv.runs.folder import named_file
 from ddenv.runs.subject import load_parts, read_parts, scenario_for_world
 from ddenv.world.load import load_scenario
-from tests.command import in_process
 from tests.runs.test_export import _reduce, box
 
 HALL = """# A hall.
@@ -86,9 +85,9 @@ def test_what_is_left_is_directives_again_and_the_run_file_needs_no_other_file(h
     ]
 
 
-def test_directives_are_worlds_on_the_command_line(hall, monkeypatch, capsys):
+def test_directives_are_worlds_on_the_command_line(hall, command):
     assert named_file(str(hall)) == ("world", hall)
-    said = in_process(monkeypatch, capsys, "world", "check", hall)
+    said = command("world", "check", hall)
     assert (
         said.returncode,
         "3 can be removed; welded, so they are removed together: lamp to table;" in said.stdout,
@@ -97,9 +96,7 @@ def test_directives_are_worlds_on_the_command_line(hall, monkeypatch, capsys):
         True,
     )
     hall.write_text(HALL.replace("lamp::l", "lamp::k"))
-    said = in_process(
-        monkeypatch, capsys, "run", hall, "--spawn", "0,0,0.2,0", "--goal", "6,0", "--output", hall.parent
-    )
+    said = command("run", hall, "--spawn", "0,0,0.2,0", "--goal", "6,0", "--output", hall.parent)
     assert (said.returncode, said.stderr) == (
         2,
         f"ddenv: {hall}:6: there is no frame 'lamp::k' here (did you mean lamp::l?)\n",

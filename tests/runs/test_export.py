@@ -238,7 +238,3 @@ def test_the_command_line_says_what_is_still_needed(tmp_path, folder):
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith(f"{folder / 'm.sdf'} still needs ")
     assert done.stderr.endswith("c.obj and 2 more\n")
-
-
-def test_a_world_that_names_no_file_needs_no_word(tmp_path, folder):
-    assert export_world(run_of(tmp_path, [box("a", 5)]), folder / "m.sdf", None).needs == []

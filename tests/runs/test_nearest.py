@@ -5,20 +5,16 @@ import sqlite3
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import nearest, removed_in_passing
 from tests.workbench import fake_moments
 
 
-def read(path):
-    with RunFile(path) as file:
-        state = fold(file.events())
-        return state, nearest(file, state)
+def read(run):
+    return run.state, nearest(run.file, run.state)
 
 
 def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
-    state, found = read(fake_moments.isolated(run).path)
+    state, found = read(fake_moments.isolated(run))
     assert found.gone == removed_in_passing(state, run.path) == ("crate_00",)
     assert found.shown
     assert found.words == (
@@ -30,7 +26,7 @@ def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
 
 
 def test_two_runs_with_one_seed_show_where_the_worlds_part(run):
-    state, found = read(fake_moments.isolated(run).path)
+    state, found = read(fake_moments.isolated(run))
     one = found.parting
     failing, passing = (state.tests[test - 1] for test in (one.with_test, one.without_test))
     assert failing.seed == passing.seed == one.seed
@@ -44,7 +40,7 @@ def test_where_trajectories_are_damaged_the_rest_is_said(run):
     with sqlite3.connect(run.path) as database:
         database.execute("UPDATE motion SET samples = x'00'")
     database.close()
-    found = read(run.path)[1]
+    found = read(run)[1]
     assert (found.gone, found.shown, found.parting) == (("crate_00",), True, None)
     assert found.sentences.startswith("A nearest world that passes lacks 1 model")
     assert "Where the paths diverge is not known: " in found.sentences
@@ -52,7 +48,7 @@ def test_where_trajectories_are_damaged_the_rest_is_said(run):
 
 
 def test_before_it_has_ended_nothing_is_claimed(run):
-    state, found = read(fake_moments.isolating(run).path)
+    state, found = read(fake_moments.isolating(run))
     assert found is None
     assert state.isolating is not None
     with pytest.raises(UserError, match="find the nearest one first: ddenv isolate"):
@@ -72,7 +68,7 @@ def ended(run, claims, removal):
     if claims:
         run.write("isolation_checked", removal=gone, claims=said, tests=[])
     run.write("isolation_finished", removal=removal)
-    return read(run.path)[1]
+    return read(run)[1]
 
 
 PASSES, EACH_NEEDED = (None, "passes", 20, 20), [(back, "needed", 0, 9) for back in range(3)]
@@ -100,4 +96,4 @@ def test_where_fresh_runs_do_not_show_that_it_passes_it_says_so(run):
     found = ended(run, ((None, "not shown", 12, 20),), None)
     assert found.words.startswith("no world is shown to pass: without 3 models of 11")
     with pytest.raises(UserError, match="no world is shown to pass"):
-        removed_in_passing(read(run.path)[0], run.path)
+        removed_in_passing(read(run)[0], run.path)

@@ -9,12 +9,12 @@ from ddenv.runs.export import export_world
 from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import load_scenario
 from ddenv.world.model import Cylinder, Mesh
+from tests.runs.test_export import TETRAHEDRON
 
 GROUND = (
     "<model name='ground'><static>1</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision>"
     "</link></model>"
 )
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 ROCK = (
     "<sdf version='1.7'><model name='rock'><static>1</static><link name='l'><collision name='c'><geometry><mesh>"
     "<uri>model://rock/rock.obj</uri></mesh></geometry></collision></link></model></sdf>"

@@ -13,10 +13,8 @@ from tests.workbench import fake_moments, fake_run
 
 
 @pytest.fixture
-def run(tmp_path):
-    made = fake_moments.finished(fake_run.FakeRun(tmp_path / "one.ddenv"))
-    yield made
-    made.close()
+def finished(run):
+    return fake_moments.finished(run)
 
 
 def at_end(run):
@@ -35,9 +33,9 @@ def way(*rows):
     return array("d", [value for time, x in rows for value in (time, x, 0, 0, 1, 0, 0, 0)]).tobytes()
 
 
-def test_the_robot_and_the_models_that_moved_are_where_they_were(run):
-    put(run, 38, "crate_01", way((0, 1.0), (10, 2.0)))
-    one = played(run.file, at_end(run), 38)
+def test_the_robot_and_the_models_that_moved_are_where_they_were(finished):
+    put(finished, 38, "crate_01", way((0, 1.0), (10, 2.0)))
+    one = played(finished.file, at_end(finished), 38)
     assert one.length == 45.0
     assert one.pose(0.0).position[:2] == (-6.0, 0.0)
     assert one.pose(22.5).position[0] == pytest.approx(-2.0)
@@ -46,11 +44,10 @@ def test_the_robot_and_the_models_that_moved_are_where_they_were(run):
     assert one.lacks == ()
 
 
-def test_an_implied_test_has_the_motions_of_the_one_that_implies_it(tmp_path):
-    run = fake_moments.sliced(fake_run.FakeRun(tmp_path / "one.ddenv"))
+def test_an_implied_test_has_the_motions_of_the_one_that_implies_it(run):
+    fake_moments.sliced(run)
     implied = next(test for test in run.state.tests if test.implied_by is not None)
     assert played(run.file, at_end(run), implied.id).length == 45.0
-    run.close()
 
 
 @pytest.mark.parametrize(
@@ -66,9 +63,9 @@ def test_an_implied_test_has_the_motions_of_the_one_that_implies_it(tmp_path):
     ids=["empty", "back in time", "nan", "far", "before the start", "for ever"],
 )
 @pytest.mark.parametrize("model", ["", "crate_01"], ids=["robot", "model"])
-def test_motions_that_make_no_sense_are_told_and_the_rest_is_shown(run, model, samples):
-    put(run, 38, model, samples)
-    one = played(run.file, at_end(run), 38)
+def test_motions_that_make_no_sense_are_told_and_the_rest_is_shown(finished, model, samples):
+    put(finished, 38, model, samples)
+    one = played(finished.file, at_end(finished), 38)
     assert one.models == ("crate_00", "crate_01")
     assert one.moving == {}
     assert bool(one.rows) == bool(model)
@@ -76,11 +73,11 @@ def test_motions_that_make_no_sense_are_told_and_the_rest_is_shown(run, model, s
     assert any("damaged" in line for line in one.lacks)
 
 
-def test_a_run_without_trajectories_says_so(run):
-    with sqlite3.connect(run.path) as database:
+def test_a_run_without_trajectories_says_so(finished):
+    with sqlite3.connect(finished.path) as database:
         database.execute("DELETE FROM motion")
     database.close()
-    one = played(run.file, at_end(run), 38)
+    one = played(finished.file, at_end(finished), 38)
     assert one.length == 0.0
     assert one.lacks == (
         "The run file has no path of the robot in test 38 (bundles leave paths out): nothing moves here.",
@@ -97,14 +94,13 @@ def test_of_another_simulator_only_the_robot_moves_and_it_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("number", "what"), [(0, "test 0"), (-1, "run 1 with a changed number"), (10**9, "test 1000000000")]
 )
-def test_there_is_no_such_test(run, number, what):
+def test_there_is_no_such_test(finished, number, what):
     with pytest.raises(UserError, match=f"there is no {what}"):
-        played(run.file, at_end(run), number)
+        played(finished.file, at_end(finished), number)
 
 
-def test_a_test_that_runs_is_not_stored_yet(tmp_path):
-    run = fake_moments.mid_round(fake_run.FakeRun(tmp_path / "one.ddenv"))
+def test_a_test_that_runs_is_not_stored_yet(run):
+    fake_moments.mid_round(run)
     last = run.tests
     with pytest.raises(UserError, match=f"test {last} is still running"):
         played(run.file, at_end(run), last)
-    run.close()

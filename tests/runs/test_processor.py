@@ -14,13 +14,14 @@ VERSION_1 = "4:cpu,cpuacct:/docker/a\n3:memory:/docker/a"
 def usable(tmp_path, monkeypatch):
     """A function from the process's control group and the files of limits to the cores it may use, on a machine with 64."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
+    monkeypatch.setattr(processor, "ROOT", tmp_path)
 
     def cores(group: str = "", limits: dict[str, str] | None = None) -> int:
         for name, text in {"proc/self/cgroup": group, **(limits or {})}.items():
             file = tmp_path / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text)
-        return processor.usable_cores(tmp_path)
+        return processor.usable_cores()
 
     return cores
 
@@ -31,7 +32,9 @@ def test_without_limits_all_cores_of_the_affinity(usable, monkeypatch, tmp_path)
     assert usable() == 2
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert processor.usable_cores(tmp_path / "nothing") == 1
+    monkeypatch.setattr(processor, "ROOT", tmp_path / "nothing")
+    assert processor.usable_cores() == 1
+    assert processor.usable_memory() == processor.free_memory() == math.inf
 
 
 @pytest.mark.parametrize(
@@ -71,8 +74,4 @@ MEMORY = "MemTotal:  16000 kB\nMemFree:  1 kB\nMemAvailable:   9000 kB\nHugePage
 )
 def test_the_memory_is_that_of_the_smallest_group(usable, tmp_path, group, limits, found):
     usable(group, {"proc/meminfo": MEMORY} | {f"sys/fs/cgroup/{name}": text for name, text in limits.items()})
-    assert (processor.usable_memory(tmp_path), processor.free_memory(tmp_path)) == tuple(1024 * kb for kb in found)
-
-
-def test_a_system_that_does_not_tell_its_memory(tmp_path):
-    assert processor.usable_memory(tmp_path) == processor.free_memory(tmp_path) == math.inf
+    assert (processor.usable_memory(), processor.free_memory()) == tuple(1024 * kb for kb in found)

@@ -12,17 +12,15 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import APART, GOAL, End, F, Parting, parted, parting_sentence, reasons, sentence
 from ddenv.text import percent
 from tests.conftest import ROOT
-from tests.workbench import fake_moments, fake_run
+from tests.workbench import fake_moments
 
 LESSONS = ROOT / "src/ddenv/learn/lessons"
 
 
 @pytest.fixture
-def found(tmp_path):
-    path = fake_moments.finished(fake_run.FakeRun(tmp_path / "one.ddenv")).path
-    with RunFile(path) as file:
-        state = fold(file.events())
-        return state, reasons(file, state)
+def found(run):
+    fake_moments.finished(run)
+    return run.state, reasons(run.file, run.state)
 
 
 @pytest.mark.parametrize("lesson", [None, "ditch", "quay-kept", "ditch-sliced"])
@@ -63,17 +61,15 @@ def test_the_runs_that_are_compared_have_one_seed_and_other_ends(found):
         assert (other.outcome, other.without) == ("pass", one.without)
 
 
-def test_runs_are_compared_also_where_f_is_what_happens_most(tmp_path):
-    run = fake_moments._rounds(fake_run.FakeRun(tmp_path / "one.ddenv"))
+def test_runs_are_compared_also_where_f_is_what_happens_most(run):
+    fake_moments._rounds(run)
     run.start_certificate()
     run.certify_all(2, None, 6 * "s")
     run.certify_all(2, "crate_00", "sspss")
     run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "not shown", "sspss"))
-    with RunFile(run.path) as file:
-        state = fold(file.events())
-        one = reasons(file, state)[0]
+    one = reasons(run.file, run.state)[0]
     assert one.ends[0].kind == F
-    assert state.tests[one.parting.without_test - 1].outcome == "pass"
+    assert run.state.tests[one.parting.without_test - 1].outcome == "pass"
 
 
 def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_metre():
@@ -98,24 +94,21 @@ def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it
     assert parting_sentence(replace(one, parting=None)) == ""
 
 
-def test_without_a_certificate_it_says_how_to_make_one(tmp_path):
-    path = fake_moments.uncertified(fake_run.FakeRun(tmp_path / "one.ddenv")).path
-    with (
-        RunFile(path) as file,
-        pytest.raises(UserError, match="no fresh runs were made; make a certificate first: ddenv certify"),
-    ):
-        reasons(file, fold(file.events()))
+def test_without_a_certificate_it_says_how_to_make_one(run):
+    fake_moments.uncertified(run)
+    with pytest.raises(UserError, match="no fresh runs were made; make a certificate first: ddenv certify"):
+        reasons(run.file, run.state)
 
 
-def test_of_an_unfinished_certificate_it_says_what_is_shown_so_far(tmp_path):
-    run = fake_moments._rounds(fake_run.FakeRun(tmp_path / "one.ddenv"))
+def test_of_an_unfinished_certificate_it_says_what_is_shown_so_far(run):
+    fake_moments._rounds(run)
     run.start_certificate()
     run.certify_all(2, None, 12 * "s")
     run.certify_all(2, "crate_00", 8 * "p")
     # Nine tenths of the certificate's error are for claims in turn. The whole world runs only where what is left misses f.
     kept, often = min(2 / 3, Pairs(both=12).keeps_at_least(0.027)), Pairs(second=8).at_most(0.027)
-    with RunFile(run.path) as file, pytest.raises(UserError) as refused:
-        reasons(file, fold(file.events()))
+    with pytest.raises(UserError) as refused:
+        reasons(run.file, run.state)
     assert str(refused.value) == (
         f"{run.path}: its certificate is not finished; so far at least {percent(kept)} of the whole world's rate is kept; "
         f"without crate_00 f shows at most {percent(often)} as often; make a certificate first: ddenv resume {run.path}"

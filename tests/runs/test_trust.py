@@ -134,12 +134,12 @@ COMMANDS = {
 
 @pytest.mark.parametrize("words", slow(pytest.mark.programs, COMMANDS, but=["resume", "test"]))
 @pytest.mark.parametrize("brings", ["command", "controller"])
-def test_a_mailed_run_starts_nothing(scenario, home, monkeypatch, capsys, words, brings):
-    from tests.command import in_process, is_one_line
+def test_a_mailed_run_starts_nothing(scenario, home, words, brings, command):
+    from tests.command import is_one_line
 
     run = home / "mail.ddenv"
     create_run(load_scenario(scenario(BRINGS[brings])), run)
-    done = in_process(monkeypatch, capsys, *[str(run) if word == "RUN" else word for word in COMMANDS[words]])
+    done = command(*[str(run) if word == "RUN" else word for word in COMMANDS[words]])
     is_one_line(done, "mail.ddenv", "--trust")
     assert not (home / "started").exists()
 

@@ -55,10 +55,3 @@ def test_no_strategy_takes_fewer(models, iterations):
     for needed in range(1, models + 1):
         best = optimum(models, needed, iterations, range(models + 1))
         assert bound(models, needed, 1 + iterations) <= best
-
-
-def test_some_strategies_need_no_more():
-    """The bound can be reached: if all models are needed, each is left out without success."""
-    assert bound(1, 1, 4, 10) == 10 + 4
-    assert bound(4, 4, 2, 3) == 3 + 8
-    assert bound(16, 2, 4, 10) == 10 + 1 + 8

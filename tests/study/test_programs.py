@@ -104,12 +104,3 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     Lab(monkeypatch, fails)
     assert study(tmp_path / "alone", plan, jobs=1)[0] == 0
     assert told(folder) == told(tmp_path / "alone")
-
-
-def test_a_mistake_gets_one_line(tmp_path):
-    (tmp_path / "file").touch()
-    wall(tmp_path)
-    words = [sys.executable, "-m", "ddenv", "study", "--scenarios", "wall.yaml", "-o", "file"]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "ddenv: file: is a file; give the name of a folder\n"

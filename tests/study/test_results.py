@@ -8,7 +8,7 @@ import pytest
 from ddenv import __version__
 from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
-from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, never_failed, plan_of, reduced
+from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, plan_of, reduced
 from tests.workbench import fake_moments
 
 
@@ -142,26 +142,13 @@ def test_what_is_not_minimal_says_why(tmp_path, cell, run, problem):
     assert (result.minimal, result.problem, result.certificate) == (False, problem.strip(), None)
 
 
-def test_what_was_not_made_and_what_is_no_run_file_is_a_problem(tmp_path, cell):
-    result = read_cell(tmp_path, cell)
-    assert (result.minimal, result.problem, result.tests, result.smaller) == (False, "not made yet", 0, 0.0)
-    run_path(tmp_path, cell).parent.mkdir()
-    run_path(tmp_path, cell).write_text("no run file")
-    result = read_cell(tmp_path, cell)
-    assert not result.minimal and "is not a ddenv run file" in result.problem
-
-
 JUDGED = {"candidate": 0, "verdict": "similar", "known": 0}
 DAMAGED = {
     "unknown event": ("juggled", {}),
-    "no such model": ("reduced", {"candidate": 0, "environment": [77], "evidence_test": 1}),
     "no such test": ("test_finished", {"test": 99}),
     "no such candidate": ("candidate_judged", JUDGED | {"candidate": 7, "tests": []}),
     "tests that are not there": ("candidate_judged", JUDGED | {"tests": [99]}),
-    "test zero": ("candidate_judged", JUDGED | {"tests": [0]}),
-    "tests that are no numbers": ("candidate_judged", JUDGED | {"tests": [[1]]}),
     "a certificate of tests that are not there": ("certificate_finished", {"claims": [], "tests": [99]}),
-    "a certificate of no tests": ("certificate_finished", {"claims": [], "tests": [None]}),
     "no events": ("", {}),
 }
 
@@ -175,9 +162,3 @@ def test_a_damaged_run_is_a_problem(done, kind, data):
             db.execute("DELETE FROM event")
     result = read_cell(*done)
     assert not result.minimal and "damaged run file" in result.problem
-
-
-def test_a_cell_whose_robot_did_not_fail_has_no_sizes(tmp_path, cell):
-    result = never_failed(tmp_path, cell)
-    assert (result.minimal, result.problem, result.baseline) == (False, "there is no failure to reduce", None)
-    assert result.tests == 1

@@ -10,9 +10,9 @@ from ddenv.page.blocks import Paragraph, Strong, Table
 from ddenv.runfile.events import BaselineFinished, Outcomes
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.results import Result, rows_of, spread
+from ddenv.study.results import Result, rows_of
 from ddenv.study.study_page import content
-from ddenv.study.tables import behind, best, chart, numbers, section
+from ddenv.study.tables import best, chart, numbers, section
 from tests.study.made import crates, plan_of
 
 MODELS = tuple(f"m{number}" for number in range(16))
@@ -98,13 +98,6 @@ def test_what_slices_save_stands_beside_the_papers_way():
     assert f"Not certified: {PAIRS[0]}, seed 100000, with slices: it is not shown." in told
 
 
-def test_what_the_paper_does_not_have_stands_alone():
-    plan = make_plan(("ditch",), f"timeseg/random,{PAIRS[0]}", "ddenv,ddmin", slice=False)
-    (group,) = rows_of(plan, [result_of(cell, 60) for cell in plan.cells])
-    table = numbers(group)
-    assert [(row[0], row[3]) for row in table.rows] == [("timeseg/random", "–"), (PAIRS[0], "268"), ("ddmin", "–")]
-
-
 def test_the_claim_counts_what_is_better_than_the_paper():
     plan = make_plan(("ditch",), slice=False)
     # Of 84, 95 and 84 % and of 268, 82 and 359 tests.
@@ -115,27 +108,6 @@ def test_the_claim_counts_what_is_better_than_the_paper():
         "the same 3 cells of the paper: at least as much removed in 2, no more tests in 2. They took 17 hours" in told
     )
     assert report.verdict == "Every world is minimal: 88 % smaller on average"
-
-
-def test_seeds_of_a_method_make_one_row(tmp_path):
-    _, _, (one, two) = cells(tmp_path, 40, 30, 50, 20, 21, None, pairs="model2model/random", seeds=3)
-    assert numbers(one).rows == (
-        ("model2model/random", "3 of 3", "40 (30 to 50)", "40", "94 %", "2.0 (1.5 to 2.5)", "2.0"),
-    )
-    assert numbers(two).rows == (
-        ("model2model/random", "2 of 3", "20.5 (20 to 21)", "40", "94 %", "1.0 (1.0 to 1.1)", "2.0"),
-    )
-    assert behind(two).rows[0][:2] == ("model2model/random", "49 % (48 % to 50 %)")
-
-
-def test_the_rate_of_what_is_left_stands_beside_the_whole_worlds(tmp_path):
-    _, _, (one, two) = cells(tmp_path, 40, 30, 50, None, pairs="model2model/random", seeds=2)
-    rates = ("38 of 40 (77 % to >99 %)", "40 of 40 (87 % to 100 %)", "at most 0 of 10 (0 % to 38 %)")
-    assert behind(one).head[3:] == (
-        *("f in the whole world", "f in what is left", "f without one of them", "steps back", "fewest tests"),
-    )
-    assert behind(one).rows[0][3:] == (*rates, "0", "9")
-    assert behind(two).rows[0][3:5] == ("19 of 20 (67 % to >99 %)", "20 of 20 (78 % to 100 %)")
 
 
 def test_what_is_not_certified_is_shown_and_is_no_success(tmp_path):
@@ -163,14 +135,6 @@ def test_half_a_success_is_none(tmp_path, second):
     rows, _ = ranking(both)
     assert list(rows)[-1] == "model2model/random" and rows["model2model/random"][0] == "10 (1 of 2 certified)"
     assert rows["model2model/sequential"][0] == Strong("21 ◂")
-
-
-@pytest.mark.parametrize(
-    ("values", "told"),
-    [([], "–"), ([3], "3"), ([3, 3], "3"), ([1, 9, 2], "2 (1 to 9)"), ([1.2, 1.4, 1.3], "1")],
-)
-def test_one_value_or_the_median_with_the_range(values, told):
-    assert spread(values, lambda value: f"{value:.0f}") == told
 
 
 def test_which_is_best_where(tmp_path):

@@ -1,6 +1,5 @@
 """The lines that are printed while a run is followed."""
 
-from ddenv.cli.summary import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded
@@ -129,12 +128,6 @@ def test_the_headline_counts_tests_that_ended_and_that_run():
     state = states(*map(started, (1, 2, 3, 4)), ended(2, "pass"), ("test_lost", {"test": 3}))[-1]
     assert headline(state).endswith("4 of 4 models · 1 tests, 2 running")
     assert headline(state, 3.25).endswith("2 running, 3.2 s simulated")
-
-
-def test_why_tests_broke_is_told_at_the_end():
-    state = states(started(1), ended(1, "error", "the controller Follow raised ValueError: no"))[-1]
-    assert broken(state) == ["1 test broke; the last one: the controller Follow raised ValueError: no"]
-    assert broken(states(started(1), ended(1, "pass"))[-1]) == []
 
 
 def test_what_the_user_does_by_hand_is_told_in_its_own_words():

@@ -22,16 +22,18 @@ from ddenv import __version__
 from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
 from ddenv.cli.terminal import CANNOT_SAY, announce
 from ddenv.errors import UserError
+from ddenv.runs.folder import named
 from ddenv.schemas import nearest
 
 # The commands, and the file of each. Only that of the command that is used is loaded: the workbench is on the screen sooner.
 COMMANDS = {
-    **dict.fromkeys(("run", "resume", "certify"), "run"),
-    **dict.fromkeys(("open", "serve"), "workbench"),
+    **dict.fromkeys(("run", "resume", "certify", "study"), "run"),
+    **dict.fromkeys(("open", "serve", "learn"), "workbench"),
     **dict.fromkeys(("runs", "schemas", "config", "doctor"), "lists"),
     **dict.fromkeys(("export", "reproduce", "report"), "share"),
-    **dict.fromkeys(("why", "isolate"), "explain"),
-    **{name: name for name in ("test", "margins", "learn", "study", "world")},
+    **dict.fromkeys(("why", "isolate", "margins"), "explain"),
+    "test": "test",
+    "world": "world",
 }
 
 
@@ -54,7 +56,8 @@ class Commands(click.Group):
         if word in COMMANDS or word.startswith("-"):
             return super().resolve_command(ctx, args)
         # While a line is typed, the shell only asks what can follow.
-        if not ctx.resilient_parsing and not _can_be_opened(word):
+        path = Path(word)
+        if not (ctx.resilient_parsing or path.suffix or len(path.parts) > 1 or path.exists() or named(word)):
             from ddenv.world.load import bundled_names
 
             known = [*self.list_commands(ctx), *bundled_names()]
@@ -67,16 +70,6 @@ class Commands(click.Group):
         others = [] if incomplete.startswith("-") else runs_and_scenarios(ctx, None, incomplete)
         # The shell lists files only where nothing else fits.
         return [*commands, *(each for each in others if each.type == "plain" or not commands)]
-
-
-def _can_be_opened(word: str) -> bool:
-    """Whether a word names a file, there or not, a run or a bundled scenario."""
-    path = Path(word)
-    if path.suffix or len(path.parts) > 1 or path.exists():
-        return True
-    from ddenv.runs.folder import named
-
-    return named(word) is not None
 
 
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})

@@ -1,4 +1,6 @@
-"""Commands that say why a run fails: `ddenv why` from its fresh runs, `isolate` by the nearest world that passes."""
+"""Commands that say why a run fails: `ddenv why` from its fresh runs, `isolate` by the nearest world that passes, and `margins` by
+how far the numbers of what is left may change before the robot no longer fails as it did.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,9 @@ from ddenv.cli.run import idle_run
 from ddenv.cli.terminal import announce, say
 from ddenv.errors import UserError
 from ddenv.runs.folder import attach_name, find_run
+
+# Of a search for margins, runs.
+BUDGET = 300
 
 
 @click.command("why")
@@ -49,7 +54,7 @@ def why_command(run: str, as_json: bool) -> int:
 @options.run_argument
 @click.option(
     "--runs",
-    type=options.whole(1),
+    type=click.IntRange(1),
     metavar="N",
     help="Minimum number of fresh runs of the world that passes; 20 by default.",
 )
@@ -97,3 +102,71 @@ def isolate_command(
     else:
         say(found.sentences)
     return 0 if found.gone else 1
+
+
+@click.command("margins")
+@options.run_argument
+@click.option(
+    "--number",
+    "globs",
+    multiple=True,
+    metavar="GLOB",
+    help="Only numbers whose names match, such as green_patch_01.friction, '*.y' or controller.speed; may be repeated. "
+    "Without it the most promising ones come first.",
+)
+@click.option("--budget", type=click.IntRange(1), metavar="N", help="Maximum number of runs; 300 by default.")
+@click.option("--list", "listed", is_flag=True, help="Only list the numbers and the range in which each is tried.")
+@options.engine_options
+def margins_command(
+    run: str,
+    globs: tuple[str, ...],
+    budget: int | None,
+    listed: bool,
+    jobs: int,
+    cluster: str | None,
+    trust: bool,
+    as_json: bool,
+) -> int:
+    """Says how far each number in what is left of RUN (a name or a file) can change before f is gone, and from where the robot
+    reaches its goal: places, sizes and frictions of models, the start, the goal, the speed, the sensors. It changes nothing
+    else, and continues an interrupted search.
+    """
+    from ddenv.cli.follow import Interrupted, follow
+    from ddenv.engine.margins import numbers_left, refusal
+    from ddenv.evidence.margins import fixes_of
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.programs import last_words, start_engine
+    from ddenv.runs.subject import read_parts
+    from ddenv.words.margins import lines, rows
+
+    path, state = idle_run(run, trust, cluster)
+    if why := refusal(state, path):
+        raise UserError(f"{path}: {why}")
+    with RunFile(path) as file:
+        numbers = numbers_left(read_parts(file), state, globs)
+    if listed:
+        for one in numbers:
+            say(f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip())
+        return 0
+    goes_on = state.margining is not None and not globs and budget is None
+    asked = {} if goes_on else {"margins": json.dumps(globs), "most_runs": budget or BUDGET}
+    try:
+        follow(path, start_engine(path, jobs, cluster=cluster, **asked), as_json)
+    except Interrupted as interrupted:
+        if interrupted.state.margining is not None:
+            announce(f"interrupted; all runs are kept; continue with: ddenv margins {path}")
+            return 130
+    with RunFile(path) as file:
+        margins = fold(file.events()).margins
+    if margins is None or margins.broken_off:
+        raise UserError(last_words(path))
+    if not margins.ended:
+        raise UserError(f"{path}: the search for margins was stopped; continue with: ddenv margins {path}")
+    if as_json:
+        found = [asdict(one.margin) | {"words": one.sentence} for one in rows(margins)]
+        fixes = [asdict(one) for one in fixes_of(margins)]
+        print(json.dumps({"margins": found, "fixes": fixes, "certified": margins.asked.certified}))
+    else:
+        print("\n".join(lines(margins)))
+    return 0

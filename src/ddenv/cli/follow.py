@@ -59,7 +59,7 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
 
     Raises UserError and Interrupted.
     """
-    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     out = sys.stderr if as_json else sys.stdout
     interrupted = False
     # On a busy disk the engine may hold its lock for seconds.
@@ -90,10 +90,6 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
     if state.status == "failed":
         raise UserError(state.reason)
     return state
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _show(file: RunFile, state: RunState, out: TextIO) -> RunState:

@@ -88,26 +88,24 @@ def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
 
     Exits with 1 if something is wrong.
     """
+    from ddenv.doctor.machine import installation, machine, terminal
+    from ddenv.doctor.machine import runs as folder_of_runs
+    from ddenv.doctor.run_health import repair as repaired
+    from ddenv.doctor.run_health import run_health
+
     if run is None and repair is not None:
         raise UserError("--repair: needs a run: ddenv doctor RUN --repair COPY")
-    found = list(_found(run, repair))
+    if run is None:
+        found = [*installation(), *terminal(), *machine(), *folder_of_runs()]
+    else:
+        found = [*(repaired(find_run(run), repair) if repair is not None else run_health(find_run(run)))]
+        # Asked about one run, only what is wrong elsewhere is worth a line.
+        found += [finding for finding in (*installation(), *folder_of_runs()) if finding.state == "wrong"]
     if as_json:
         print(json.dumps({"well": is_well(found), "findings": [asdict(finding) for finding in found]}))
     else:
         print("\n".join(map(printable, finding_lines(found, terminal_columns()))))
     return 0 if is_well(found) else 1
-
-
-def _found(run: str | None, copy: Path | None) -> Iterator[Finding]:
-    from ddenv.doctor.machine import installation, machine, runs, terminal
-    from ddenv.doctor.run_health import repair, run_health
-
-    if run is None:
-        yield from (*installation(), *terminal(), *machine(), *runs())
-        return
-    # Asked about one run, only what is wrong elsewhere is worth a line.
-    yield from (repair(find_run(run), copy) if copy is not None else run_health(find_run(run)))
-    yield from (finding for finding in (*installation(), *runs()) if finding.state == "wrong")
 
 
 def finding_lines(found: Iterable[Finding], columns: int | None) -> Iterator[str]:

@@ -68,28 +68,6 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
         return numbers
 
 
-class Number(click.ParamType):  # type: ignore[type-arg]  # as above
-    """A number as a setting has it. Only one that is not `checked` later has to be in the setting's range."""
-
-    name = "number"
-
-    def __init__(self, one: Setting, *, checked: bool = False) -> None:
-        self._one, self._checked = one, checked
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> int | float:
-        try:
-            number: int | float = int(value) if self._one.kind is int else float(value)
-        except ValueError:
-            self.fail(f"expected {self._one.wanted}, found '{value}'", param, ctx)
-        if not self._checked and not self._one.allows(number):
-            self.fail(f"expected {self._one.wanted}, found {value}", param, ctx)
-        return number
-
-
-def whole(least: int, most: int | None = None) -> Number:
-    return Number(Setting(None, "", least=least, most=most, kind=int))
-
-
 # Options.
 
 
@@ -104,29 +82,34 @@ def together(*options: Option) -> Option:
 
 def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) -> Option:
     """An option for each setting that has one, which replaces the scenario's value."""
-    chosen = (one for one in OPTIONS if (not only or one.name in only) and one.name not in without)
-    return together(*map(_option, chosen))
+    found = []
+    for one in OPTIONS:
+        if (only and one.name not in only) or one.name in without:
+            continue
+        words = f"{_sentence(one)}{'; 0: no limit' if one.none else ''}."
+        if one.kind is bool:
+            found.append(click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words))
+            continue
+        # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
+        kind = click.IntRange(0) if one.none else one.kind
+        words += f" {one.more}" if one.shown == "method" else ""
+        found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=words))
+    return together(*found)
 
 
 def _sentence(one: Setting) -> str:
     return f"{one.summary[:1].upper()}{one.summary[1:]}"
 
 
-def _option(one: Setting) -> Option:
-    words = _sentence(one)
-    if one.none:
-        words += "; 0: no limit"
-    if one.kind is bool:
-        return click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=f"{words}.")
-    # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
-    kind = whole(0) if one.none else one.kind if one.kind is str else Number(one, checked=True)
-    more = f" {one.more}" if one.shown == "method" else ""
-    return click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=f"{words}.{more}")
-
-
 def jobs_option(what: str = "Tests") -> Option:
     words = f"{what} at the same time."
-    return click.option("--jobs", type=Number(JOBS), default=processor.usable_cores(), show_default=True, help=words)
+    return click.option(
+        "--jobs",
+        type=click.IntRange(1, int(JOBS.most or 1)),
+        default=processor.usable_cores(),
+        show_default=True,
+        help=words,
+    )
 
 
 # Where the tests of a run that is there are made from now on.

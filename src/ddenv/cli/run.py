@@ -1,4 +1,4 @@
-"""Commands that start an engine and follow it without a screen: `ddenv run`, and on a run `resume` and `certify`."""
+"""Commands that start engines and follow them without a screen: `ddenv run` and `study`, and on a run `resume` and `certify`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import click
 from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
+from ddenv.runs.folder import find_run, run_path
 from ddenv.settings import SETTINGS
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_world
@@ -91,7 +92,6 @@ def resume_command(
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like
-    from ddenv.runs.folder import find_run, run_path
     from ddenv.runs.programs import start_engine
     from ddenv.runs.trust import trusted_scenario
 
@@ -119,13 +119,13 @@ def resume_command(
 @options.run_argument
 @click.option(
     "--runs",
-    type=options.whole(1),
+    type=click.IntRange(1),
     metavar="N",
     help="Minimum number of runs of what is left; by default as many as the baseline has.",
 )
 @click.option(
     "--certify-rate",
-    type=options.Number(SETTINGS["certify_rate"]),
+    type=float,
     metavar="PART",
     help="Continue the last certificate, with all of its runs, until it shows that this share of the rate is kept.",
 )
@@ -139,6 +139,9 @@ def certify_command(
     from ddenv.runs.programs import start_engine
 
     path, state = idle_run(run, trust, cluster)
+    share = SETTINGS["certify_rate"]
+    if certify_rate is not None and not share.allows(certify_rate):
+        raise UserError(f"--certify-rate: expected {share.wanted}, found {certify_rate}")
     if state.baseline is None:
         raise UserError(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
@@ -150,12 +153,64 @@ def certify_command(
     return follow_to_summary(path, engine, as_json)[0]
 
 
+@click.command("study")
+@click.option(
+    "--scenarios",
+    multiple=True,
+    metavar="NAMES",
+    help="Bundled names or YAML files, separated by commas.  [default: ditch,rubble,friction]",
+)
+@click.option(
+    "--pairs",
+    default="paper",
+    show_default=True,
+    metavar="PAIRS",
+    help="Pairs separated by commas, 'paper' for its three, or 'all'.",
+)
+@click.option(
+    "--algorithms",
+    default="ddenv",
+    show_default=True,
+    metavar="NAMES",
+    help="Algorithms separated by commas, or 'all'.",
+)
+@click.option(
+    "--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Seeds per scenario and method."
+)
+@options.jobs_option()
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    type=Path,
+    default=Path("study"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder of the study; an existing study continues.",
+)
+@options.setting_options(without=("pair", "algorithm", "seed", "budget", "timeout", "cluster"))
+@options.trust_option
+def study_command(scenarios: tuple[str, ...], jobs: int, folder: Path, trust: bool, **given: Any) -> int:
+    """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
+
+    It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.
+    With --as-printed it follows the paper's algorithm to the letter, which needs many more tests.
+    """
+    from ddenv.runs.trust import check_named
+    from ddenv.study.conduct import conduct
+    from ddenv.study.plan import make_plan, scenario_names
+
+    plan = make_plan(scenarios, **given)
+    for scenario, name in zip(plan.scenarios, scenario_names(scenarios), strict=True):
+        check_named(scenario, name, asking(trust))
+    return conduct(plan, folder, jobs, sys.stdout)
+
+
 def idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState]:
     """The file and the state of a run that no engine works on, and that may start what it brings along. Raises UserError."""
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
     from ddenv.runs.trust import trusted_scenario
 
     path = find_run(run)

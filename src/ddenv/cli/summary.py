@@ -13,18 +13,7 @@ from ddenv.runfile.progress import Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
-from ddenv.words.claims import (
-    drift,
-    meaning,
-    means,
-    missing,
-    promise,
-    rate,
-    seen,
-    smaller_known,
-    verdict_on,
-    what_ran,
-)
+from ddenv.words.claims import drift, meaning, means, missing, promise, rate, seen, smaller_known, verdict_on, what_ran
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12
@@ -114,41 +103,36 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     before, after = len(state.elements), len(state.environment)
     if state.baseline is None:
         return [printable(f"run file: {path}")]
+    found = current(state)
+    helps = () if found is None else helping(found)
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
-        found = current(state)
-        helps = () if found is None else helping(found)
         what = f"environment, {f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
     more += f"; {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
     names = first_of(state.environment, MOST_NAMES)
+    # They say nothing about the failure.
+    broken = [test for test in state.tests if test.outcome in BROKEN]
     said = [
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
         *_certificate_lines(state),
         f"{state.tests_done} tests ({tests}; {count(state.deflake_runs, 're-run')}{more}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
         *([known] if (known := smaller_known(state)) else []),
-        *broken(state),
+        *([f"{count(len(broken), 'test')} broke; the last one: {broken[-1].failure}"] if broken else []),
         f"run file: {path}",
-        *_next(state, path),
     ]
+    if state.status == "finished" and found is not None:
+        out = f", and H in it leaves {helps[0]} out" if helps else ""
+        run, bundle = attach_name(path), shlex.quote(f"{path.stem}.zip")
+        passing = "" if state.isolated is not None else f"'ddenv isolate {run}' finds a nearest world that passes, "
+        said.append(
+            f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, {passing}"
+            f"'ddenv export {run} --bundle {bundle}' packs it for others"
+        )
     return [printable(line) for line in said]
-
-
-def _next(state: RunState, path: Path) -> list[str]:
-    """What can be done with a result that fresh runs speak of."""
-    found = current(state)
-    if state.status != "finished" or found is None:
-        return []
-    out = f", and H in it leaves {helps[0]} out" if (helps := helping(found)) else ""
-    run, bundle = attach_name(path), shlex.quote(f"{path.stem}.zip")
-    passing = "" if state.isolated is not None else f"'ddenv isolate {run}' finds a nearest world that passes, "
-    return [
-        f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, {passing}"
-        f"'ddenv export {run} --bundle {bundle}' packs it for others"
-    ]
 
 
 def _certificate_lines(state: RunState) -> list[str]:
@@ -169,9 +153,3 @@ def _certificate_lines(state: RunState) -> list[str]:
     if (whole := _whole_world(state)) is not None:
         lines.append(f"  the whole world: {rate(whole)}")
     return [*lines, promise(state, found)] if state.certified else lines
-
-
-def broken(state: RunState) -> list[str]:
-    """Why the last broken test broke, if any did: broken tests say nothing about the failure."""
-    tests = [test for test in state.tests if test.outcome in BROKEN]
-    return [f"{count(len(tests), 'test')} broke; the last one: {tests[-1].failure}"] if tests else []

@@ -32,15 +32,15 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
 @click.option(
-    "--test", type=options.whole(1), metavar="NUMBER", help="Use the models and the seed of this test of the run."
+    "--test", type=click.IntRange(1), metavar="NUMBER", help="Use the models and the seed of this test of the run."
 )
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
 @click.option(
     "--margin", multiple=True, metavar="NUMBER[=VALUE]", help="Change a number, as 'ddenv export --margin' does."
 )
-@click.option("--seed", type=options.whole(0, 2**31), help="Seed of the first run; the next ones count up from it.")
-@click.option("--repeat", type=options.whole(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
+@click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up from it.")
+@click.option("--repeat", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
 @click.option(
     "--simulator", type=Path, metavar="FILE", help="Run in this simulator: a YAML file with its name and its command."
 )
@@ -52,6 +52,7 @@ def test_command(
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
     from ddenv.engine.single_test import plan, run_trials
+    from ddenv.evidence.claims import current
     from ddenv.runs.export import with_margins
 
     planned, margins = {name: given.pop(name) for name in PLANNED}, given.pop("margin")
@@ -64,7 +65,11 @@ def test_command(
             if not as_json:
                 print(line(result), flush=True)
     rows = summary(results)
-    others = _elsewhere(what, results) if planned["minimal"] and simulator is not None else []
+    certificate, oracle = None if what.state is None else current(what.state), what.scenario.oracle
+    others = []
+    # Without a certificate there is nothing to compare with.
+    if planned["minimal"] and simulator is not None and certificate and oracle and certificate.claims[0].low:
+        others = elsewhere(results, certificate.claims[0], oracle.name or "this simulator")
     if as_json:
         print(json.dumps({"runs": results, "summary": rows, "elsewhere": others}))
     elif len(results) > 1:
@@ -140,16 +145,6 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
         broke = sum(row["outcomes"].values()) - row["runs"]
         found.append(printable(words + (f"; {count(broke, 'more run')} broke" if broke else "")))
     return found
-
-
-def _elsewhere(what: Subject, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What the runs show of another simulator; [] without a certificate that it can be compared with."""
-    from ddenv.evidence.claims import current
-
-    certificate, oracle = None if what.state is None else current(what.state), what.scenario.oracle
-    if certificate is None or oracle is None or not certificate.claims[0].low:
-        return []
-    return elsewhere(results, certificate.claims[0], oracle.name or "this simulator")
 
 
 def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ import click
 from ddenv.cli.options import Numbers, reading_options, remembered_option, scenarios, together
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
-from ddenv.runs.folder import find_run
+from ddenv.runs.folder import find_run, named_file
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_directives
 
@@ -47,7 +47,6 @@ def world_command() -> None:
 
 def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
-    from ddenv.runs.folder import named_file
     from ddenv.runs.remedies import with_remembered
     from ddenv.runs.subject import reading_of
     from ddenv.world.load import load_scenario
@@ -79,40 +78,40 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 
 def world_report(world: World) -> dict[str, Any]:
     """Everything of the table and more; lengths in m, angles in rad."""
+    from ddenv.world.extent import model_bounds
     from ddenv.world.placement import inside
     from ddenv.world.sdf.official import refused
 
-    removable = frozenset(world.elements())
+    removable, models = frozenset(world.elements()), []
+    for model in world.models:
+        box = model_bounds(model)
+        links = [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links]
+        models.append(
+            {
+                "name": model.name,
+                "kind": _kind(model),
+                "removable": model.name in removable,
+                "line": model.line,
+                "pose": [*model.pose.position, *model.pose.quaternion],
+                "links": links,
+                "joints": [{"name": joint.name, "kind": joint.kind} for joint in model.joints],
+                "shapes": dict(_shapes(model)),
+                "low": None if box is None else box[0].tolist(),
+                "high": None if box is None else box[1].tolist(),
+                "friction": sorted({collision.mu for collision in model.collisions}),
+                "mass": sum(link.inertia.mass for link in model.links if link.inertia is not None) or None,
+                "notes": _notes(world, model.name),
+            }
+        )
     return {
         "file": str(world.path),
         "version": world.version,
         "world": world.name,
         "gravity": list(world.gravity),
-        "models": [_described(model, world, removable) for model in world.models],
+        "models": models,
         "notes": _notes(world, ""),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
-    }
-
-
-def _described(model: Model, world: World, removable: frozenset[str]) -> dict[str, Any]:
-    from ddenv.world.extent import model_bounds
-
-    box = model_bounds(model)
-    return {
-        "name": model.name,
-        "kind": _kind(model),
-        "removable": model.name in removable,
-        "line": model.line,
-        "pose": [*model.pose.position, *model.pose.quaternion],
-        "links": [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links],
-        "joints": [{"name": joint.name, "kind": joint.kind} for joint in model.joints],
-        "shapes": dict(_shapes(model)),
-        "low": None if box is None else box[0].tolist(),
-        "high": None if box is None else box[1].tolist(),
-        "friction": sorted({collision.mu for collision in model.collisions}),
-        "mass": sum(link.inertia.mass for link in model.links if link.inertia is not None) or None,
-        "notes": _notes(world, model.name),
     }
 
 
@@ -141,69 +140,65 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
 
     No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
+    from ddenv.world.placement import note_inside
+    from ddenv.world.sdf.official import refused
+
     numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
     by_model: dict[str, dict[str, None]] = {}
     for note in sorted(world.notes, key=lambda note: numbers[_text(note)]):
         detail = printable(note.detail.removesuffix(" away"))
         words = f"{numbers[_text(note)]} ({detail})" if detail else str(numbers[_text(note)])
         by_model.setdefault(note.model, {})[words] = None
-    table = _table((_row(model, ", ".join(by_model.get(model.name, ()))) for model in world.models), columns)
     notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
     below = ["", "notes", *notes] if notes else []
-    wrong = [line for words in (*_inside(world), *_refused(world)) for line in wrapped(words, columns)]
-    gravity = " ".join(f"{part:g}" for part in world.gravity)
-    what = world.version if is_directives(world.path) else f"SDF {world.version}"
-    title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
-    return [*wrapped(title, columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
-
-
-def _refused(world: World) -> list[str]:
-    """A line for each reason for which the official checker would refuse the file."""
-    from ddenv.world.sdf.official import refused
-
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
         places.setdefault(why, []).append(place)
-    times = {why: f", and {len(at) - 1} more" if len(at) > 1 else "" for why, at in places.items()}
+    wrong = [words for _, words in note_inside(world)]
+    for why, at in places.items():
+        more = f", and {len(at) - 1} more" if len(at) > 1 else ""
+        wrong.append(printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{more}"))
+    gravity = " ".join(f"{part:g}" for part in world.gravity)
+    what = world.version if is_directives(world.path) else f"SDF {world.version}"
+    title = printable(f"{world.path}: {what}, world '{world.name}', gravity {gravity} m/s^2")
     return [
-        printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{times[why]}") for why, at in places.items()
+        *wrapped(title, columns),
+        "",
+        *_table(world, by_model, columns),
+        *below,
+        "",
+        *(line for words in (_totals(world), *wrong) for line in wrapped(words, columns)),
     ]
-
-
-def _inside(world: World) -> list[str]:
-    from ddenv.world.placement import note_inside
-
-    return [words for _, words in note_inside(world)]
 
 
 def _text(note: Note) -> str:
     return printable(f"{note.kind}: {note.what} {note.why}")
 
 
-def _row(model: Model, notes: str) -> tuple[str, ...]:
-    """A cell for each of HEADER."""
-    from ddenv.world.extent import center, model_bounds
-
-    box = model_bounds(model)
-    return (
-        shortened(model.name, LONGEST_NAME),
-        _kind(model),
-        str(len(model.links)),
-        ", ".join(f"{number} {shape}" for shape, number in _shapes(model).items()) or "none",
-        "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0]),
-        ", ".join(f"{part:.2f}" for part in center(model)),
-        f"{model.links[0].pose.yaw():.2f}",
-        notes,
-    )
-
-
-def _table(rows: Iterable[tuple[str, ...]], columns: int | None) -> list[str]:
+def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None) -> list[str]:
+    """A line for each model, with the cells of HEADER; `notes` are the last of them."""
     from rich.console import Console
     from rich.measure import Measurement
     from rich.table import Table
     from rich.text import Text
 
-    found, titles, console = list(rows), list(HEADER), Console(width=columns or WIDEST, color_system=None)
+    from ddenv.world.extent import center, model_bounds
+
+    found = []
+    for model in world.models:
+        box = model_bounds(model)
+        cells = (
+            shortened(model.name, LONGEST_NAME),
+            _kind(model),
+            str(len(model.links)),
+            ", ".join(f"{number} {shape}" for shape, number in _shapes(model).items()) or "none",
+            "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0]),
+            ", ".join(f"{part:.2f}" for part in center(model)),
+            f"{model.links[0].pose.yaw():.2f}",
+            ", ".join(notes.get(model.name, ())),
+        )
+        found.append(cells)
+    titles, console = list(HEADER), Console(width=columns or WIDEST, color_system=None)
     for spare in (*SPARE, ""):
         table = Table(box=None, pad_edge=False, header_style="")
         for title in titles:

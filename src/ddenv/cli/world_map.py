@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from ddenv.map.cells import picture, signs
 from ddenv.map.colors import PLAIN
 from ddenv.map.drawing import tick_step, tick_text, ticks
-from ddenv.map.footprints import Drawn, plan
+from ddenv.map.footprints import plan
 from ddenv.map.paint import Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
 from ddenv.text import count, padded, shortened, width
@@ -52,14 +52,23 @@ def terminal_map(
     low, high = extent([each.outline for each in models], [point[:2] for point in (spawn, goal) if point is not None])
     margin = np.maximum(0.3, 0.03 * (high - low))
     low, high = low - margin, high + margin
-    entries = [entry for entry in _entries(models) if entry[1] not in dim]
+    entries = []
+    for sign, each in sorted(zip(signs(models), models, strict=True), key=lambda each: -each[1].outline.area):
+        (x, y, _), size = each.center, " x ".join(f"{part:.2f}" for part in each.size)
+        if each.model.name not in dim:
+            size = size if each.outline.polygons else "no shapes"
+            entries.append((sign, each.model.name, f"{x:.2f}, {y:.2f}", size))
     legend = _legend(entries, columns, max(3, rows // 3))
     view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))
-    axes = _axes(view)
     canvas = picture(models, view, color=color, dim=dim)
-    _marks(canvas, view, spawn, goal, color)
-    title = shortened(_title(world, models, spawn, goal), columns)
-    return "\n".join([title, *_framed(canvas, view, *axes, color), *legend])
+    title = [world.path.name, count(len(models), "model")]
+    if spawn is not None:
+        title.append(f"S start ({spawn[0]:g}, {spawn[1]:g}), yaw {spawn[2]:g}")
+        canvas.put(view.cell(*spawn[:2]), f"S{arrow(spawn[2])}", *((WHITE, START) if color else (PLAIN, None)))
+    if goal is not None:
+        title.append(f"G goal ({goal[0]:g}, {goal[1]:g})")
+        canvas.put(view.cell(*goal), "G", *((WHITE, GOAL) if color else (PLAIN, None)))
+    return "\n".join([shortened(" · ".join(title), columns), *_framed(canvas, view, color), *legend])
 
 
 def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
@@ -71,28 +80,7 @@ def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
     return View(x, y, scale, min(columns, max(2 * NUMBERS, needs)), min(rows, max(3, need_rows)))
 
 
-def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Point | None) -> str:
-    words = [world.path.name, count(len(models), "model")]
-    if spawn is not None:
-        words.append(f"S start ({spawn[0]:g}, {spawn[1]:g}), yaw {spawn[2]:g}")
-    if goal is not None:
-        words.append(f"G goal ({goal[0]:g}, {goal[1]:g})")
-    return " · ".join(words)
-
-
 # The legend.
-
-
-def _entries(models: Sequence[Drawn]) -> list[Entry]:
-    letters = signs(models)
-    order = sorted(range(len(models)), key=lambda index: -models[index].outline.area)
-    return [(letters[index], models[index].model.name, *_numbers(models[index])) for index in order]
-
-
-def _numbers(each: Drawn) -> tuple[str, str]:
-    (x, y, _), size = each.center, each.size
-    words = " x ".join(f"{part:.2f}" for part in size) if each.outline.polygons else "no shapes"
-    return f"{x:.2f}, {y:.2f}", words
 
 
 def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
@@ -118,49 +106,35 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
     return f"{left}{GAP}{center:>{widths[2]}}{GAP}{size:>{widths[3]}}"
 
 
-# Axes and marks.
+# The frame.
 
 
-def _axes(view: View) -> tuple[dict[int, str], dict[int, str]]:
+def _framed(canvas: Canvas, view: View, color: bool) -> Iterator[str]:
+    """The lines of the picture with its frame and its axes; all are equally wide."""
     wide, high = view.columns * view.scale / 2, view.rows * view.scale
     x_step, y_step = tick_step(2 * wide, max(1, view.columns // 8)), tick_step(2 * high, max(1, view.rows // 4))
-    across = {view.cell(x, view.y): tick_text(x, x_step) for x in ticks(view.x - wide, view.x + wide, x_step)}
-    down = {view.cell(view.x, y): tick_text(y, y_step) for y in ticks(view.y - high, view.y + high, y_step)}
-    return {cell[1]: text for cell, text in across.items() if cell}, {
-        cell[0]: text for cell, text in down.items() if cell
-    }
-
-
-def _marks(canvas: Canvas, view: View, spawn: Pose | None, goal: Point | None, color: bool) -> None:
-    signs: list[tuple[Pose | Point, str, int]] = [] if spawn is None else [(spawn, f"S{arrow(spawn[2])}", START)]
-    signs += [] if goal is None else [(goal, "G", GOAL)]
-    for point, sign, back in signs:
-        canvas.put(view.cell(*point[:2]), sign, WHITE if color else PLAIN, back if color else None)
-
-
-def _framed(
-    canvas: Canvas, view: View, across: Mapping[int, str], down: Mapping[int, str], color: bool
-) -> Iterator[str]:
-    """The lines of the picture with its frame; all are equally wide."""
+    across, down = dict[int, str](), dict[int, str]()
+    for x in ticks(view.x - wide, view.x + wide, x_step):
+        if cell := view.cell(x, view.y):
+            across[cell[1]] = tick_text(x, x_step)
+    for y in ticks(view.y - high, view.y + high, y_step):
+        if cell := view.cell(view.x, y):
+            down[cell[0]] = tick_text(y, y_step)
     yield f"{'y, m':>{NUMBERS}}┌{'─' * view.columns}┐"
     for row in range(view.rows):
         number, corner = (down[row], "┤") if row in down else ("", "│")
         cells = "".join(map(_escaped, canvas.runs(row))) if color else canvas.text(row)
         yield f"{number[:NUMBERS]:>{NUMBERS}}{corner}{cells}│"
     yield f"{'':>{NUMBERS}}└{''.join('┬' if column in across else '─' for column in range(view.columns))}┘"
-    yield _under(across, view.columns)
-
-
-def _under(across: Mapping[int, str], columns: int) -> str:
-    """The numbers along x, each below its place."""
-    full = columns + AXIS
+    # The numbers along x, each below its place.
+    full = view.columns + AXIS
     line = [" "] * full
     for column, text in across.items():
         start = NUMBERS + 1 + column - len(text) // 2
         if start + len(text) < full - 4:
             line[start : start + len(text)] = text
     line[-4:] = "x, m"
-    return "".join(line)
+    yield "".join(line)
 
 
 def _escaped(run: Run) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.words.claims import of_all_parts
@@ -77,7 +76,13 @@ def read_oracle(path: Path) -> Oracle:
         outcomes = {frozenset(key.split()): str(value) for key, value in data["outcomes"].items()}
         otherwise = str(data["otherwise"])
         rates = {frozenset(key.split()): float(value) for key, value in data.get("rates", {}).items()}
-        rounds = {str(name): tuple(map(_round, each)) for name, each in data.get("plays", {}).items()}
+        rounds = {
+            str(name): tuple(
+                RecordedRound(tuple(tuple(part.split()) for part in one["parts"]), tuple(map(str, one["tested"])))
+                for one in each
+            )
+            for name, each in data.get("plays", {}).items()
+        }
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise UserError(f"{path}: not an oracle; expected models, outcomes and otherwise") from None
     if len(models) > MOST_MODELS or len(set(models)) != len(models):
@@ -89,10 +94,6 @@ def read_oracle(path: Path) -> Oracle:
     if not frozenset().union(*outcomes, *rates).issubset(models):
         raise UserError(f"{path}: outcomes: a set names a model that is not listed")
     return Oracle(models, outcomes, otherwise, rates, rounds)
-
-
-def _round(data: Any) -> RecordedRound:
-    return RecordedRound(tuple(tuple(part.split()) for part in data["parts"]), tuple(map(str, data["tested"])))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ SAID = {
 # Candidates of a round to choose from, and models of a candidate that are named there.
 MOST, FEW = 6, 3
 # Why something came about, as questions and answers.
-REASONS = Path(__file__).with_name("reasons.yaml")
+REASONS: dict[str, dict[str, Any]] = yaml.safe_load(Path(__file__).with_name("reasons.yaml").read_text())
 # By the setting `growth`, what n does.
 _GROWTH = {
     "paper": "After each round n grows by one, but never above the number of models.",
@@ -76,17 +75,17 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     until = next((each.id for each in ended if each.data["test"] == number), None)
     if test.outcome not in SAID or candidate is None or until is None:
         return None
-    answers = tuple(Answer(words, outcome == test.outcome, _seen(test)) for outcome, words in SAID.items())
-    what = f"Test {number} runs {_what(candidate)}. How does it end?"
+    seen = "The robot reached the goal."
+    if test.outcome != "pass":
+        away = "" if test.distance is None else f" {test.distance:.1f} m from f's end"
+        seen = f"The robot {deed(test.failure)}{away}: {'that is f' if test.outcome == 'similar' else 'that is not f'}."
+    answers = tuple(Answer(words, outcome == test.outcome, seen) for outcome, words in SAID.items())
+    label = f"{candidate.label} alone" if candidate.kind == "partition" else f"E {candidate.label}"
+    what = f"Test {number} runs {label}: {_named(candidate.models)}. How does it end?"
     runs = [position.end.tests[id - 1] for id in {*candidate.tests, number} if id <= number]
     missed = len(runs) if all(each.outcome in ("pass", "other") for each in runs) else 1
     reason = _why_ended(test, candidate, settings(moment.after), missed)
     return Foretelling(Question(what, answers, _hint(candidate)), until, reason, test.outcome)
-
-
-def _what(candidate: Candidate) -> str:
-    what = f"{candidate.label} alone" if candidate.kind == "partition" else f"E {candidate.label}"
-    return f"{what}: {_named(candidate.models)}"
 
 
 def _named(models: tuple[str, ...]) -> str:
@@ -101,13 +100,6 @@ def _hint(candidate: Candidate) -> str:
         others = tuple(name for name in candidate.split.environment if name not in part)
         return f"Only the models of the part are there. Everything else is gone: {_named(others)}."
     return f"Everything of E is there except {_named(part)}."
-
-
-def _seen(test: Test) -> str:
-    if test.outcome == "pass":
-        return "The robot reached the goal."
-    away = "" if test.distance is None else f" {test.distance:.1f} m from f's end"
-    return f"The robot {deed(test.failure)}{away}: {'that is f' if test.outcome == 'similar' else 'that is not f'}."
 
 
 # Who wins a round.
@@ -151,7 +143,9 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         "The first candidate that has everything f needs wins. 'part A' is A alone, 'without A' is all the rest.",
     )
     if round.winner is None:
-        kind = "last" if _is_last(round) else "none"
+        # The round that leaves out each model alone is the last one without f.
+        alone = {one.partition for one in round.candidates if one.kind == "complement"}
+        kind = "last" if len(alone) == len(round.partitions) == len(round.environment) else "none"
         return Foretelling(question, chapter.last, _reason(kind, round.number), kind)
     before = "Those before it probably lack something." if round.winner else "It was the first one to be tried."
     reason = _reason("won", round.number, candidate=_name(round.candidates[round.winner]), before=before)
@@ -169,7 +163,6 @@ def _candidate_answer(one: Candidate, round: Round) -> Answer:
 
 
 def _name(one: Candidate) -> str:
-    """Its label at the beginning of a sentence."""
     return one.label[:1].upper() + one.label[1:]
 
 
@@ -224,32 +217,17 @@ def _why_ended(test: Test, candidate: Candidate, options: Settings, missed: int)
     """What the outcome of a candidate's test means, the last one of so many that `missed` f."""
     if test.outcome == "pass" and options.most_runs == 1 and options.accept_rate != "kept":
         return _reason("only pass", test.id)
+    gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
+    goes = f"f shows without {gone}: they can go."
+    if options.accept_rate == "kept":
+        goes = f"f can show without {gone}. More runs will tell whether it shows often enough."
+    elif options.most_runs > 1:
+        goes = f"f showed without {gone}. Here the first run with f decides, so they go."
     # Of a single model nobody would be wrong to call it the smallest world.
     most = 2 if test.outcome == "similar" and candidate.size == 1 else None
     often = f"All {missed} runs missed f. That makes it likely, but it proves nothing."
     luck = often if missed > 1 else "It may have been bad luck: one test proves little."
-    return _reason(test.outcome, test.id, most, goes=_goes(candidate, options), luck=luck)
-
-
-def _goes(candidate: Candidate, options: Settings) -> str:
-    """What f without some models says of these."""
-    gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
-    if options.accept_rate == "kept":
-        return f"f can show without {gone}. More runs will tell whether it shows often enough."
-    if options.most_runs > 1:
-        return f"f showed without {gone}. Here the first run with f decides, so they go."
-    return f"f shows without {gone}: they can go."
-
-
-def _is_last(round: Round) -> bool:
-    """Whether the round leaves out each model alone: without f it is the last one."""
-    alone = {one.partition for one in round.candidates if one.kind == "complement"}
-    return len(alone) == len(round.partitions) == len(round.environment)
-
-
-@cache
-def _reasons() -> dict[str, dict[str, Any]]:
-    return dict(yaml.safe_load(REASONS.read_text()))
+    return _reason(test.outcome, test.id, most, goes=goes, luck=luck)
 
 
 def _reason(name: str, turn: int, most: int | None = None, **words: str) -> Question:
@@ -257,7 +235,7 @@ def _reason(name: str, turn: int, most: int | None = None, **words: str) -> Ques
 
     Each `turn` begins with another answer: the right one has no place of its own.
     """
-    asked = _reasons()[name]
+    asked = REASONS[name]
     answers = [
         Answer(each["say"], each.get("right", False), each["why"].format(**words), each.get("misconception", ""))
         for each in asked["answers"][:most]

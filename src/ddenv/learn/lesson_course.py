@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -222,7 +221,9 @@ class Course:
             return
         here = self._steps[step]
         if here.question is not None:
-            self._asked = Asked(str(step), _filled(here.question, self._said))
+            asked, said = here.question, self._said
+            answers = tuple(replace(each, text=said(each.text), why=said(each.why)) for each in asked.answers)
+            self._asked = Asked(str(step), Question(said(asked.text), answers, said(asked.hint)))
         elif (found := self._opened.foretold[step]) is not None:
             self._asked = Asked(str(step), found.question, found.until, found.reason)
         elif here.race:
@@ -304,9 +305,3 @@ class Course:
                     self._own = self._own or before
                 return True
         return False
-
-
-def _filled(question: Question, said: Callable[[str], str]) -> Question:
-    """The question with its figures; `said` fills them in."""
-    answers = tuple(replace(each, text=said(each.text), why=said(each.why)) for each in question.answers)
-    return Question(said(question.text), answers, said(question.hint))

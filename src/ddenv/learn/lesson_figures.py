@@ -32,14 +32,6 @@ _FIGURE = re.compile(r"\{([^{}]*)\}")
 _NAMED = 8
 
 
-def _left_percent(state: RunState) -> str:
-    return f"{100 - round(100 * len(state.environment) / max(1, len(state.elements)))} %"
-
-
-def _search_tests(state: RunState) -> int:
-    return sum(test.phase == "round" and test.is_finished for test in state.tests)
-
-
 def _certificate(state: RunState) -> Certificate | None:
     """The last finished certificate, also one of an environment that the run has left since."""
     return next((each for each in reversed(state.certificates) if each.claims), None)
@@ -84,16 +76,10 @@ def _bound(state: RunState, without: str | None = None) -> str:
 
 
 def _left(state: RunState) -> str:
-    """How often f showed in its runs of what is left, by now."""
     now = _now(state)
     runs = [test for test in state.confirm_tests if test.run >= now.first_run and test.without is None]
     ended = [test.outcome for test in runs if test.node == now.node and test.is_finished]
     return claims.of_runs(ended.count("similar"), len(ended))
-
-
-def _error(state: RunState) -> str:
-    found = _certificate(state)
-    return "" if found is None else f"{math.ceil(1000 * found.error) / 10:g} %"
 
 
 def _of_baseline(state: RunState, name: str) -> str:
@@ -104,24 +90,14 @@ def _first_slice(state: RunState) -> Node | None:
     return next((node for node in state.nodes if node.how == "sliced"), None)
 
 
-def _sliced(state: RunState) -> int:
-    node = _first_slice(state)
-    return len(state.elements if node is None else node.environment)
-
-
-def _slice(state: RunState) -> str:
-    node = _first_slice(state)
-    return "nothing was removed without testing" if node is None else slice_words(state, node)
-
-
 # Over the whole run, from its end.
 OF_RUN: dict[str, Callable[[RunState], object]] = {
     "models": lambda state: len(state.elements),
     "left": lambda state: len(state.environment),
-    "smaller": _left_percent,
+    "smaller": lambda state: f"{100 - round(100 * len(state.environment) / max(1, len(state.elements)))} %",
     "kept": lambda state: first_of(list(state.environment), _NAMED),
     "tests": lambda state: state.tests_done,
-    "search_tests": _search_tests,
+    "search_tests": lambda state: sum(test.phase == "round" and test.is_finished for test in state.tests),
     "fresh_tests": lambda state: sum(test.phase == "certify" for test in state.tests),
     "reruns": lambda state: state.deflake_runs,
     "rounds": lambda state: state.rounds_done,
@@ -142,10 +118,14 @@ OF_RUN: dict[str, Callable[[RunState], object]] = {
     "certificates": lambda state: sum(bool(each.claims) for each in state.certificates),
     "fresh": _fresh,
     "fresh_whole": _fresh_whole,
-    "error": _error,
+    "error": lambda state: (
+        f"{math.ceil(1000 * found.error) / 10:g} %" if (found := _certificate(state)) is not None else ""
+    ),
     "reason": lambda state: f"{state.reason[:1].upper()}{state.reason[1:]}",
-    "sliced": _sliced,
-    "slice": _slice,
+    "sliced": lambda state: len(state.elements if (node := _first_slice(state)) is None else node.environment),
+    "slice": lambda state: (
+        "nothing was removed without testing" if (node := _first_slice(state)) is None else slice_words(state, node)
+    ),
     "audit": lambda state: settings(state).audit,
     "subsets": lambda state: f"{2 ** len(state.elements):,}" if len(state.elements) < 30 else "countless",
 }
@@ -179,10 +159,7 @@ TRUE_RATES = ("whole_rate", "here_rate", "end_rate")
 _ABOUT_CLAIM = re.compile(r"(without|verdict on|here_bound without) (\S.*)")
 _BESIDE = re.compile(r"([\w-]+)\.(.+)")
 _OF_SET = re.compile(r"(rate|chance) of (\S.*)")
-
-
-def names() -> tuple[str, ...]:
-    return (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
+NAMES = (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
 
 
 def check(text: str) -> None:
@@ -190,8 +167,8 @@ def check(text: str) -> None:
     for name in _FIGURE.findall(text):
         other, bare = _parts(name)
         about = _ABOUT_CLAIM.fullmatch(bare) or _OF_SET.fullmatch(name)
-        if bare not in (OF_RUN if other else names()) and not about:
-            meant = nearest(name, names()) or f"; known figures are {', '.join(names())}"
+        if bare not in (OF_RUN if other else NAMES) and not about:
+            meant = nearest(name, NAMES) or f"; known figures are {', '.join(NAMES)}"
             raise UserError(f"unknown figure '{{{name}}}'{meant}")
     bare = _FIGURE.sub("", text)
     for term in TERMS:
@@ -239,7 +216,10 @@ class Figures:
         if about := _ABOUT_CLAIM.fullmatch(bare):
             if about[1] == "here_bound without":
                 return _bound(self.here, about[2])
-            claim = _claim(end, about[2])
+            made = _certificate(end)
+            claim = next((one for one in made.claims if one.without == about[2]), None) if made else None
+            if claim is None:
+                raise UserError(f"{{without {about[2]}}}: the last certificate says nothing about '{about[2]}'")
             return claims.rate(claim) if about[1] == "without" else claims.short(claim)
         if self.oracle is None:
             raise UserError(f"{{{name}}} needs an oracle; give the key 'oracle'")
@@ -250,11 +230,3 @@ class Figures:
             rate = self.oracle.rate(of_set[2].split(", "))
             return percent(rate if of_set[1] == "rate" else 1 - miss_chance(rate, settings(self.end).iterations))
         return str(OF_ORACLE[bare](self.oracle))
-
-
-def _claim(state: RunState, model: str) -> Claim:
-    certificate = _certificate(state)
-    found = next((each for each in certificate.claims if each.without == model), None) if certificate else None
-    if found is None:
-        raise UserError(f"{{without {model}}}: the last certificate says nothing about '{model}'")
-    return found

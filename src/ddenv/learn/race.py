@@ -78,7 +78,9 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
         if sorted(model for part in round.parts for model in part) != sorted(environment) or not round.tested:
             raise UserError(f"plays: {name}: round {number}: its parts do not make up the models that were left")
         split = Split(environment, round.parts)
-        candidates = {one.label: one for one in _candidates(split)}
+        kinds = (("partition", 0), ("complement", 1))
+        made = (Candidate(2 * at + odd, kind, at, split) for at in range(len(split.partitions)) for kind, odd in kinds)
+        candidates = {one.label: one for one in made}
         for label in round.tested:
             if label not in candidates or (turns and turns[-1].round == number and turns[-1].outcome == "similar"):
                 raise UserError(f"plays: {name}: round {number}: {label!r} cannot be tested there")
@@ -91,25 +93,18 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
     return Play(name, oracle.models, tuple(turns))
 
 
-def _candidates(split: Split) -> Iterator[Candidate]:
-    for place in range(len(split.partitions)):
-        for kind in ("partition", "complement"):
-            yield Candidate(2 * place + (kind == "complement"), kind, place, split)
-
-
 # From run files.
 
 
 def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
     """The searches of these runs, which must be of one world. Raises UserError."""
-    found, world = list[Play](), None
+    found, worlds = list[Play](), list[tuple[bytes, set[str]]]()
     for run in runs:
         with RunFile(run) as file:
-            play, here = _play_of_run(run, file.events()), file.document("world")
-        if world is not None and (here, set(play.begins)) != world:
+            found.append(_play_of_run(run, file.events()))
+            worlds.append((file.document("world"), set(found[-1].begins)))
+        if worlds[-1] != worlds[0]:
             raise UserError(f"{run}: its world is not that of {runs[0]}; a race needs runs of one world")
-        world = world or (here, set(play.begins))
-        found.append(play)
     names = [play.name for play in found]
     if len(set(names)) < len(names):
         raise UserError(f"a race needs different runs, found {', '.join(names)}")
@@ -123,8 +118,7 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
         event = recorded.event
         if isinstance(event, TestStarted):
             test = state.tests[event.test - 1]
-            candidate = made_for(state, test)
-            if candidate is not None:
+            if (candidate := made_for(state, test)) is not None:
                 begun[test.id] = candidate, test.run > 0
         elif isinstance(event, TestFinished) and event.test in begun:
             test, (candidate, again) = state.tests[event.test - 1], begun[event.test]
@@ -135,14 +129,10 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
         raise UserError(f"{run}: has no search tests yet")
     # While fresh runs certify its end, no test of the search is left.
     ended = state.status == "finished" or state.confirming
-    return Play(run.stem, state.elements, tuple(turns), ended, _method(state))
-
-
-def _method(state: RunState) -> str:
-    """The algorithm, with the parts of the pair that it uses."""
     chosen = settings(state)
     parts = dict(zip(BOTH, chosen.pair.partition("/")[::2], strict=True))
-    return f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
+    method = f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
+    return Play(run.stem, state.elements, tuple(turns), ended, method)
 
 
 def spent(play: Play, tests: int | None = None) -> dict[str, int]:
@@ -248,15 +238,11 @@ def bet(plays: Sequence[Play]) -> Question:
     best = [play.name for play in plays if play.tests == fewest]
     tie = len(best) > 1
     answers = [
-        Answer(play.name, not tie and play.name == best[0], f"{play.name} needs {count(play.tests, 'test')}.")
-        for play in plays
+        Answer(play.name, best == [play.name], f"{play.name} needs {count(play.tests, 'test')}.") for play in plays
     ]
     answers.append(Answer("a tie", tie, f"{_and(best)} {'need' if tie else 'needs'} the fewest."))
-    return Question(
-        "Which of them needs the fewest tests?",
-        tuple(answers),
-        "What does each know about the world before its first test?",
-    )
+    hint = "What does each know about the world before its first test?"
+    return Question("Which of them needs the fewest tests?", tuple(answers), hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,6 +287,5 @@ def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> 
     if not done:
         return f"{found}; without prior knowledge it takes at least {least}."
     quicker = [play.name for play in done if play.tests < len(attempt.tried)]
-    if not quicker:
-        return f"{found}, and no algorithm needed fewer: {others}."
-    return f"{found}; {first_of(quicker, NAMED)} needed fewer: {others}."
+    what = f"; {first_of(quicker, NAMED)} needed fewer" if quicker else ", and no algorithm needed fewer"
+    return f"{found}{what}: {others}."

@@ -69,7 +69,7 @@ def read_lesson(file: Path, places: Callable[[Path], Find]) -> Lesson:
         run,
         oracle,
         tuple(_step(each, found, oracle is not None) for each in top["steps"].entries()),
-        {name: _beside(node) for name, node in top["beside"].named()} if "beside" in top else {},
+        _others(top["beside"]) if "beside" in top else {},
     )
 
 
@@ -121,11 +121,6 @@ class _Node:
             raise self.wrong("expected a list with at least one entry")
         return [_Node(self.file, each, f"{self.key}[{place}]") for place, each in enumerate(self.node.value, 1)]
 
-    def named(self) -> list[tuple[str, _Node]]:
-        if not isinstance(self.node, yaml.MappingNode):
-            raise self.wrong("expected names, each with a file")
-        return [(str(key.value), _Node(self.file, value, f"{self.key}.{key.value}")) for key, value in self.node.value]
-
     def raw(self) -> str:
         if not isinstance(self.node, yaml.ScalarNode) or not self.node.value.strip():
             raise self.wrong("expected a text")
@@ -141,12 +136,6 @@ class _Node:
         if not text.isascii() or not text.isdigit() or not 0 < int(text[:9]) <= 600:
             raise self.wrong(f"expected a number from 1 to 600, found {text[:20]!r}")
         return int(text)
-
-    def flag(self) -> bool:
-        text = self.raw().lower()
-        if text not in ("true", "false"):
-            raise self.wrong(f"expected true or false, found {text[:20]!r}")
-        return text == "true"
 
     def one_of(self, known: tuple[str, ...]) -> str:
         text = self.raw()
@@ -164,6 +153,12 @@ def _beside(node: _Node) -> Path:
     if not path.is_file():
         raise node.wrong(f"there is no file {name[:60]!r} beside the lesson")
     return path
+
+
+def _others(node: _Node) -> dict[str, Path]:
+    if not isinstance(node.node, yaml.MappingNode):
+        raise node.wrong("expected names, each with a file")
+    return {str(key.value): _beside(_Node(node.file, value, f"beside.{key.value}")) for key, value in node.node.value}
 
 
 def _step(node: _Node, find: Find, has_oracle: bool) -> Step:
@@ -221,7 +216,9 @@ def _question(node: _Node, keys: dict[str, _Node]) -> Question:
 
 def _answer(node: _Node) -> Answer:
     keys = node.keys(_ANSWER, "say", "why")
-    right = keys["right"].flag() if "right" in keys else False
+    right = "right" in keys and keys["right"].raw().lower() == "true"
+    if "right" in keys and keys["right"].raw().lower() not in ("true", "false"):
+        raise keys["right"].wrong(f"expected true or false, found {keys['right'].raw()[:20]!r}")
     belief = keys["misconception"].one_of(tuple(MISCONCEPTIONS)) if "misconception" in keys else ""
     if right and belief:
         raise keys["misconception"].wrong("the right answer has none")

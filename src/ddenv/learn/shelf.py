@@ -112,7 +112,11 @@ def open_lesson(file: Path) -> Opened:
     if oracle is not None and searches and frozenset(oracle.models) not in oracle.showing:
         raise UserError(f"{lesson.oracle}: f does not show with all models, so there is nothing to search")
     plays = {} if oracle is None else _plays(lesson, oracle)
-    made = Opened(lesson, opened[0], oracle, {name: _end(run) for name, run in lesson.beside.items()}, plays)
+    beside = {}
+    for name, run in lesson.beside.items():
+        with RunFile(run) as content:
+            beside[name] = fold(content.events())
+    made = Opened(lesson, opened[0], oracle, beside, plays)
     _check(made)
     return made
 
@@ -130,11 +134,6 @@ def _plays(lesson: Lesson, oracle: Oracle) -> dict[str, Play]:
         return {name: recorded_play(name, oracle) for name in oracle.rounds}
     except UserError as error:
         raise UserError(f"{lesson.oracle}: {error}") from None
-
-
-def _end(run: Path) -> RunState:
-    with RunFile(run) as content:
-        return fold(content.events())
 
 
 def _check(opened: Opened) -> None:

@@ -26,32 +26,30 @@ class Variable:
 
 def variables(moment: Moment) -> tuple[Variable, ...]:
     """E, n_partitions, subenvironments, s, result, results, in the order of the algorithm."""
-    candidate = pointed(moment)
-    now = _values(moment.after, candidate)
-    earlier = None if candidate is None or moment.before.round is None else _same(moment.before, candidate)
+    candidate, round = pointed(moment), moment.before.round
+    now, earlier = _values(moment.after, candidate), None
+    # The candidate as it was before, if it is one of the same round.
+    if candidate and round and round.split is candidate.split and candidate.index < len(round.candidates):
+        earlier = round.candidates[candidate.index]
     before = _values(moment.before, earlier)
     return tuple(Variable(name, value, value != before[name]) for name, value in now.items())
 
 
-def _same(before: RunState, candidate: Candidate) -> Candidate | None:
-    """The candidate as it was before, if it is one of the same round."""
-    round = before.round
-    if round is None or round.split is not candidate.split or candidate.index >= len(round.candidates):
-        return None
-    return round.candidates[candidate.index]
-
-
 def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
-    round = state.round
+    round, said = state.round, []
     tests = [] if candidate is None else state.tests_of(candidate.tests)
-    finished = [test for test in tests if test.is_finished]
+    # All candidates in short, with their verdicts; the current one between brackets. `-A` is all without A.
+    for one in () if round is None else round.candidates:
+        letter = one.label.rpartition(" ")[2]
+        words = f"{letter if one.kind == 'partition' else f'-{letter}'}{VERDICTS.get(one.verdict, '')}"
+        said.append(f"[{words}]" if candidate is not None and one.index == candidate.index else words)
     return {
         "E": f"{count(len(state.environment), 'model')}: {_names(state.environment)}" if state.nodes else "",
         "n_partitions": "" if round is None else str(round.n_partitions),
-        "subenvironments": "" if round is None else _line(round.candidates, candidate),
+        "subenvironments": " ".join(said),
         "s": "" if candidate is None else f"{candidate.label} = {_names(candidate.models)}",
         "result": "" if not tests else _result(tests[-1]),
-        "results": " ".join(SIGNS.get(test.outcome, "?") for test in finished),
+        "results": " ".join(SIGNS.get(test.outcome, "?") for test in tests if test.is_finished),
     }
 
 
@@ -59,18 +57,7 @@ def _names(names: Sequence[str]) -> str:
     return ", ".join(names) or "no models"
 
 
-def _line(candidates: Sequence[Candidate], current: Candidate | None) -> str:
-    """All candidates in short, with their verdicts; the current one between brackets. `-A` is all without A."""
-    said = []
-    for one in candidates:
-        letter = one.label.rpartition(" ")[2]
-        words = f"{letter if one.kind == 'partition' else f'-{letter}'}{VERDICTS.get(one.verdict, '')}"
-        said.append(f"[{words}]" if current is not None and one.index == current.index else words)
-    return " ".join(said)
-
-
 def _result(test: Test) -> str:
-    """How a test ended, in words; `result` is empty while it runs."""
     if test.outcome in ("running", "lost"):
         return "..."
     if test.outcome == "pass":

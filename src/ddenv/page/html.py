@@ -1,12 +1,15 @@
-"""A report as one HTML page that needs nothing else: no script, no other file."""
+"""A report as one HTML page that needs nothing else: no script, no other file; and what our pages may load and run."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
 from ddenv.page.blocks import Block, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts
-from ddenv.page.policy import hashed, policy
 from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent
@@ -43,7 +46,10 @@ def _block(block: Block) -> str:
         case Picture():
             words = escape(plain(block.alternative))
             return f'<figure class="{block.name}" aria-label="{words}">\n{block.svg}\n</figure>'
-    return _code(block)
+        case Code():
+            text = escape("\n".join(map(printable, block.lines)))
+            shown = f"<pre>{text}</pre>"
+            return f"<details><summary>{_text(block.folded)}</summary>{shown}</details>" if block.folded else shown
 
 
 def _paragraph(block: Paragraph) -> str:
@@ -62,12 +68,6 @@ def _table(table: Table) -> str:
     return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
 
 
-def _code(code: Code) -> str:
-    text = "\n".join(escape(printable(line)) for line in code.lines)
-    shown = f"<pre>{text}</pre>"
-    return f"<details><summary>{_text(code.folded)}</summary>{shown}</details>" if code.folded else shown
-
-
 def _part(part: Part) -> str:
     match part:
         case Name(text):
@@ -79,3 +79,22 @@ def _part(part: Part) -> str:
 
 def _text(text: str) -> str:
     return escape(plain(text))
+
+
+# Nothing that is not named, whatever a run file contains.
+_NOTHING = {"default-src": "'none'", "base-uri": "'none'", "form-action": "'none'"}
+
+
+def policy(allowed: Mapping[str, str]) -> str:
+    """A Content-Security-Policy that allows only what `allowed` names, by directive."""
+    return "; ".join(f"{directive} {sources}" for directive, sources in {**_NOTHING, **allowed}.items())
+
+
+def of_scripts(page: str) -> str:
+    """The sources of the `<script>` elements that a page has itself."""
+    return " ".join(hashed(text) for text in re.findall(r"<script>(.*?)</script>", page, re.DOTALL))
+
+
+def hashed(text: str) -> str:
+    """The source that allows exactly `text`."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -34,23 +34,18 @@ def markdown(report: Report, stem: str) -> str:
 def pictures(report: Report, stem: str) -> dict[str, str]:
     """The SVG files that the text of the same `stem` shows, by name."""
     style = (HERE / "style.css").read_text()
-    return {
-        _file(stem, block): _alone(block.svg, style)
-        for section in report.sections
-        for block in section.blocks
-        if isinstance(block, Picture)
-    }
+    ground, found = '<rect width="100%" height="100%" style="fill: var(--page)"/>', {}
+    for block in (block for section in report.sections for block in section.blocks):
+        if isinstance(block, Picture):
+            # It contains its own colours.
+            start = block.svg.index(">") + 1
+            svg = f"{block.svg[:start]}\n<style>\n{style}</style>\n{ground}{block.svg[start:]}\n"
+            found[_file(stem, block)] = svg
+    return found
 
 
 def _file(stem: str, picture: Picture) -> str:
     return f"{stem}.{picture.name}.svg"
-
-
-def _alone(svg: str, style: str) -> str:
-    """A picture that contains its own colours."""
-    start = svg.index(">") + 1
-    ground = '<rect width="100%" height="100%" style="fill: var(--page)"/>'
-    return f"{svg[:start]}\n<style>\n{style}</style>\n{ground}{svg[start:]}\n"
 
 
 def _block(block: Block, stem: str) -> list[str]:
@@ -59,28 +54,21 @@ def _block(block: Block, stem: str) -> list[str]:
             words = "".join(map(_part, block.parts))
             return [f"> {words}" if block.notice else _BEGINNING.sub(r"\1\\\2", words)]
         case Table():
-            return _table(block)
+            sides = ("---:" if column in block.right else "---" for column in range(len(block.head)))
+            rows = (_row(row, number in block.strong) for number, row in enumerate(block.rows))
+            return [_row(block.head, False), f"| {' | '.join(sides)} |", *rows]
         case Picture():
             return [f"![{_text(block.alternative)}]({quote(_file(stem, block))})"]
-    return _code(block)
-
-
-def _table(table: Table) -> list[str]:
-    sides = ("---:" if column in table.right else "---" for column in range(len(table.head)))
-    rows = (_row(row, number in table.strong) for number, row in enumerate(table.rows))
-    return [_row(table.head, False), f"| {' | '.join(sides)} |", *rows]
+        case Code():
+            fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", "\n".join(block.lines))), default=0))
+            shown = [fence, *map(printable, block.lines), fence]
+            fold = ["<details>", f"<summary>{block.folded}</summary>", "", *shown, "", "</details>"]
+            return fold if block.folded else shown
 
 
 def _row(row: tuple[Cell, ...], strong: bool) -> str:
     cells = ["".join(map(_part, parts(cell))) for cell in row]
     return f"| {' | '.join(f'**{cell}**' if strong and cell else cell for cell in cells)} |"
-
-
-def _code(code: Code) -> list[str]:
-    text = [printable(line) for line in code.lines]
-    fence = "`" * max(3, 1 + max((len(run) for line in text for run in re.findall("`+", line)), default=0))
-    shown = [fence, *text, fence]
-    return ["<details>", f"<summary>{code.folded}</summary>", "", *shown, "", "</details>"] if code.folded else shown
 
 
 def _part(part: Part) -> str:

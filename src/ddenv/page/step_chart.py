@@ -81,7 +81,6 @@ def axes(at: At, last: int, most: int) -> Iterator[str]:
 
 
 def _labels(state: RunState, at: At, last: int) -> Iterator[str]:
-    """What went without a test, and the number at the end."""
     x, y = at(last, len(state.environment))
     for node in state.nodes:
         if node.how == "sliced":

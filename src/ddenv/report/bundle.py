@@ -48,7 +48,11 @@ def write_bundle(run: Path, target: Path) -> list[Path]:
     with tempfile.TemporaryDirectory(prefix=".ddenv-bundle-", dir=target.absolute().parent) as temporary:
         folder = Path(temporary) / target.stem
         folder.mkdir()
-        _fill(folder, run, record)
+        _copy_run(run, folder / RUN, record)
+        needs = export_world(run, folder / _world(record), folder / SCENARIO).needs
+        write_report(run, folder / REPORT)
+        write_file(folder / AGAIN, _filled("repro.py.txt", run=RUN, needs=NEEDS))
+        write_file(folder / ISSUE, _issue(record, needs))
         if target.suffix.lower() != ".zip":
             shutil.move(folder, target)
             return sorted(target.iterdir())
@@ -89,26 +93,22 @@ def _certified(run: Path) -> Record:
 
 
 def _copy_run(run: Path, target: Path, record: Record) -> None:
-    """A copy with only the trajectories that are needed."""
+    """A copy with only the trajectories of f and of what the report draws: all would be a hundred times as much."""
+    state = record.state
+    drawn = {test for test in (state.evidence_test, *state.failures, *record.ways) if test is not None}
+    drawn |= {test.id for test in state.tests if test.phase == "baseline"}
+    # An implied test has the trajectories of another one.
+    drawn |= {by for test in drawn if (by := state.tests[test - 1].implied_by) is not None}
     try:
         source = sqlite3.connect(f"{run.absolute().as_uri()}?mode=ro", uri=True)
         with closing(source), closing(sqlite3.connect(target)) as copy:
             source.backup(copy)
             copy.execute("PRAGMA journal_mode = DELETE")
-            needed = ", ".join(str(test) for test in sorted(_needed(record)))
-            copy.execute(f"DELETE FROM motion WHERE test NOT IN ({needed})")
+            copy.execute(f"DELETE FROM motion WHERE test NOT IN ({', '.join(map(str, sorted(drawn)))})")
             copy.commit()
             copy.execute("VACUUM")
     except sqlite3.Error as error:
         raise UserError(f"{run}: cannot be copied: {error}") from None
-
-
-def _fill(folder: Path, run: Path, record: Record) -> None:
-    _copy_run(run, folder / RUN, record)
-    needs = export_world(run, folder / _world(record), folder / SCENARIO).needs
-    write_report(run, folder / REPORT)
-    write_file(folder / AGAIN, _filled("repro.py.txt", run=RUN, needs=NEEDS))
-    write_file(folder / ISSUE, _issue(record, needs))
 
 
 def _world(record: Record) -> str:
@@ -116,17 +116,7 @@ def _world(record: Record) -> str:
 
 
 def _filled(template: str, **words: str) -> bytes:
-    """A file of `TEMPLATES` with these words."""
     return Template((TEMPLATES / template).read_text()).substitute(words).encode(errors="replace")
-
-
-def _needed(record: Record) -> set[int]:
-    """The tests whose trajectories go along: f's, and those that the report draws. All tests would be a hundred times as much."""
-    state = record.state
-    drawn = {test for test in (state.evidence_test, *state.failures, *record.ways) if test is not None}
-    drawn |= {test.id for test in state.tests if test.phase == "baseline"}
-    # An implied test has the trajectories of another one.
-    return drawn | {by for test in drawn if (by := state.tests[test - 1].implied_by) is not None}
 
 
 def _issue(record: Record, needs: list[str]) -> bytes:

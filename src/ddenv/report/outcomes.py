@@ -6,21 +6,10 @@ import math
 from collections import Counter
 
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs
-from ddenv.page.blocks import (
-    Block,
-    Cell,
-    Name,
-    Section,
-    Strong,
-    Table,
-    named,
-    percent,
-    say,
-    thousands,
-)
+from ddenv.page.blocks import Block, Cell, Name, Section, Strong, Table, named, percent, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.deeds import DEEDS
-from ddenv.runfile.failures import OtherFailure, atlas
+from ddenv.runfile.failures import atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.text import as_sentence, count, plain
@@ -88,25 +77,24 @@ def _baseline(state: RunState) -> list[Block]:
 
 
 def _tests(state: RunState) -> list[Block]:
-    """A row for each outcome, with a column for each kind of test in the run."""
     finished = state.finished_tests
     counts = Counter((test.outcome, test.phase) for test in finished)
     phases = [(phase, words) for phase, words in PHASES if any(test.phase == phase for test in finished)]
-    rows = tuple(
-        _outcome(state, outcome, number, [counts[outcome, phase] for phase, _ in phases])
-        for outcome, number in state.outcomes().items()
-        if number
-    )
+    rows = []
+    for outcome, number in state.outcomes().items():
+        if number:
+            by_phase = (str(counts[outcome, phase] or "–") for phase, _ in phases)
+            rows.append((outcome, str(number), percent(number / state.tests_done), *by_phase, _meaning(state, outcome)))
     head = ("outcome", "tests", "share", *(words for _, words in phases), "meaning")
     table = Table(head, rows, range(1, 3 + len(phases)))
     # Before the end of the run, anything may still come to be needed.
-    slices, ahead = _slices(state), state.ahead if state.status == "finished" else 0
+    ahead = state.ahead if state.status == "finished" else 0
     words = (
         f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, and "
         f"{thousands(state.cut_tests)} ended early because the robot was stuck for good"
     )
     idle = f"; {thousands(ahead)} were started early by idle workers and not needed" if ahead else ""
-    return [table, say(f"{words}{idle}."), *slices]
+    return [table, say(f"{words}{idle}."), *_slices(state)]
 
 
 def _slices(state: RunState) -> list[Block]:
@@ -124,8 +112,7 @@ def _slices(state: RunState) -> list[Block]:
     return blocks
 
 
-def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) -> tuple[Cell, ...]:
-    share = percent(number / state.tests_done)
+def _meaning(state: RunState, outcome: str) -> str:
     meaning = MEANING[outcome]
     if outcome == "other":
         ways = Counter(test.failure for test in state.tests if test.outcome == "other" and test.failure in DEEDS)
@@ -133,12 +120,12 @@ def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) ->
     if outcome in BROKEN:
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
         meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
-    return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning
+    return meaning
 
 
 def others_met(record: Record) -> Section | None:
     """The section on other failures; None if there is none."""
-    found = atlas(record.state)
+    state, found = record.state, atlas(record.state)
     if not found:
         return None
     tests = count(sum(len(each.tests) for each in found), "test")
@@ -147,18 +134,15 @@ def others_met(record: Record) -> Section | None:
         "The workbench reduces any of them in a branch of the run (key f)."
     )
     head = ("failure", "from f's end, m", "tests", "smallest environment", "its models")
-    table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), {1, 2})
+    rows = []
+    for each in found[:MOST]:
+        size = f"{count(each.size, 'model')} (test {each.smallest})"
+        away = "" if state.f_position is None else f"{math.dist(state.f_position, each.position):.2f}"
+        models = named(state.models_of(state.tests[each.smallest - 1]), MOST_NAMES) or "none"
+        rows.append((each.name, away, thousands(len(each.tests)), size, models))
     more = len(found) - MOST
     rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []
-    return Section("Other failures met", (lead, table, *rest))
-
-
-def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
-    models = state.models_of(state.tests[failure.smallest - 1])
-    size = f"{count(failure.size, 'model')} (test {failure.smallest})"
-    f = state.f_position
-    away = "" if f is None else f"{math.dist(f, failure.position):.2f}"
-    return failure.name, away, thousands(len(failure.tests)), size, named(models, MOST_NAMES) or "none"
+    return Section("Other failures met", (lead, Table(head, rows, {1, 2}), *rest))
 
 
 def worth(record: Record) -> Section | None:
@@ -166,26 +150,29 @@ def worth(record: Record) -> Section | None:
     state = record.state
     if state.baseline is None or not state.nodes:
         return None
-    found = current(state)
-    blocks = _without(state) if found is None else _with(state, found)
+    found, rows = current(state), [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
+    if found is not None:
+        return Section("What the result is worth", tuple(_with(state, found)))
+    claimed = "what its runs have shown so far still holds" if rows else "nothing is claimed about what is left"
+    so_far = drift(state)
+    first = as_sentence(f"{missing(state)}: {claimed}")
+    blocks: list[Block] = [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
+    if rows:
+        shown = [(_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows]
+        blocks.append(Table(("environment", "runs", "with f", "shown"), shown, {1, 2}))
     return Section("What the result is worth", tuple(blocks))
 
 
-def _without(state: RunState) -> list[Block]:
-    so_far, words = drift(state), missing(state)
-    rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
-    claimed = "what its runs have shown so far still holds" if rows else "nothing is claimed about what is left"
-    first = as_sentence(f"{words}: {claimed}")
-    block = say(first, f" From all runs so far: {so_far[0]}." if so_far else "")
-    shown = ((_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows)
-    table = Table(("environment", "runs", "with f", "shown"), tuple(shown), {1, 2})
-    return [block, table] if rows else [block]
-
-
 def _with(state: RunState, found: Certificate) -> list[Block]:
-    rows = fresh_runs(state)
-    head = ("environment", "runs", "ended", "f shown", "95 % interval", "meaning")
-    table = Table(head, tuple(_fresh_row(state, each, found) for each in rows[:MOST_ROWS]), {1, 3, 4}, {0})
+    head, rows = ("environment", "runs", "ended", "f shown", "95 % interval", "meaning"), []
+    for each in fresh_runs(state)[:MOST_ROWS]:
+        ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
+        has_rate = each.runs and not each.is_chosen
+        shown = percent(each.shown / each.runs) if has_rate else "–"
+        is_exact = each.claim is not None and each.claim.is_exact
+        interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
+        meaning = each.shows if each.claim is None else means(state, found, each.claim)
+        rows.append((_name(each), thousands(each.runs), ended, shown, interval, meaning))
     words = (
         "These runs have seeds that the search did not use, and none of them ended early. Rates exclude broken runs."
     )
@@ -195,17 +182,7 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         )
     if state.certified:
         words += f" {as_sentence(promise(state, found))}"
-    return [table, say(words)]
-
-
-def _fresh_row(state: RunState, each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
-    ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
-    has_rate = each.runs and not each.is_chosen
-    shown = percent(each.shown / each.runs) if has_rate else "–"
-    is_exact = each.claim is not None and each.claim.is_exact
-    interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
-    words = each.shows if each.claim is None else means(state, found, each.claim)
-    return _name(each), thousands(each.runs), ended, shown, interval, words
+    return [Table(head, rows, {1, 3, 4}, {0}), say(words)]
 
 
 def _name(each: FreshRuns) -> Cell:

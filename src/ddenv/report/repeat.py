@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import shlex
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from ddenv.page.blocks import Block, Code, Name, Section, Table, say, section
 from ddenv.report.run_data import Record
-from ddenv.settings import JOBS, OPTIONS, PRINTED, SETTINGS, Setting, read
+from ddenv.settings import JOBS, OPTIONS, PRINTED, SETTINGS, read
 from ddenv.text import plain
 from ddenv.world.access import ending_of
+from ddenv.world.load import bundled_names
 
 LONGEST_VALUE = 120
 # Settings of our own simulation; a simulator of the user's own has others.
@@ -20,25 +24,19 @@ OF_DRAKE = ("time_step", "contact")
 def settings(record: Record) -> Section:
     scenario, jobs = record.state.scenario, record.state.jobs
     oracle = section(scenario, "oracle")
-    rows = [
-        (one.label, _read(scenario, record.asked, one), one.meaning)
-        for one in SETTINGS.values()
-        if (one.name in section(scenario, one.section) or not one.stored) and not (oracle and one.name in OF_DRAKE)
-    ]
-    rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
-    table = Table(
-        ("setting", "value", "meaning"), tuple((name, Name(value), meaning) for name, value, meaning in rows if value)
-    )
-    blocks: list[Block] = [table]
-    if dump := _dump(scenario):
-        blocks.append(Code(dump, folded="The whole scenario, as YAML"))
+    rows: list[tuple[str, Name, str]] = []
+    for one in SETTINGS.values():
+        if (one.name in section(scenario, one.section) or not one.stored) and not (oracle and one.name in OF_DRAKE):
+            # With the first value, if it was changed during the run.
+            now, first = (value_words(read(each, one)) or one.none for each in (scenario, record.asked))
+            value = now if first == now else f"{now} (changed during the run; initially {first})"
+            rows += [(one.label, Name(value), one.meaning)] if value else []
+    rows += [(JOBS.label, Name(str(jobs)), JOBS.meaning)] if jobs else []
+    blocks: list[Block] = [Table(("setting", "value", "meaning"), rows)]
+    with suppress(yaml.YAMLError, RecursionError):
+        dump = yaml.safe_dump(scenario, sort_keys=False, allow_unicode=True, width=100)
+        blocks.append(Code(tuple(dump.splitlines()), folded="The whole scenario, as YAML"))
     return Section("Settings", tuple(blocks))
-
-
-def _read(scenario: dict[str, Any], asked: dict[str, Any], one: Setting) -> str:
-    """The value of a setting, with the first value if it was changed during the run."""
-    now, first = (value_words(read(each, one)) or one.none for each in (scenario, asked))
-    return now if first == now else f"{now} (changed during the run; initially {first})"
 
 
 def value_words(value: Any) -> str:
@@ -48,16 +46,6 @@ def value_words(value: Any) -> str:
     if value is None or isinstance(value, (dict, list)):
         return ""
     return plain(f"{value:g}" if isinstance(value, float) else value)[:LONGEST_VALUE]
-
-
-def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
-    import yaml
-
-    try:
-        text = yaml.safe_dump(scenario, sort_keys=False, allow_unicode=True, width=100)
-    except (yaml.YAMLError, RecursionError):
-        return ()
-    return tuple(text.splitlines())
 
 
 def repeat(record: Record) -> Section:
@@ -76,26 +64,17 @@ def repeat(record: Record) -> Section:
         ]
     again = "Reduce it again from the beginning"
     again += " (without the decisions made by hand):" if state.decisions else ":"
-    if not (bundled := _is_bundled(record)):
-        again = f"{again[:-1]}, with the scenario's own file:"
-    return Section("Repeat it", (*blocks, say(again), Code((_command(record, bundled),))))
-
-
-def _is_bundled(record: Record) -> bool:
-    """Whether options can repeat the run: a bundled scenario with no other changes."""
-    from ddenv.world.load import bundled_names
-
+    # With options, if it is a bundled scenario with no other changes.
     without = (one for one in SETTINGS.values() if one.section == "reduction" and not one.option)
     usual = PRINTED if read(record.asked, SETTINGS["as_printed"]) else {}
-    others = [one.name for one in without if read(record.asked, one) != usual.get(one.name, one.default)]
-    return record.asked.get("name") in bundled_names() and not others
-
-
-def _command(record: Record, bundled: bool) -> str:
-    """`ddenv run` with the first settings, even if the scenario's file has changed since."""
+    others = [one for one in without if read(record.asked, one) != usual.get(one.name, one.default)]
+    bundled = record.asked.get("name") in bundled_names() and not others
+    if not bundled:
+        again = f"{again[:-1]}, with the scenario's own file:"
+    # The first settings, even if the scenario's file has changed since.
     name = plain(record.asked.get("name", "scenario"))
     words = ["ddenv", "run", name if bundled else f"{name}.yaml"]
     for one in OPTIONS:
         if one.name in section(record.asked, one.section) or (bundled and not one.stored):
             words += one.words(read(record.asked, one))
-    return shlex.join(words)
+    return Section("Repeat it", (*blocks, say(again), Code((shlex.join(words),))))

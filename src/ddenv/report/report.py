@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.page.blocks import (
-    Name,
-    Paragraph,
-    Part,
-    Report,
-    Strong,
-    duration,
-    moment,
-    percent,
-    say,
-    thousands,
-)
+from ddenv.page.blocks import Paragraph, Part, Report, Strong, duration, moment, named, percent, say, thousands
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
@@ -43,37 +31,35 @@ def content(record: Record) -> Report:
     state = record.state
     about = (what_is_left, worth, why, margins, way, guiding, others_met, sureness, settings, repeat)
     sections = [each(record) for each in about]
+    damage = (
+        say(Strong("Parts of this run could not be read."), f" {plain(each)}.", notice=True) for each in record.troubles
+    )
+    version, begun = plain(state.engine_version), moment(record.started)
+    by = f"run by ddenv {version}, " if version and version != __version__ else ""
+    when = f", begun {begun} UTC" if begun else ""
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),
-        lead=(*in_short(record), *_damage(record), _standing(record), *_failure(state)),
+        lead=(*in_short(record), *damage, _standing(record), *_failure(state)),
         figures=_figures(record),
         sections=tuple(each for each in sections if each is not None),
-        foot=_foot(record),
+        foot=f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in UTC, lengths in m.",
     )
 
 
 def _verdict(state: RunState) -> str:
-    left, all_of_them = len(state.environment), len(state.elements)
+    left, whole = len(state.environment), len(state.elements)
     if state.baseline is None:
         return "No failure is known yet"
     if state.certified and not left:
-        return f"None of the {count(all_of_them, 'model')} is needed to make the robot fail"
-    enough = "is" if left == 1 else "are"
-    if left == all_of_them:
+        return f"None of the {count(whole, 'model')} is needed to make the robot fail"
+    if left == whole:
         return f"The robot fails with all {count(left, 'model')}; none has been removed yet"
-    words = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
-    return words if state.certified else f"{words} so far"
-
-
-def _damage(record: Record) -> list[Paragraph]:
-    return [
-        say(Strong("Parts of this run could not be read."), f" {plain(each)}.", notice=True) for each in record.troubles
-    ]
+    enough = f"{'is' if left == 1 else 'are'} enough to make the robot fail{'' if state.certified else ' so far'}"
+    return f"{left} of {whole} models {enough}"
 
 
 def _standing(record: Record) -> Paragraph:
-    """Whether it is over, and why it ended."""
     state = record.state
     why = plain(ended(state) if state.status == "finished" else state.reason).rstrip(".")
     if state.status == "finished" and state.certified:
@@ -121,14 +107,6 @@ def _figures(record: Record) -> tuple[tuple[str, str], ...]:
         *(((thousands(rounds), "round" if rounds == 1 else "rounds"),) if rounds else ()),
         (duration(spent(state, state.updated_at)), "computing time"),
     )
-
-
-def _foot(record: Record) -> str:
-    version = plain(record.state.engine_version)
-    by = f"run by ddenv {version}, " if version and version != __version__ else ""
-    begun = moment(record.started)
-    when = f", begun {begun} UTC" if begun else ""
-    return f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in UTC, lengths in m."
 
 
 def files_of(file: Path) -> list[Path]:
@@ -187,20 +165,16 @@ def in_short(record: Record) -> list[Paragraph]:
     runs = "1 simulated run" if state.made == 1 else f"{thousands(state.made)} simulated runs"
     cost = f"This took {runs} and {duration(spent(state, state.updated_at))} of computing time."
     what = f" The robot {deed(state.failure)} before it reached its goal. "
-    return [say(Strong("In short:"), what, *_enough(state), f" {sure} {cost}")]
-
-
-def _enough(state: RunState) -> Iterator[Part]:
     left, whole = state.environment, count(len(state.elements), "model")
+    enough: tuple[Part, ...] = (f"Any of the {whole} in its world may be involved.",)
     if not left:
-        yield f"It also fails with all {whole} of its world removed: look at the robot, its goal and what always stays."
-        return
-    if len(left) == len(state.elements):
-        yield f"Any of the {whole} in its world may be involved."
-        return
-    these = "1 is" if len(left) == 1 else f"{len(left)} are"
-    yield f"Of the {whole} in its world, {these} enough to make it fail this way: "
-    for number, name in enumerate(left[:MOST_NAMES]):
-        yield "" if not number else " and " if number == len(left) - 1 else ", "
-        yield Name(plain(name))
-    yield f" and {len(left) - MOST_NAMES} more." if len(left) > MOST_NAMES else "."
+        always = "look at the robot, its goal and what always stays."
+        enough = (f"It also fails with all {whole} of its world removed: {always}",)
+    elif len(left) < len(state.elements):
+        these = "1 is" if len(left) == 1 else f"{len(left)} are"
+        enough = (
+            f"Of the {whole} in its world, {these} enough to make it fail this way: ",
+            *named(left, MOST_NAMES),
+            ".",
+        )
+    return [say(Strong("In short:"), what, *enough, f" {sure} {cost}")]

@@ -77,7 +77,10 @@ def picture(
     `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
     these models, in place of those that are left. `limits` are outlined.
     """
-    frame = _frame(record.models, list(_places(record).values()))
+    across = WIDTH - LEFT - RIGHT
+    # As wide as the page, and never too flat.
+    sizes = (across, HIGHEST), (across, LEAST_HIGH)
+    frame = Frame.around(record.models, list(_places(record).values()), 0.03, LEAST, *sizes, (LEFT, TOP))
     if ways is None:
         last = record.evidence if record.evidence is not record.original else None
         ways = {"way": record.original, "last": last}
@@ -119,19 +122,10 @@ def _places(record: Record) -> dict[str, Point]:
 
 
 def _sort(record: Record, name: str) -> str:
-    """The class of a model: kept, gone, or always there."""
-    state = record.state
     if name not in record.elements:
         return "still"
-    if state.baseline is None:
-        return "whole"
-    return "kept" if name in record.kept else "gone"
-
-
-def _frame(models: Sequence[Drawn], points: Sequence[Point]) -> Frame:
-    """The map is as wide as the page, and never too flat."""
-    across = WIDTH - LEFT - RIGHT
-    return Frame.around(models, points, 0.03, LEAST, (across, HIGHEST), (across, LEAST_HIGH), (LEFT, TOP))
+    kept = "kept" if name in record.kept else "gone"
+    return "whole" if record.state.baseline is None else kept
 
 
 def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:
@@ -143,14 +137,11 @@ def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:
 
 
 def _way(samples: array[float] | None, frame: Frame) -> str:
-    """The robot's path, or "" if unknown."""
     if not samples:
         return ""
     points = table(samples)[:, 1:3]
-    step = max(1, -(-len(points) // MOST_POINTS))
     # The end matters most.
-    chosen = np.vstack([points[::step], points[-1:]])
-    return _line(frame, chosen)
+    return _line(frame, np.vstack([points[:: max(1, -(-len(points) // MOST_POINTS))], points[-1:]]))
 
 
 def _line(frame: Frame, points: np.ndarray) -> str:

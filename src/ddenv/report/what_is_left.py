@@ -12,9 +12,8 @@ from ddenv.map.footprints import Drawn
 from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table, named, say
 from ddenv.report.report_map import picture
 from ddenv.report.run_data import Record
-from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
-from ddenv.runs.reasons import Nearest, Parting, no_reasons, parting_sentence, sentence
+from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
 from ddenv.text import coordinates, count, first_of, plain
 from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said
@@ -26,27 +25,22 @@ MOST_MODELS, MOST_NAMES, MOST_DROPPED, MOST_MAPS = 200, 12, 3, 6
 def what_is_left(record: Record) -> Section:
     state = record.state
     title = "The minimal environment" if state.certified else "What is left so far"
-    if state.baseline is None:
-        title = "The world"
-    if record.world is None:
-        return Section(title, _names_alone(state))
-    blocks: list[Block] = [Picture("map", picture(record), _alternative(state))]
-    if state.baseline is not None:
-        blocks += _models(record)
-    return Section(title, tuple(blocks))
-
-
-def _alternative(state: RunState) -> str:
-    if state.baseline is None:
-        return "The world from above."
-    return (
+    words = (
         f"The world from above: {count(len(state.environment), 'model')} left, drawn solid; what was removed is faint. "
         "The robot's paths in f and in the last similar run."
     )
+    left = say(Strong("Left:"), " ", *named(state.environment, MOST_MODELS), ".")
+    none = "No map: the world cannot be read."
+    if state.baseline is None:
+        title, words = "The world", "The world from above."
+        left = say(f"{count(len(state.elements), 'model')} can be removed. {none}")
+    if record.world is None:
+        return Section(title, (left,) if state.baseline is None else (left, say(none)))
+    models = () if state.baseline is None else _models(record)
+    return Section(title, (Picture("map", picture(record), words), *models))
 
 
 def _models(record: Record) -> list[Block]:
-    """A row for each model that is left, in the file's order."""
     state, names = record.state, record.state.environment[:MOST_MODELS]
     if not names:
         return []
@@ -75,13 +69,6 @@ def _size(each: Drawn) -> str:
     return " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
 
 
-def _names_alone(state: RunState) -> tuple[Block, ...]:
-    if state.baseline is None:
-        return (say(f"{count(len(state.elements), 'model')} can be removed. No map: the world cannot be read."),)
-    left = say(Strong("Left:"), " ", *named(state.environment, MOST_MODELS), ".")
-    return (left, say("No map: the world cannot be read."))
-
-
 def why(record: Record) -> Section | None:
     """The section on why the robot fails; None before a certificate or an isolation shows it."""
     found = current(record.state)
@@ -98,8 +85,12 @@ def why(record: Record) -> Section | None:
         if record.models and number < MOST_MAPS and reason.parting is not None:
             words = f"The world from above without {reason.without}: the robot's paths with it and without it"
             blocks.append(_map(record, record.kept, reason.gone, reason.parting, f"why{number}", words, None))
-    if record.nearest is not None:
-        blocks += _passing(record, record.nearest)
+    if (passes := record.nearest) is not None:
+        blocks.append(say(plain(passes.sentences)))
+        if record.models and passes.parting is not None:
+            without = f"the robot's path with {first_of(passes.gone, 3)} and without"
+            words = f"The nearest world that passes, from above: {without}"
+            blocks.append(_map(record, record.elements, passes.gone, passes.parting, "nearest", words, passes.gone))
     return Section("Why it fails", tuple(blocks)) if blocks else None
 
 
@@ -125,20 +116,6 @@ def _limits(record: Record) -> tuple[Block, Block]:
         words += f" The robot's paths now and with {one.name} = {one.value:.4g}, seed {parting.seed}."
     limits = [limit for one in record.changes for limit in one.limits]
     return say(plain(words)), Picture("margins", picture(record, "margins", ways, None, limits), plain(words))
-
-
-def _passing(record: Record, found: Nearest) -> list[Block]:
-    """The nearest world that passes, with the ways of two runs."""
-    blocks: list[Block] = [say(plain(found.sentences))]
-    one = found.parting
-    if one is None:
-        return blocks
-    if record.models:
-        words = (
-            f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without"
-        )
-        blocks.append(_map(record, record.elements, found.gone, one, "nearest", words, found.gone))
-    return blocks
 
 
 def _map(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
-from ddenv.evidence.margins import MOST_RUNS, Margin, changes_at
+from ddenv.evidence.margins import MOST_RUNS, changes_at
 from ddenv.runfile.events import MarginRan
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
@@ -45,24 +44,22 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
     by_name = {} if world is None else {model.name: model for model in world.models}
     found = []
     for row in rows(margins):
-        one = row.margin
-        limits = [value for side in one.sides for value in (side.goal, side.gone) if value and value.outcomes]
-        if limits:
-            value = min(limits, key=lambda each: (each.verdict != "goal", abs(each.value - one.asked.now)))
-            parting = _parting(file, state, one.asked.name, value.value)
-            moved = tuple(_limits(by_name, one))
-            share = abs(value.value - one.asked.now) / one.asked.scale
-            words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
-            to = changes_at(one.asked, value.value)
-            found.append(Change(one.asked.name, value.value, share, to, value.verdict, words, parting, moved))
+        one, asked = row.margin, row.margin.asked
+        ends = [value for side in one.sides for value in (side.goal, side.gone) if value and value.outcomes]
+        if not ends:
+            continue
+        value = min(ends, key=lambda each: (each.verdict != "goal", abs(each.value - asked.now)))
+        parting = _parting(file, state, asked.name, value.value)
+        limits = list[Limit]()
+        owner, _, what = asked.name.rpartition(".")
+        if owner in by_name and what in ("x", "y", "yaw"):
+            for each in (each for side in one.sides for each in (side.until, side.gone) if each):
+                limits.append((each.verdict, by_name[owner], move_of(by_name[owner], what, each.value)))
+        share = abs(value.value - asked.now) / asked.scale
+        words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
+        to = changes_at(asked, value.value)
+        found.append(Change(asked.name, value.value, share, to, value.verdict, words, parting, tuple(limits)))
     return tuple(found)
-
-
-def _limits(models: Mapping[str, Model], one: Margin) -> Iterator[Limit]:
-    owner, _, what = one.asked.name.rpartition(".")
-    if owner in models and what in ("x", "y", "yaw"):
-        for value in (each for side in one.sides for each in (side.until, side.gone) if each):
-            yield value.verdict, models[owner], move_of(models[owner], what, value.value)
 
 
 def beside(state: RunState) -> Test | None:

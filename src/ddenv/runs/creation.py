@@ -12,15 +12,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.export import renamed
 from ddenv.runs.folder import named, run_path
-from ddenv.runs.subject import (
-    RESOURCE,
-    Announce,
-    check_parts,
-    has_options,
-    load_parts,
-    read_parts,
-    scenario_named,
-)
+from ddenv.runs.subject import RESOURCE, Announce, check_parts, has_options, load_parts, read_parts, scenario_named
 from ddenv.runs.trust import check_cluster, check_named, trust_cluster, trusted_scenario
 from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.files.resources import Resources
@@ -47,9 +39,8 @@ def create_named(
         raise UserError(f"--output: {output} exists already; choose another name")
     if given.get("inside") and (of_run := named(subject)) is not None and of_run[0] == "run":
         if has_options(given, "inside"):
-            raise UserError(
-                "--inside: a run keeps its own options; give only --name, --output, --jobs, --trust and --json"
-            )
+            only = "give only --name, --output, --jobs, --trust and --json"
+            raise UserError(f"--inside: a run keeps its own options; {only}")
         with RunFile(of_run[1]) as file:
             scenario = trusted_scenario(file, asks, None)
         path = run_path(f"{scenario.name}-inside", name, output)
@@ -69,8 +60,7 @@ def create_run(scenario: Scenario, path: Path) -> World:
     check_cluster(scenario.reduction.cluster)
     world, _ = load_parts(scenario)
     documents = {"world": world.text, "robot": read_bytes(scenario.robot.model)}
-    documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
-    _write(scenario, world, path, documents)
+    _write(scenario, world, path, documents, world.resources)
     return world
 
 
@@ -83,9 +73,9 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
     with RunFile(run) as file:
         _, world, robot = read_parts(file)
         documents = {name: file.document(name) for name in ("world", "robot")}
-        documents |= {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
+        resources = file.documents(RESOURCE)
     check_parts(scenario, world, robot)
-    _write(scenario, world, path, documents)
+    _write(scenario, world, path, documents, resources)
 
 
 def create_inside(run: Path, path: Path) -> World:
@@ -103,20 +93,19 @@ def create_inside(run: Path, path: Path) -> World:
     reading = scenario.reading.model_copy(update={"inside": True})
     world = parse_world(documents["world"], scenario.world, reading, stored)
     documents["world"] = world.text
-    documents |= {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
-    update = {
-        "reading": reading,
-        "whole": whole_of(whole, scenario),
-        "protected": renamed(scenario.protected, whole, removed, world),
-    }
+    protected = renamed(scenario.protected, whole, removed, world)
+    update = {"reading": reading, "whole": whole_of(whole, scenario), "protected": protected}
     scenario = scenario.model_copy(update=update)
     check_parts(scenario, world, robot)
-    _write(scenario, world, path, documents)
+    _write(scenario, world, path, documents, world.resources)
     return world
 
 
-def _write(scenario: Scenario, world: World, path: Path, documents: dict[str, bytes]) -> None:
+def _write(
+    scenario: Scenario, world: World, path: Path, documents: dict[str, bytes], resources: Mapping[str, bytes]
+) -> None:
     documents["scenario"] = scenario.model_dump_json().encode()
+    documents |= {f"{RESOURCE}{key}": content for key, content in resources.items()}
     elements = world.elements(frozenset(scenario.protected))
     number = {name: at for at, name in enumerate(elements)}
     # What is welded to a model that stays is tied to nothing.

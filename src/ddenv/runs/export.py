@@ -74,9 +74,15 @@ def export_world(
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
     data["whole"] = whole_of(world, scenario).model_dump(mode="json")
     data["protected"] = renamed(scenario.protected, world, removed, minimal)
-    needed = (*_folders(scenario, asked, robot, documents), *_packages(scenario.robot.model, robot))
-    model_path = (*scenario.reading.model_path, *needed)
+    # Those folders of the original world and robot that the exported files still need, and the robot's packages.
+    own, asked_by_robot = scenario.robot.model, Resources(documents)
+    parse_model(robot, own, scenario.reading, asked_by_robot)
+    both = ((scenario.world.parent, asked), (own.parent, asked_by_robot))
+    needed = [each for each, by in both if any(_leans_on(each, uri, base) for uri, base in by.asked)]
+    around = (each for each in own.absolute().parents if each.name and each.is_dir())
+    needed += [each for each in around if f"package://{each.name}/".encode() in robot]
     data["reading"]["inside"] = False
+    model_path = (*scenario.reading.model_path, *needed)
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
     return Exported([sdf, model, scenario_file], needs)
@@ -138,12 +144,6 @@ def _name(path: Path, folder: Path) -> str:
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
-def _packages(file: Path, robot: bytes) -> list[Path]:
-    """The folders above the robot's file that it refers to as packages."""
-    around = (folder for folder in file.absolute().parents if folder.name and folder.is_dir())
-    return [folder for folder in around if f"package://{folder.name}/".encode() in robot]
-
-
 def renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> tuple[str, ...]:
     """The names of protected models in the minimal world, where copies of one name are numbered anew; a part's is its model's."""
     wholes = {model.name: model.inside or model.name for model in world.models}
@@ -151,15 +151,6 @@ def renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], m
     now = dict.fromkeys(model.inside or model.name for model in minimal.models)
     names = dict(zip(kept, now, strict=True))
     return tuple(dict.fromkeys(names[wholes.get(name, name)] for name in protected))
-
-
-def _folders(scenario: Scenario, asked: Resources, robot: bytes, documents: Mapping[str, bytes]) -> list[Path]:
-    """Those folders of the original world and robot that the exported files still need."""
-    file = scenario.robot.model
-    asked_by_robot = Resources(documents)
-    parse_model(robot, file, scenario.reading, asked_by_robot)
-    both = ((scenario.world.parent, asked), (file.parent, asked_by_robot))
-    return [folder for folder, each in both if any(_leans_on(folder, uri, base) for uri, base in each.asked)]
 
 
 def _leans_on(folder: Path, uri: str, base: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,7 +75,10 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     rows, moving = array("d"), {}
     for name, samples in _stored(file, number, lacks).items():
         stored = table(samples)
-        if not _makes_sense(stored):
+        times = stored[:, 0]
+        in_time = times.size and times[0] >= 0 and times[-1] <= LONGEST and (times[:-1] <= times[1:]).all()
+        # No number compares with NaN.
+        if not (in_time and (np.abs(stored) <= FARTHEST).all()):
             lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
         elif name == ROBOT:
             rows = samples
@@ -95,18 +99,10 @@ def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[flo
         return file.motions(number)
     except UserError as error:
         lacks.append(f"{error}.")
-    try:
-        robot = file.motion(number)
-    except UserError:
-        robot = None
-    return {} if robot is None else {ROBOT: robot}
-
-
-def _makes_sense(rows: np.ndarray) -> bool:
-    """Whether these are finite places, whose times grow. (No number compares with NaN.)"""
-    times = rows[:, 0]
-    in_time = times.size and times[0] >= 0 and times[-1] <= LONGEST and (times[:-1] <= times[1:]).all()
-    return bool(in_time and (np.abs(rows) <= FARTHEST).all())
+    with suppress(UserError):
+        if (robot := file.motion(number)) is not None:
+            return {ROBOT: robot}
+    return {}
 
 
 def table(samples: array[float]) -> np.ndarray:

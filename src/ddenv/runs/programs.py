@@ -54,7 +54,6 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes
 
 
 def _log(place: Path, run: Path) -> BinaryIO:
-    """A log, for whom the run is."""
     return os.fdopen(os.open(place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, mode_beside(run)), "ab")
 
 

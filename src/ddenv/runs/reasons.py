@@ -94,11 +94,21 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
         raise UserError(uncertified(state, file.path))
     end, *removals = certificate.claims
     left = {test.run: test for test in runs_behind(state, certificate, end) if test.outcome == F}
-    return tuple(
-        _reason(file, state, certificate, claim.without, runs_behind(state, certificate, claim), left)
-        for claim in removals
-        if claim.without is not None
-    )
+    found = []
+    for claim in removals:
+        mine = runs_behind(state, certificate, claim)
+        kinds: dict[str, list[Test]] = {}
+        for test in mine:
+            kinds.setdefault(_kind(test), []).append(test)
+        ends = sorted((_end(kind, them) for kind, them in kinds.items()), key=lambda end: -end.number)
+        gone = tuple(stack_with(state, state.nodes[certificate.node].environment, str(claim.without)))
+        # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
+        shown = next((end.kind for end in ends if end.kind != F), None)
+        pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
+        parting, _, lacks = parting_of(file, next(pairs, None), gone)
+        exact = bool(certificate.seeds)
+        found.append(Reason(str(claim.without), gone, len(mine), tuple(ends), parting, lacks, exact))
+    return tuple(found)
 
 
 def no_reasons(certificate: Certificate) -> str:
@@ -108,27 +118,8 @@ def no_reasons(certificate: Certificate) -> str:
     return f"What the robot does without each model is not known, because none was left out: {verdict_on(certificate)}."
 
 
-def _reason(
-    file: RunFile, state: RunState, certificate: Certificate, name: str, mine: Sequence[Test], left: dict[int, Test]
-) -> Reason:
-    ends = _ends(mine)
-    gone = tuple(stack_with(state, state.nodes[certificate.node].environment, name))
-    # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
-    shown = next((end.kind for end in ends if end.kind != F), None)
-    pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
-    parting, _, lacks = parting_of(file, next(pairs, None), gone)
-    return Reason(name, gone, len(mine), ends, parting, lacks, bool(certificate.seeds))
-
-
 def _kind(test: Test) -> str:
     return test.outcome if test.outcome in (F, GOAL) else test.failure
-
-
-def _ends(tests: Sequence[Test]) -> tuple[End, ...]:
-    kinds: dict[str, list[Test]] = {}
-    for test in tests:
-        kinds.setdefault(_kind(test), []).append(test)
-    return tuple(sorted((_end(kind, them) for kind, them in kinds.items()), key=lambda end: -end.number))
 
 
 def _end(kind: str, tests: Sequence[Test]) -> End:
@@ -203,24 +194,22 @@ def parting_sentence(reason: Reason) -> str:
 
 
 def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> str:
-    """Where two paths diverge, or why that is not known; then a sentence that begins with `met`, if the robot met `it`."""
+    """When two runs begin to differ, and when and where they are visibly apart, or why that is not known; then a sentence that
+    begins with `met`, if the robot met `it`.
+    """
     if one is None:
         return f"Where the paths diverge is not known: {lacks}." if lacks else ""
-    if one.met is None:
-        return _where_they_diverge(one)
-    did = "touches" if one.touched else "senses"
-    return f"{_where_they_diverge(one)} {met} the robot {did} {it} after {one.met:.1f} s."
-
-
-def _where_they_diverge(one: Parting) -> str:
-    """When two runs begin to differ, and when and where they are visibly apart, in one sentence."""
     if one.apart is None or one.place is None:
         # Their ways may be equal to the end.
         equal = f" equal until {one.equal:.1f} s, and" if one.equal else ""
-        return f"With seed {one.seed} the two runs are{equal} never {APART:g} m apart."
-    start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
-    apart = f"{APART:g} m apart after {one.apart:.1f} s, at ({coordinates(one.place)}) m"
-    return f"With seed {one.seed} the two runs differ {start}, and are {apart}."
+        words = f"With seed {one.seed} the two runs are{equal} never {APART:g} m apart."
+    else:
+        start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
+        apart = f"{APART:g} m apart after {one.apart:.1f} s, at ({coordinates(one.place)}) m"
+        words = f"With seed {one.seed} the two runs differ {start}, and are {apart}."
+    if one.met is not None:
+        words += f" {met} the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s."
+    return words
 
 
 # The nearest world that passes, beside the whole world that fails.
@@ -259,17 +248,13 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     if one.found is None:
         return Nearest((), words, shown)
     gone = state.removals[one.found - 1].models
-    parting, first, lacks = parting_of(file, _pair(state, one.found), gone)
-    return Nearest(gone, words, shown, parting, first, lacks)
-
-
-def _pair(state: RunState, found: int) -> tuple[Test, Test] | None:
-    """A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not."""
-    passing = {test.run: test for test in state.tests if test.removal == found and test.outcome == GOAL}
+    # A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not.
+    passing = {test.run: test for test in state.tests if test.removal == one.found and test.outcome == GOAL}
     whole = [test for test in state.tests if test.run in passing and test.environment == 0]
     failing = [test for test in whole if test.outcome in (F, "other")]
     chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
-    return None if chosen is None else (chosen, passing[chosen.run])
+    parting, first, lacks = parting_of(file, None if chosen is None else (chosen, passing[chosen.run]), gone)
+    return Nearest(gone, words, shown, parting, first, lacks)
 
 
 def removed_in_passing(state: RunState, where: object) -> tuple[str, ...]:

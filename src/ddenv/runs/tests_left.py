@@ -56,13 +56,18 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
 
     Without an engine `at_work` nothing runs, and the time is not known.
     """
-    expected = None if state.ended else _expected(state)
+    expected = None if state.ended or _is_overdue(state) else _expected(state)
     if expected is None:
         return None
     running = len(state.running_tests) if at_work else 0
     most = math.inf if state.budget is None else max(0, state.budget - state.made)
     low, likely, high = (int(min(most, max(running, each))) for each in expected)
-    each = _seconds_of_a_test(state) if at_work else None
+    if not at_work or state.paused or state.needs_room or state.waiting_candidate is not None:
+        return Remaining((low, likely, high), None)
+    # Real time from one finished test to the next, s.
+    finished = (test.wall_seconds for test in islice(reversed(state.tests), 2 * LATEST) if test.is_finished)
+    times = [each for each in islice(finished, LATEST) if each > 0]
+    each = sum(times) / len(times) / (1 + BUSY * (max(1, state.jobs) - 1)) if times else None
     return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
 
 
@@ -91,24 +96,21 @@ def _is_overdue(state: RunState) -> bool:
 
 
 def _expected(state: RunState) -> tuple[int, int, int] | None:
-    """How many tests are left, as (low, likely, high); None if unknown, or after more than were expected."""
+    """How many tests are left, as (low, likely, high); None if unknown."""
+    forecast, baseline = state.forecast, state.baseline
     if state.isolating is not None or state.margining is not None:
         return None
     if state.confirming:
         now = in_the_making(state)
-        if now is None or _is_overdue(state):
-            return None
-        return _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
-    forecast, baseline = state.forecast, state.baseline
-    if forecast is None or baseline is None or _is_overdue(state):
+        return None if now is None else _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
+    if forecast is None or baseline is None:
         return None
-    done = state.tests_done - forecast.tests_done
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
     asked = settings(state)
     certificate = certificate_tests(rate, asked.certify_rate, left, baseline.runs, baseline.runs)
     certificate = (RUNS_BESIDE,) * 3 if asked.accept_rate == "exact" else certificate
-    search = _after(forecast.tests, done)
+    search = _after(forecast.tests, state.tests_done - forecast.tests_done)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
 
@@ -117,15 +119,6 @@ def _after(expected: tuple[int, int, int], done: int) -> tuple[int, int, int]:
     """What is left of `expected`, as (low, likely, high), once `done` are made. What is late is not about to end."""
     low, likely, high = (max(0, each - done) for each in expected)
     return low, max(likely, min(expected[1], high) // LATE), high
-
-
-def _seconds_of_a_test(state: RunState) -> float | None:
-    """Real time from one finished test to the next, s; None while nothing is started."""
-    if state.paused or state.needs_room or state.waiting_candidate is not None:
-        return None
-    finished = (test.wall_seconds for test in islice(reversed(state.tests), 2 * LATEST) if test.is_finished)
-    times = [each for each in islice(finished, LATEST) if each > 0]
-    return sum(times) / len(times) / (1 + BUSY * (max(1, state.jobs) - 1)) if times else None
 
 
 def search_tests(models: int, asked: Reduction, rate: float | None = None) -> tuple[int, int, int]:

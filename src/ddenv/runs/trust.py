@@ -14,6 +14,7 @@ import re
 import shlex
 import stat
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.machinery import all_suffixes
 from importlib.util import find_spec
@@ -68,50 +69,36 @@ def _cluster_of(scenario: Scenario) -> list[Program]:
 
 
 def _own_program(scenario: Scenario) -> list[Program]:
-    """Its simulator or its controller, if it brings one."""
-    if scenario.oracle is not None:
-        command, folder = scenario.oracle.command, start_folder(scenario).absolute()
-        if command is not None:
-            return [_program(f"the command '{command}' in {folder}", _named(folder, command))]
-        return [_class("simulator", scenario.oracle.program, folder)]
-    use = scenario.controller.use
-    return [_class("controller", use, scenario.folder.absolute())] if ":" in use else []
-
-
-def _class(what: str, use: str, folder: Path) -> Program:
-    files = _modules(folder, use.partition(":")[0].partition(".")[0])
-    return _program(f"the {what} {use}, searched in {folder} first", files)
+    """Its simulator or its controller, if it brings one, with the files that its command names, or its class's module."""
+    oracle, what, use, folder = scenario.oracle, "controller", scenario.controller.use, scenario.folder.absolute()
+    if oracle is not None:
+        what, use, folder = "simulator", oracle.program, start_folder(scenario).absolute()
+        if oracle.command is not None:
+            words = list[str]()
+            with suppress(ValueError):
+                words = shlex.split(oracle.command)
+            files = [folder / word for word in words if is_file(folder / word)]
+            return [_program(f"the command '{oracle.command}' in {folder}", files)]
+    elif ":" not in use:
+        return []
+    # In every form that Python looks for; an installed module is the user's own choice.
+    module = use.partition(":")[0].partition(".")[0]
+    # A run file may have the module's name, too, and changes all the time.
+    alone = [path for path in folder.glob(f"{module}.*") if path.name.endswith(tuple(all_suffixes()))]
+    found = (*alone, *(folder / module).rglob("*"))
+    # Python itself writes into this folder.
+    files = sorted(path for path in found if "__pycache__" not in path.parts and is_file(path))
+    return [_program(f"the {what} {use}, searched in {folder} first", files)]
 
 
 def _program(words: str, files: Iterable[Path]) -> Program:
-    contents = [(str(path), _content(path)) for path in islice(files, MOST_FILES)]
+    contents = []
+    for path in islice(files, MOST_FILES):
+        digest = ""
+        with suppress(OSError), path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        contents.append((str(path), digest))
     return Program(words, (hashlib.sha256(json.dumps([words, contents]).encode()).hexdigest(),))
-
-
-def _named(folder: Path, command: str) -> list[Path]:
-    """The files that a command names."""
-    try:
-        words = shlex.split(command)
-    except ValueError:
-        return []
-    return [folder / word for word in words if is_file(folder / word)]
-
-
-def _modules(folder: Path, module: str) -> list[Path]:
-    """The files of a module in `folder`, in every form that Python looks for; an installed one is the user's own choice."""
-    # A run file may have the module's name, too, and changes all the time.
-    alone = [path for path in folder.glob(f"{module}.*") if path.name.endswith(tuple(all_suffixes()))]
-    found = [*alone, *(folder / module).rglob("*")]
-    # Python itself writes into this folder.
-    return sorted(path for path in found if "__pycache__" not in path.parts and is_file(path))
-
-
-def _content(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return ""
 
 
 def untrusted(scenario: Scenario) -> Program | None:

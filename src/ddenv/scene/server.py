@@ -30,7 +30,7 @@ import tornado.web
 import tornado.websocket
 
 from ddenv.errors import UserError
-from ddenv.page.policy import of_scripts, policy
+from ddenv.page.html import of_scripts, policy
 from ddenv.runs.programs import FIRST_PORT
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.scene.player import Player

@@ -6,11 +6,10 @@ import contextlib
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
@@ -20,7 +19,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
@@ -42,23 +41,23 @@ CLEAR = "\r\x1b[K"
 QUIET = 60.0
 
 
-@dataclass
 class Work:
-    """A cell in work by so many `workers`, since its run was as `before`. `problem` says why it did not end this time."""
+    """A cell in work by so many `workers`; its run was as `before`. `problem` says why it did not end this time."""
 
-    cell: Cell
-    path: Path
-    workers: int
-    file: RunFile
-    before: RunState
-    state: RunState
-    engine: subprocess.Popen[bytes]
-    problem: str = ""
+    def __init__(self, folder: Path, cell: Cell, workers: int) -> None:
+        self.cell, self.workers, self.problem = cell, workers, ""
+        self.path = run_path(folder, cell)
+        if not self.path.exists():
+            create_run(cell.scenario, self.path)
+        self.file = RunFile(self.path)
+        self.before = self.state = fold(self.file.events())
+        self.engine = start_engine(self.path, workers, accept_mode="automatic", share=self.path.parent)
 
     @property
     def tests(self) -> int:
         """How many tests this session has made, and not reused from another cell."""
-        return _made(self.state) - _made(self.before)
+        now, then = (each.made - sum(test.taken for test in each.tests) for each in (self.state, self.before))
+        return now - then
 
     def catch_up(self) -> None:
         self.state = fold(self.file.events(self.state.revision), self.state)
@@ -75,10 +74,6 @@ class Work:
         return not at_work
 
 
-def _made(state: RunState) -> int:
-    return state.made - sum(test.taken for test in state.tests)
-
-
 def is_done(folder: Path, cell: Cell) -> bool:
     """Whether nothing is left to do for a cell. Raises UserError if its run file has other settings."""
     path = run_path(folder, cell)
@@ -92,25 +87,13 @@ def is_done(folder: Path, cell: Cell) -> bool:
         raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
     if other:
         raise UserError(f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}")
-    return state.status == "finished" and not _broke(state) and not engine_is_alive(path)
-
-
-def _broke(state: RunState) -> bool:
-    """Whether the baseline, or a claim of the certificate, is open since tests broke: an engine makes them again."""
+    if state.status != "finished" or engine_is_alive(path):
+        return False
+    # Where the baseline, or a claim of the certificate, is open since tests broke, an engine makes them again.
     if state.baseline is None:
-        return all(test.outcome in BROKEN for test in state.finished_tests)
+        return not all(test.outcome in BROKEN for test in state.finished_tests)
     certificate = current(state)
-    return certificate is not None and any(claim.verdict == "unknown" for claim in certificate.claims)
-
-
-def _begin(folder: Path, cell: Cell, workers: int) -> Work:
-    path = run_path(folder, cell)
-    if not path.exists():
-        create_run(cell.scenario, path)
-    file = RunFile(path)
-    state = fold(file.events())
-    engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
-    return Work(cell, path, workers, file, state, state, engine)
+    return certificate is None or all(claim.verdict != "unknown" for claim in certificate.claims)
 
 
 class Runner:
@@ -136,20 +119,27 @@ class Runner:
         """
         # Ignored signals stay ignored: a study under nohup outlives its terminal.
         asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) != signal.SIG_IGN]
-        handlers = [(number, signal.signal(number, _interrupt)) for number in asked]
+        handlers = [(number, signal.signal(number, signal.default_int_handler)) for number in asked]
         try:
             while self._waiting or self.running:
                 while self._waiting and (free := self._jobs - sum(work.workers for work in self.running)) > 0:
                     # Free workers are shared among the waiting cells.
                     workers = max(min(PER_CELL, free), free // len(self._waiting))
-                    self.running.append(_begin(self._folder, self._waiting.pop(0), workers))
-                self._collect()
+                    self.running.append(Work(self._folder, self._waiting.pop(0), workers))
+                for work in tuple(self.running):
+                    if work.has_ended():
+                        self._ends(work)
                 self.look()
                 if self.running:
                     time.sleep(POLL)
         finally:
-            _stop(self.running)
+            # They record it; also those stop that an earlier, killed study left.
+            stop_engines([(work.file, work.engine) for work in self.running])
+            deadline = time.monotonic() + STOP_WAIT
+            while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in self.running):
+                time.sleep(POLL)
             for work in self.running:
+                work.catch_up()
                 work.file.close()
             for number, handler in handlers:
                 signal.signal(number, handler)
@@ -159,14 +149,21 @@ class Runner:
                     print(CLEAR, end="", file=self._out, flush=True)
             self._record()
 
-    def _collect(self) -> None:
-        for work in tuple(self.running):
-            if work.has_ended():
-                self.running.remove(work)
-                self._ended.append(work)
-                work.file.close()
-                seed = f", seed {work.cell.seed}" if self._plan.seeds > 1 else ""
-                self._say(f"{self._share}  {work.cell.label}{seed}: {self._ending(work)}")
+    def _ends(self, work: Work) -> None:
+        self.running.remove(work)
+        self._ended.append(work)
+        work.file.close()
+        seed = f", seed {work.cell.seed}" if self._plan.seeds > 1 else ""
+        came_to = work.problem
+        if not came_to:
+            result = read_cell(self._folder, work.cell)
+            doubt = "" if result.minimal else f"; not certified: {result.problem}"
+            tests = f"{count(result.tests, 'test')} and {result.certificate_tests} for the certificate"
+            models = f"{len(result.elements)} → {count(len(result.left), 'model')}"
+            came_to = f"{models}, {tests}, {duration(work.state.working_seconds)}{doubt}"
+            if result.baseline is None:
+                came_to = result.problem
+        self._say(f"{self._share}  {work.cell.label}{seed}: {came_to}")
 
     def look(self) -> None:
         """Says how far it is, and records it from time to time."""
@@ -194,40 +191,15 @@ class Runner:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
 
     def _now(self) -> str:
-        return " · ".join((self._share, *(f"{work.cell.label}: {_doing(work)}" for work in self.running)))
-
-    def _ending(self, work: Work) -> str:
-        if work.problem:
-            return work.problem
-        result = read_cell(self._folder, work.cell)
-        if result.baseline is None:
-            return result.problem
-        sizes = f"{len(result.elements)} → {count(len(result.left), 'model')}"
-        tests = f"{count(result.tests, 'test')} and {result.certificate_tests} for the certificate"
-        doubt = "" if result.minimal else f"; not certified: {result.problem}"
-        return f"{sizes}, {tests}, {duration(work.state.working_seconds)}{doubt}"
-
-
-def _doing(work: Work) -> str:
-    state = work.state
-    if state.baseline is None:
-        return f"{state.tests_done} of {work.cell.scenario.reduction.baseline_runs} baseline runs"
-    models = f"{len(state.environment)} of {len(state.elements)} models"
-    return f"{models}, {'certificate, ' if state.confirming else ''}{state.tests_done} tests"
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
-
-
-def _stop(running: Sequence[Work]) -> None:
-    """Stops engines, which record it, also those that an earlier, killed study left."""
-    stop_engines([(work.file, work.engine) for work in running])
-    deadline = time.monotonic() + STOP_WAIT
-    while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in running):
-        time.sleep(POLL)
-    for work in running:
-        work.catch_up()
+        said = [self._share]
+        for work in self.running:
+            state = work.state
+            doing = f"{len(state.environment)} of {len(state.elements)} models, "
+            doing += f"{'certificate, ' if state.confirming else ''}{state.tests_done} tests"
+            if state.baseline is None:
+                doing = f"{state.tests_done} of {work.cell.scenario.reduction.baseline_runs} baseline runs"
+            said.append(f"{work.cell.label}: {doing}")
+        return " · ".join(said)
 
 
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:

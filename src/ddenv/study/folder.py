@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,8 +35,6 @@ def opened(folder: Path) -> Iterator[None]:
         (folder / RUNS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{refused}: {error.strerror}; {instead}") from None
-    if not os.access(folder / RUNS, os.W_OK):
-        raise UserError(f"{refused}: no permission; {instead}")
     taken = f"{folder}: another study is running in this folder; wait for it, or {instead}"
     with held(folder / LOCK, taken, refused, instead):
         yield

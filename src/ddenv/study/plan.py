@@ -104,13 +104,24 @@ class Plan:
     def cells(self) -> tuple[Cell, ...]:
         """All cells in the order of the tables: without slices, and then with them if the scenario uses them."""
         return tuple(
-            _cell(scenario, method, number, slices)
+            self._cell(scenario, method, number, slices)
             for scenario in self.scenarios
             for method in self.methods
             for number in range(self.seeds)
             for slices in (False, True)
             if scenario.reduction.slice or not slices
         )
+
+    def _cell(self, scenario: Scenario, method: Method, number: int, slices: bool) -> Cell:
+        """The seeds of a scenario are so far apart that two cells share either all runs or none."""
+        seed = scenario.reduction.seed + number * SEEDS_APART
+        if seed >= MOST_SEED:
+            raise UserError(
+                f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}"
+            )
+        own = {"algorithm": method.algorithm, "pair": method.pair, "seed": seed, "slice": slices}
+        reduction = scenario.reduction.model_copy(update=own)
+        return Cell(scenario.model_copy(update={"reduction": reduction}), method, seed)
 
 
 def make_plan(
@@ -157,14 +168,3 @@ def _chosen(
         except UserError as error:
             raise UserError(f"{option}: {error}; or give {' or '.join(map(repr, groups))}") from None
     return names
-
-
-def _cell(scenario: Scenario, method: Method, number: int, slices: bool) -> Cell:
-    """The seeds of a scenario are so far apart that two cells share either all runs or none."""
-    reduction = scenario.reduction
-    seed = reduction.seed + number * SEEDS_APART
-    if seed >= MOST_SEED:
-        raise UserError(f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}")
-    own = {"algorithm": method.algorithm, "pair": method.pair, "seed": seed, "slice": slices}
-    asked = reduction.model_copy(update=own)
-    return Cell(scenario.model_copy(update={"reduction": asked}), method, seed)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
@@ -127,7 +127,6 @@ def read_cell(folder: Path, cell: Cell) -> Result:
 
 
 def _read(file: RunFile, cell: Cell) -> Result:
-    """What the events of a cell's run add up to. Raises UserError."""
     state = RunState()
     # The numbers of the tests that the search and the certificates rest on, in order.
     search, fresh = dict[int, None](), dict[int, None]()
@@ -150,13 +149,14 @@ def _read(file: RunFile, cell: Cell) -> Result:
     tests, fresh_tests = ([state.tests[number - 1] for number in numbers] for numbers in (search, fresh))
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
+    problem = "it has no certificate" if state.minimal else state.reason if state.ended else "has not ended"
     # A certificate runs the whole world only where what is left missed f: its runs would show the rate as too low.
     whole = [test.outcome for test in tests if test.environment == 0 and test.outcome in ("similar", "other", "pass")]
     return Result(
         cell,
         ended=state.ended,
         minimal=minimal,
-        problem="" if minimal else _problem(state),
+        problem="" if minimal else problem,
         elements=state.elements,
         left=state.environment,
         tests=len(tests),
@@ -180,12 +180,6 @@ def _read(file: RunFile, cell: Cell) -> Result:
     )
 
 
-def _problem(state: RunState) -> str:
-    if state.minimal:
-        return "it has no certificate"
-    return state.reason if state.ended else "has not ended"
-
-
 class Paper(NamedTuple):
     """A row of the paper: the number of its table, tests, which part of the models was removed, and minutes."""
 
@@ -195,14 +189,13 @@ class Paper(NamedTuple):
     minutes: int
 
 
-@cache
-def _tables() -> dict[str, Any]:
-    return dict(yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text()))
+# The paper's tables, by scenario: their numbers, and their rows by pair.
+TABLES: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text())
 
 
 def paper_row(cell: Cell) -> Paper | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
-    table = _tables().get(cell.scenario.name, {"rows": {}})
+    table = TABLES.get(cell.scenario.name, {"rows": {}})
     row = table["rows"].get(cell.method.pair)
     return Paper(table["table"], **row) if row and cell.method.algorithm == "ddenv" and not cell.slices else None
 
@@ -245,23 +238,24 @@ class Row:
         """Their median, without those of certificates; None if nothing is minimal."""
         return median(result.tests for result in self.minimal) if self.minimal else None
 
+    @property
+    def certain(self) -> float | None:
+        """The tests of a method that is certified with all seeds; None for another, which is no success."""
+        return self.tests if self.certified else None
+
 
 def rows_of(plan: Plan, results: Sequence[Result]) -> tuple[tuple[Row, ...], ...]:
     """The `results` of the plan's cells as rows, for each scenario a row for each method."""
-
-    def row(scenario: Scenario, method: Method) -> Row:
-        without, sliced = (
-            tuple(
-                result
-                for result in results
-                if (result.cell.scenario.name, result.cell.method, result.cell.slices)
-                == (scenario.name, method, slices)
-            )
-            for slices in (False, True)
+    found = defaultdict[tuple[str, Method, bool], list[Result]](list)
+    for result in results:
+        found[result.cell.scenario.name, result.cell.method, result.cell.slices].append(result)
+    return tuple(
+        tuple(
+            Row(scenario, method, *(tuple(found[scenario.name, method, slices]) for slices in (False, True)))
+            for method in plan.methods
         )
-        return Row(scenario, method, without, sliced)
-
-    return tuple(tuple(row(scenario, method) for method in plan.methods) for scenario in plan.scenarios)
+        for scenario in plan.scenarios
+    )
 
 
 def spread(values: Sequence[float], said: Callable[[float], str]) -> str:

@@ -55,31 +55,33 @@ def content(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], 
     """The page of a study; `results` are those of the plan's cells in their order."""
     scenarios = rows_of(plan, results)
     minimal = [result for result in results if result.minimal]
-    sections = [
-        best(scenarios),
-        *(section(folder, rows) for rows in scenarios),
-        making(plan, results, sessions, folder),
+    ranking = best(scenarios)
+    sections = [section(folder, rows) for rows in scenarios]
+    yet = " yet" if any(not result.ended for result in results) else ""
+    verdict = f"None of {count(len(results), 'world')} is minimal{yet}"
+    figures = [(f"{len(minimal)} of {len(results)}", "certified")]
+    if minimal:
+        smaller = percent(mean(result.smaller for result in minimal))
+        worlds = "Every world is" if len(minimal) == len(results) else f"{len(minimal)} of {len(results)} worlds are"
+        verdict = f"{worlds} minimal: {smaller} smaller on average"
+        figures.append((smaller, "smaller, mean"))
+    figures += [
+        (thousands(sum(result.simulated for result in results)), "search tests"),
+        (thousands(sum(result.certificate_simulated for result in results)), "certificate tests"),
     ]
+    if sessions:
+        jobs = sorted({session.jobs for session in sessions})
+        workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
+        made = thousands(sum(session.tests for session in sessions))
+        figures.append((duration(sum(session.seconds for session in sessions)), f"with {workers}, {made} made"))
     return Report(
         name="ddenv study",
-        verdict=_verdict(results, minimal),
+        verdict=verdict,
         lead=tuple(_lead(results, minimal)),
-        figures=tuple(_figures(results, minimal, sessions)),
-        sections=tuple(part for part in sections if part is not None),
+        figures=tuple(figures),
+        sections=(*([ranking] if ranking else []), *sections, making(plan, results, sessions, folder)),
         foot=f"Written by ddenv {__version__}. Lengths in m, times in UTC.",
     )
-
-
-def _verdict(results: Sequence[Result], minimal: Sequence[Result]) -> str:
-    if not minimal:
-        yet = " yet" if any(not result.ended for result in results) else ""
-        return f"None of {count(len(results), 'world')} is minimal{yet}"
-    worlds = "Every world is" if len(minimal) == len(results) else f"{len(minimal)} of {len(results)} worlds are"
-    return f"{worlds} minimal: {_smaller(minimal)} smaller on average"
-
-
-def _smaller(minimal: Sequence[Result]) -> str:
-    return percent(mean(result.smaller for result in minimal))
 
 
 def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Paragraph]:
@@ -104,21 +106,6 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         )
     if missing := len(results) - len(minimal):
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
-
-
-def _figures(
-    results: Sequence[Result], minimal: Sequence[Result], sessions: Sequence[Session]
-) -> Iterator[tuple[str, str]]:
-    yield f"{len(minimal)} of {len(results)}", "certified"
-    if minimal:
-        yield _smaller(minimal), "smaller, mean"
-    yield thousands(sum(result.simulated for result in results)), "search tests"
-    yield thousands(sum(result.certificate_simulated for result in results)), "certificate tests"
-    if sessions:
-        jobs = sorted({session.jobs for session in sessions})
-        workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
-        made = thousands(sum(session.tests for session in sessions))
-        yield duration(sum(session.seconds for session in sessions)), f"with {workers}, {made} made"
 
 
 def write_study(plan: Plan, folder: Path, sessions: Sequence[Session]) -> tuple[Path, tuple[Result, ...]]:
@@ -207,7 +194,6 @@ def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], f
 
 
 def _settings(plan: Plan) -> Table:
-    """The settings that any method uses, with a column for each scenario."""
     used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
     rows = [
         (item.label, *(value_words(getattr(getattr(scenario, item.section), item.name)) for scenario in plan.scenarios))

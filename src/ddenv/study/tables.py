@@ -47,7 +47,11 @@ def models(rows: Sequence[Row]) -> int:
 
 def chart(rows: Sequence[Row]) -> str:
     """The chart of a scenario with at least one result that came to an end."""
-    own, others = _looks([row for row in rows if row.over])
+    own, others = [row for row in rows if row.over], list[Row]()
+    if len(own) > len(WIDTHS):
+        # With a colour of their own: the paper's methods, in their order, and those with the fewest tests.
+        own.sort(key=lambda row: (0,) if row.paper else (1, not row.certified, row.tests or 0.0))
+        own, others = own[: len(WIDTHS)], own[len(WIDTHS) :]
     last, most = max(1, *(result.tests for result in over(rows))), max(1, models(rows))
     at = scale(last, most, HEIGHT)
     looks = [("faint", "", 0.0, row) for row in others]
@@ -71,15 +75,6 @@ def chart(rows: Sequence[Row]) -> str:
         lines.append(f'<path class="{look}"{wide} d="M{LEFT} {y:.1f}h{SAMPLE}"/>')
         lines.append(f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{words}</text>')
     return "\n".join([opening(HEIGHT + LINE * len(legend) + 4), *axes(at, last, most), *lines, "</svg>"])
-
-
-def _looks(rows: list[Row]) -> tuple[list[Row], list[Row]]:
-    """The rows with their own colour, and all others: of many, the paper's methods and those with the fewest tests."""
-    if len(rows) <= len(WIDTHS):
-        return rows, []
-    # The paper's keep their order.
-    own = sorted(rows, key=lambda row: (0,) if row.paper else (1, not row.certified, row.tests or 0.0))[: len(WIDTHS)]
-    return own, [row for row in rows if row not in own]
 
 
 def _line_end(row: Row) -> str:
@@ -206,7 +201,6 @@ def _rate(parts: Sequence[tuple[int, int]]) -> str:
 
 
 def _left(results: Sequence[Result]) -> Cell:
-    """Each set of models that is left, the most frequent first."""
     if not results:
         return "–"
     sets = Counter(result.left for result in results)
@@ -233,28 +227,21 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     """All methods, the fewest tests first; None if too few were tried."""
     if len(scenarios[0]) < FEWEST or not any(row.minimal for rows in scenarios for row in rows):
         return None
-    fewest = [min((tests for row in rows if (tests := _certain(row)) is not None), default=None) for rows in scenarios]
-    names = tuple(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios)
-    head = ("method", *names, "times the bound, mean")
-    methods = [(_times(rows), rows) for rows in zip(*scenarios, strict=True)]
-    table: list[tuple[Cell, ...]] = [("minimum for a search that ends there", *map(_bound, scenarios), "1.0")]
-    # Methods that are not certified everywhere come last.
-    for times, rows in sorted(methods, key=lambda method: method[0] or math.inf):
-        cells = [_cell(row, least) for row, least in zip(rows, fewest, strict=True)]
-        table.append((rows[0].method.label, *cells, "–" if times is None else f"{times:.1f}"))
-    ranking = Table(head, tuple(table), range(1, len(head)))
-    return Section("Which is best where", (ranking, say(BOUNDS)))
-
-
-def _certain(row: Row) -> float | None:
-    """The tests of a method that is certified with all seeds; None for another, which is no success."""
-    return row.tests if row.certified else None
-
-
-def _times(rows: Sequence[Row]) -> float | None:
-    """The geometric mean of tests to bound: each scenario has the same weight, whatever its number of tests."""
-    ratios = [tests / row.bound for row in rows if (tests := _certain(row)) is not None and row.bound]
-    return geometric_mean(ratios) if len(ratios) == len(rows) else None
+    fewest = [min((row.certain for row in rows if row.certain is not None), default=None) for rows in scenarios]
+    head = ("method", *(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios), "times the bound, mean")
+    # As a range, since cells may differ in how many models are left.
+    bounds = (sorted({result.bound for row in rows for result in row.minimal}) for rows in scenarios)
+    least = (" to ".join(map(str, dict.fromkeys((each[0], each[-1])))) if each else "–" for each in bounds)
+    table: list[tuple[Cell, ...]] = [("minimum for a search that ends there", *least, "1.0")]
+    ranked = []
+    for rows in zip(*scenarios, strict=True):
+        # Each scenario has the same weight, whatever its number of tests. Methods not certified everywhere come last.
+        ratios = [row.certain / row.bound for row in rows if row.certain is not None and row.bound]
+        times = geometric_mean(ratios) if len(ratios) == len(rows) else math.inf
+        cells = [_cell(row, few) for row, few in zip(rows, fewest, strict=True)]
+        ranked.append((times, (rows[0].method.label, *cells, f"{times:.1f}" if times < math.inf else "–")))
+    table += [row for _, row in sorted(ranked, key=lambda each: each[0])]
+    return Section("Which is best where", (Table(head, table, range(1, len(head))), say(BOUNDS)))
 
 
 def _cell(row: Row, fewest: float | None) -> Cell:
@@ -263,9 +250,3 @@ def _cell(row: Row, fewest: float | None) -> Cell:
     if not row.certified:
         return f"{row.tests:g} ({len(row.minimal)} of {len(row.results)} certified)"
     return Strong(f"{row.tests:g} ◂") if row.tests == fewest else f"{row.tests:g}"
-
-
-def _bound(rows: Sequence[Row]) -> str:
-    """The bound as a range, since cells may differ in how many models are left."""
-    bounds = [result.bound for row in rows for result in row.minimal]
-    return " to ".join(map(str, sorted({min(bounds), max(bounds)}))) if bounds else "–"

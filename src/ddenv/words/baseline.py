@@ -19,37 +19,24 @@ def baseline(state: RunState) -> str:
     if found is None:
         return ""
     broke = f"; {count(found.broken, 'more run')} broke" if found.broken else ""
-    said = [f"Baseline: the robot {failed_in(state, found)} in {how_often(found)}{broke}."]
-    if also := other_failures(found):
-        said.append(as_sentence(f"{also} (--failure selects another one)"))
+    interval = f"95 % interval {percent(found.low)} to {percent(found.high)}"
+    often = f"{found.failures} of {count(found.runs, 'run')} ({percent(found.rate)}, {interval})"
+    said = [f"Baseline: the robot {failed_in(state, found)} in {often}{broke}."]
+    if listed := [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]:
+        others = f"other failures: {first_of(listed, MOST_FAILURES)}"
+        f = next((one for one in found.seen if one.test == found.failure_test), None)
+        if found.chose and f is not None:
+            chose = f"the first {count(found.chose, 'run')} served only to choose f"
+            others = f"{chose}: {f.name} in {f.runs} of them; {others}"
+        said.append(as_sentence(f"{others} (--failure selects another one)"))
     if found.rate < 1.0:
         said.append(as_sentence(missed(state)))
     return " ".join(said)
 
 
-def how_often(found: BaselineFinished) -> str:
-    """How often f showed: "3 of 4 runs (75 %, 95 % interval 30 % to 95 %)"."""
-    interval = f"95 % interval {percent(found.low)} to {percent(found.high)}"
-    return f"{found.failures} of {count(found.runs, 'run')} ({percent(found.rate)}, {interval})"
-
-
 def failed_in(state: RunState, found: BaselineFinished) -> str:
     """What the robot did in the f of the baseline; on a branch another failure is f."""
     return next((deed(test.failure) for test in state.tests_of((found.failure_test,))), deed(""))
-
-
-def other_failures(found: BaselineFinished) -> str:
-    """The failures besides f of the runs that chose f, with their numbers, and f itself if these runs only chose it; "" if
-    there is none.
-    """
-    listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
-    if not listed:
-        return ""
-    others = f"other failures: {first_of(listed, MOST_FAILURES)}"
-    f = next((one for one in found.seen if one.test == found.failure_test), None)
-    if not found.chose or f is None:
-        return others
-    return f"the first {count(found.chose, 'run')} served only to choose f: {f.name} in {f.runs} of them; {others}"
 
 
 def missed(state: RunState) -> str:

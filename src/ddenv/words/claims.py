@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import islice
+from collections.abc import Mapping, Sequence
 
 from ddenv.evidence.claims import (
     FreshRuns,
@@ -20,7 +19,7 @@ from ddenv.evidence.claims import (
 from ddenv.runfile.deeds import deed
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
-from ddenv.runfile.state import RunState, Trial
+from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import stack_with
 from ddenv.text import between, count, first_of, percent
 from ddenv.words.signs import metres
@@ -42,14 +41,9 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
         shown = f"; it keeps at least {percent(left.bound)}" if left.bound else ""
         return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
-    for word, start in (
-        ("unknown", "not shown that each model is needed: tests broke without"),
-        ("not shown", "not shown that each model is needed: undecided without"),
-        ("not needed", "not minimal: f shows about as often without"),
-    ):
-        names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
-        if names:
-            return f"{start} {first_of(names, MOST_NAMES)}; with everything that is left {rate(left)}"
+    verdicts = {str(claim.without): claim.verdict for claim in removals}
+    if doubt := _doubt(verdicts, "not shown that each model is needed", "not minimal: f shows", "without"):
+        return f"{doubt}; with everything that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
     if certificate.seeds:
         return f"{_exactly(certificate)}; with other seeds {rate(left)}{but}"
@@ -67,6 +61,19 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     )
     often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
+
+
+def _doubt(verdicts: Mapping[str, str], unsure: str, refuted: str, how: str) -> str:
+    """Of which models, by name, a result is `unsure` or `refuted`; "" if of none."""
+    starts = {
+        "unknown": f"{unsure}: tests broke {how}",
+        "not shown": f"{unsure}: undecided {how}",
+        "not needed": f"{refuted} about as often {how}",
+    }
+    for word, start in starts.items():
+        if names := [name for name, verdict in verdicts.items() if verdict == word]:
+            return f"{start} {first_of(names, MOST_NAMES)}"
+    return ""
 
 
 def _seldom(removals: Sequence[Claim]) -> str:
@@ -111,20 +118,21 @@ def _at_most(certificate: Certificate) -> float | None:
     return max((bound for bound in bounds if bound is not None), default=None) if None not in bounds else None
 
 
+def _as_often(bound: float | None) -> str:
+    return "rarer" if bound is None else f"at most {percent(bound)} as often"
+
+
 def shown(state: RunState) -> str:
     """What fresh runs show of what is left, by a finished certificate or so far; one sentence without a full stop."""
     if (found := current(state)) is not None:
         return verdict_on(found, never_left_out(state, found))
     said = [missing(state)]
     if (now := state.certificate) is not None:
-        bounds = [(name, claim.bound) for name, claim in so_far(state, now).items() if claim.bound is not None]
-        said += [
-            f"so far at least {percent(share)} of {_whole_rate(now)} is kept" for name, share in bounds[:1] if share
-        ]
-        less = ((name, share) for name, share in bounds[1:] if share < 1.0)
-        said += [
-            f"without {name} f shows at most {percent(share)} as often" for name, share in islice(less, MOST_NAMES)
-        ]
+        bounds = {name: claim.bound for name, claim in so_far(state, now).items() if claim.bound is not None}
+        if share := bounds.pop(None, 0.0):
+            said.append(f"so far at least {percent(share)} of {_whole_rate(now)} is kept")
+        less = [f"without {name} f shows {_as_often(share)}" for name, share in bounds.items() if share < 1.0]
+        said += less[:MOST_NAMES]
     return "; ".join(said)
 
 
@@ -135,7 +143,6 @@ def uncertified(state: RunState, run: object) -> str:
 
 
 def _stayed(pinned: int) -> str:
-    """That nothing is claimed of models that were never left out."""
     return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
 
 
@@ -207,13 +214,7 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     rate, bound = _whole_rate(certificate), claim.bound
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
         return f"shown to keep at least {percent(bound)} of {rate}, not {percent(certificate.certify_rate)}"
-    often = (
-        "with none of these seeds"
-        if claim.is_exact
-        else "rarer"
-        if bound is None
-        else f"at most {percent(bound)} as often"
-    )
+    often = "with none of these seeds" if claim.is_exact else _as_often(bound)
     return {
         "exact": f"f shows with {seeds_of(certificate)} each time",
         "kept": f"keeps at least {percent(certificate.certify_rate if bound is None else bound)} of {rate}",
@@ -234,9 +235,10 @@ def _whole_rate(certificate: Certificate) -> str:
 def of_passing(state: RunState, one: Isolation) -> str:
     """What an isolation that has ended shows, in one sentence without a full stop."""
     if not one.checks:
+        stacks = (stack_with(state, state.elements, state.elements[model]) for model in one.asked.suspects)
         return (
             "no passing world was found: the robot does not reach its goal often enough even without all "
-            f"{count(len(_may_go(state, one)), 'model')} that may be removed"
+            f"{count(len(set().union(*stacks)), 'model')} that may be removed"
         )
     check = one.checks[-1]
     gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
@@ -244,24 +246,16 @@ def of_passing(state: RunState, one: Isolation) -> str:
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(one, first)}"
     said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(one, first)}"
-    for word, start in (
-        ("unknown", "not shown that each of them has to go: tests broke with"),
-        ("not shown", "not shown that each of them has to go: undecided with"),
-        ("not needed", "not a nearest one: the robot passes about as often with"),
+    verdicts = {str(claim.back): claim.verdict for claim in backs}
+    if doubt := _doubt(
+        verdicts, "not shown that each of them has to go", "not a nearest one: the robot passes", "with"
     ):
-        found = [claim.back for claim in backs if claim.verdict == word and claim.back is not None]
-        if found:
-            return f"{said}; {start} {first_of(found, MOST_NAMES)} put back"
+        return f"{said}; {doubt} put back"
     most = max(backs, key=lambda claim: claim.high)
     back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
     if one.asked.chosen:
         return f"{said}; with {back} put back it misses its goal in a chosen run"
     return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most.reached, most)}"
-
-
-def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
-    stacks = (stack_with(state, state.elements, state.elements[model]) for model in one.asked.suspects)
-    return frozenset(name for stack in stacks for name in stack)
 
 
 def _reaching(one: Isolation, claim: Returned) -> str:
@@ -327,8 +321,7 @@ def promise(state: RunState, certificate: Certificate) -> str:
             "runs measure how often f shows, and nothing more"
         )
     kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
-    most = _at_most(certificate)
-    often = "rarer" if most is None else f"at most {percent(most)} as often"
+    often = _as_often(_at_most(certificate))
     return (
         f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f shows {often}; "
         f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
@@ -351,22 +344,23 @@ def smaller_known(state: RunState) -> str:
     nodes = [
         (len(node.environment), f"#{node.number} in the history{', taken back' if node.rejected else ''}")
         for node in state.nodes
-        if node.shown and not node.lost_rate and len(node.environment) < left and _same_f(state, node)
+        if node.shown
+        and not node.lost_rate
+        and len(node.environment) < left
+        # The same failures count as f there as now.
+        and failures_at(state, node.number) == state.failures
     ]
-    trials = [(one.size, one.label) for one in state.trials if one.size < left and _shows_f(state, one)]
+    trials = [
+        (one.size, one.label)
+        for one in state.trials
+        if one.size < left and one.verdict == "similar"
+        # Verdicts may stand although f is another failure by now.
+        if any(test.outcome == "similar" for test in state.tests_of(one.tests))
+    ]
     if not nodes and not trials:
         return ""
     size, where = min((*nodes, *trials), key=lambda each: each[0])
     return f"a smaller environment is known to show f: {count(size, 'model')} ({where})"
-
-
-def _same_f(state: RunState, node: Node) -> bool:
-    """Whether the same failures count as f in a node as now."""
-    return failures_at(state, node.number) == state.failures
-
-
-def _shows_f(state: RunState, trial: Trial) -> bool:
-    return trial.verdict == "similar" and any(test.outcome == "similar" for test in state.tests_of(trial.tests))
 
 
 def missing(state: RunState) -> str:

@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import current, failing_instead, helping
+from ddenv.evidence.claims import FreshRuns, current, failing_instead, fresh_runs, fresh_runs_made, has_dropped, helping
 from ddenv.runfile.deeds import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
+from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.text import as_sentence, count, first_of, plain
+from ddenv.runfile.tested import adoptable
+from ddenv.text import as_sentence, count, first_of, percent, plain, shortened
 from ddenv.words.baseline import baseline
-from ddenv.words.certifying import certifying
-from ddenv.words.claims import ended, instead, of_passing, of_runs, promise
-from ddenv.words.decisions import arrival, by_hand, last_reduction, older_engine, out_of_budget, rarer, to_adopt
+from ddenv.words.claims import (
+    drift,
+    ended,
+    environment_named,
+    instead,
+    of_passing,
+    of_runs,
+    promise,
+    terms,
+    usual_runs,
+)
+from ddenv.words.margins import finding
 from ddenv.words.methods import DDENV, Lines, Step, beginning, follows, fruitless, listing
-from ddenv.words.signs import metres
+from ddenv.words.news import isolating
+from ddenv.words.signs import bar, metres
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # Maximum number of kept models that a sentence names.
@@ -26,6 +39,10 @@ NAMED = 8
 NAMED_ENDS = 2
 # An end within so many epsilon of f's end may be the same failure to the user.
 NEAR = 3
+# The maximum number of pinned models that a sentence names, and the maximum width of each name in cells.
+PINNED, LONGEST = 2, 32
+# Decisions that change the environment or the search.
+_CHANGES = ("go_back", "undo", "pin", "unpin", "change", "adopt", "leave_out", "accept_other")
 _SETTLING = (
     "Finding models that support others: the piles fall and settle once, without the robot. "
     "This shows which models a removal would drop.",
@@ -53,10 +70,35 @@ def explain(snapshot: Snapshot) -> Explanation:
     if snapshot.past:
         sentences = (snapshot.happened, *sentences)
     elif not snapshot.error:
-        first = (*older_engine(snapshot), *refuted(state), *rarer(state), *to_adopt(state))
-        sentences = (*first, *sentences, *implied(state), *_offered(state), *by_hand(state))
+        sentences = (*_warnings(snapshot), *sentences, *_implied(state), *_offered(state), *_by_hand(state))
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
+
+
+def _warnings(snapshot: Snapshot) -> tuple[str, ...]:
+    """What the user has to know before anything else, and a try that could become the environment."""
+    state, said = snapshot.state, []
+    if snapshot.older_engine and snapshot.engine == "alive":
+        version = plain(snapshot.older_engine)
+        said.append(
+            f"Another version of ddenv works on this run ({version}): it may not know all commands of this version."
+        )
+    if words := refuted_words(state):
+        said.append(as_sentence(words))
+    here, rates = state.here, drift(state)
+    if has_dropped(state) and rates and here is not None and here.parent is not None:
+        before = count(len(state.nodes[here.parent].environment), "model")
+        said.append(f"f is rarer than it was: {rates[0]}. u goes back to {before}.")
+    if (last := adoptable(state)) is not None:
+        said.append(f"{last.label} shows f with {count(last.size, 'model')}: a adopts it.")
+    return tuple(said)
+
+
+def _implied(state: RunState) -> tuple[str, ...]:
+    last = next((test for test in reversed(state.tests) if test.is_finished), None)
+    if last is None or last.implied_by is None or state.ended:
+        return ()
+    return (f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",)
 
 
 def _offered(state: RunState) -> tuple[str, ...]:
@@ -65,8 +107,33 @@ def _offered(state: RunState) -> tuple[str, ...]:
     return (f"{as_sentence(plain(rare))} Press c to change it.",) if rare and not state.node and not state.ended else ()
 
 
+def _by_hand(state: RunState) -> tuple[str, ...]:
+    said = []
+    for trial in (one for one in state.trials if not one.verdict):
+        what = f"{trial.label} ({count(trial.size, 'model')})"
+        running = [test.outcome == "running" for test in state.tests_of(trial.tests)]
+        if any(running):
+            number = running.index(True)
+            again = f"re-run {number} of {settings(state).most_runs - 1}" if number else "first run"
+            said.append(f"{what} is being tested: {again}.")
+        else:
+            said.append(f"{what} is tested next, before the round goes on.")
+    pinned = [shortened(name, LONGEST) for name in state.environment if name in state.pinned]
+    # What has just been pinned is said by how the search began.
+    if pinned and not state.ended and not (_arrival(state) and state.decisions[-1].kind == "pin"):
+        said.append(f"Pinned, and so in every candidate: {first_of(pinned, PINNED)}.")
+    return tuple(said)
+
+
+def _arrival(state: RunState) -> str:
+    """How the user's last decision led to this environment; "" if there is none, or a test was made since."""
+    last = state.decisions[-1] if state.decisions else None
+    if state.here is None or last is None or last.tests != state.tests_done or last.kind not in _CHANGES:
+        return ""
+    return as_sentence(plain(last.words))
+
+
 def _happening(snapshot: Snapshot) -> Happening:
-    """The step the run is at, and the sentences on it."""
     state, options = snapshot.state, settings(snapshot.state)
     if snapshot.gone:
         return None, (
@@ -84,11 +151,16 @@ def _happening(snapshot: Snapshot) -> Happening:
     if state.baseline is None:
         return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
     if state.confirming or state.isolating is not None or state.margining is not None:
-        return _with_pause(state, ("returned", certifying(snapshot)))
+        return _with_pause(state, ("returned", _certifying(snapshot)))
     if state.round is None or state.round.done:
         return _with_pause(state, ("split", _between(snapshot, options)))
     if state.waiting_candidate is not None:
-        return "waiting", _waiting(state, state.round.candidates[state.waiting_candidate], options)
+        candidate = state.round.candidates[state.waiting_candidate]
+        before, after = len(state.environment), count(candidate.size, "model")
+        return "waiting", (
+            f"{candidate.label} shows f: {_ended(state, candidate, options)}",
+            f"The reduction waits for you: a accepts it ({before} → {after}), x rejects it and goes on.",
+        )
     return _with_pause(state, _testing(snapshot, state.round, options))
 
 
@@ -105,7 +177,6 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
 
 
 def _standing(state: RunState, status: str) -> tuple[str, ...]:
-    """Why the run stands still, and what goes on from there; none if it does not."""
     reason = plain(state.reason).rstrip(".")
     match status:
         case "starting":
@@ -116,7 +187,7 @@ def _standing(state: RunState, status: str) -> tuple[str, ...]:
             return (f"The engine could not go on: {reason}.", "Everything so far is kept; r tries again.")
         case "stopped":
             said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
-            then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
+            then = _out_of_budget(state) or ("Everything so far is kept; r resumes.",)
             return (f"The engine was {said}.", *then)
         case "lost":
             unfinished = state.tally["running"]
@@ -125,10 +196,15 @@ def _standing(state: RunState, status: str) -> tuple[str, ...]:
     return ()
 
 
+def _out_of_budget(state: RunState) -> tuple[str, ...]:
+    budget = state.budget
+    if budget is None or state.made < budget:
+        return ()
+    return (f"The budget of {count(budget, 'test')} is used up: c raises it, and the run goes on.",)
+
+
 def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     tests = state.finished_tests
-    reached = sum(test.outcome == "pass" for test in tests)
-    failed = sum(test.outcome == "failed" for test in tests)
     first = (
         f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. f is the "
         "failure that most runs end in: only worlds that show it are kept."
@@ -136,32 +212,26 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f, or they show several failures, so more runs are made."
     # The last one first: that the world is slow.
-    noted = tuple(as_sentence(plain(words)) for _, words in reversed(state.notes))
-    if not tests:
-        return (*noted, first)
-    return (*noted, first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
+    said = [*(as_sentence(plain(words)) for _, words in reversed(state.notes)), first]
+    if tests:
+        reached, failed = (sum(test.outcome == outcome for test in tests) for outcome in ("pass", "failed"))
+        said.append(f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
+    return tuple(said)
 
 
 def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
-    state = snapshot.state
+    state, here = snapshot.state, snapshot.state.here
     number = 1 if state.round is None else state.round.number + 1
     first = f"Round {number}: {beginning(options, len(state.environment))}"
-    if free := sliced(state):
+    # How the environment was cut down to its slice, until the next test is made.
+    if here is not None and here.how == "sliced" and here.tests == state.tests_done:
         # An earlier moment says itself what the slice left out, and nothing can be taken back there.
-        return (*(free[:1] if snapshot.past else free), first)
-    arrived = arrival(state)
-    if arrived:
+        free = () if snapshot.past else (f"{plain(slice_words(state, here))}. u takes it back.",)
+        return (TEACHING, *free, first)
+    if arrived := _arrival(state):
         return (arrived, first)
     then = baseline(state) if state.round is None else follows(options, state.round)
     return (first, then) if then else (first,)
-
-
-def _waiting(state: RunState, candidate: Candidate, options: Settings) -> tuple[str, ...]:
-    before, after = len(state.environment), candidate.size
-    return (
-        f"{candidate.label} shows f: {_ended(state, candidate, options)}",
-        f"The reduction waits for you: a accepts it ({before} → {count(after, 'model')}), x rejects it and goes on.",
-    )
 
 
 def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
@@ -175,7 +245,13 @@ def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
 def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening:
     state = snapshot.state
     if current.winner is not None:
-        return _reduced(state, current.candidates[current.winner], options)
+        won = current.candidates[current.winner]
+        gone = len(won.split.environment) - won.size
+        return "reduced", (
+            f"{won.label} shows f: {_ended(state, won, options)}",
+            f"E is now {won.label}: {gone + won.size} → {count(won.size, 'model')}; "
+            f"f shows without the other{'s' if gone > 1 else ' one'}.",
+        )
     candidate = snapshot.focus
     if candidate is None or candidate.verdict:
         candidate = next((each for each in current.candidates if not each.verdict), None)
@@ -183,21 +259,33 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
         words = f"{shown.label} shows f: {_ended(state, shown, options)}"
         return "waiting", (words, "The first candidate that shows f becomes E, and the round ends.")
     if candidate is None:
-        return "nothing", _nothing_found(state, current, options)
+        first = f"No candidate of round {current.number} showed f."
+        return "nothing", (first, fruitless(options, current, len(state.environment)))
     running = [test for test in snapshot.running if test.round == current.number and test.candidate == candidate.index]
     ahead = len({test.candidate for test in snapshot.running if test.round == current.number} - {candidate.index})
-    place = _place(candidate, current)
+    place = f"candidate {candidate.index + 1} of {len(current.candidates)}"
+    place = f"{candidate.label} ({count(candidate.size, 'model')}), {place}"
     if not running:
-        return "next", (*last_reduction(state), _next(state, candidate, place, options))
+        return "next", (*_last_reduction(state), _next(state, candidate, place, options))
     # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
     test = running[0]
-    first = not _number(candidate, test)
-    sentences = _first_run(place, options) if first else _rerun(state, candidate, test, place, options)
+    # Its run number differs where chosen runs are repeated.
+    number = candidate.tests.index(test.id) if test.id in candidate.tests else test.run
+    sentences = _of_run(state, candidate, number, place, options)
     if beside := len(running) - 1:
-        sentences = (*sentences, f"Idle workers make {count(beside, 're-run')} of it at the same time.")
+        sentences += (f"Idle workers make {count(beside, 're-run')} of it at the same time.",)
     if ahead:
-        sentences = (*sentences, f"Idle workers test {count(ahead, 'later candidate')} at the same time.")
-    return "test" if first else "rerun", sentences
+        sentences += (f"Idle workers test {count(ahead, 'later candidate')} at the same time.",)
+    return "rerun" if number else "test", sentences
+
+
+def _last_reduction(state: RunState) -> tuple[str, ...]:
+    """The last reduction, until the next test is made: a step shows its result."""
+    here = state.here
+    if here is None or here.how != "reduced" or here.parent is None or here.tests != state.tests_done:
+        return ()
+    before = len(state.nodes[here.parent].environment)
+    return (f"{here.what} showed f: {before} → {count(len(here.environment), 'model')}.",)
 
 
 def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
@@ -213,36 +301,23 @@ def _next(state: RunState, candidate: Candidate, place: str, options: Settings) 
     return f"Next is re-run {len(candidate.tests)} of {options.most_runs - 1} of {place}: {again}"
 
 
-def _place(candidate: Candidate, current: Round) -> str:
-    """A candidate, and its place among the others."""
-    place = f"candidate {candidate.index + 1} of {len(current.candidates)}"
-    return f"{candidate.label} ({count(candidate.size, 'model')}), {place}"
-
-
-def _first_run(place: str, options: Settings) -> tuple[str, ...]:
-    return (
-        f"First run of {place}.",
-        f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within {options.epsilon:g} m of "
-        "f's end.",
-    )
-
-
-def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, options: Settings) -> tuple[str, ...]:
+def _of_run(state: RunState, candidate: Candidate, number: int, place: str, options: Settings) -> tuple[str, ...]:
+    """What a run of a candidate is for, its `number` counted from 0."""
+    if not number:
+        return (
+            f"First run of {place}.",
+            f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within "
+            f"{options.epsilon:g} m of f's end.",
+        )
     if shown := _shown_of(state, candidate):
         return (
-            f"Run {_number(candidate, test) + 1} of {place}: {shown}.",
+            f"Run {number + 1} of {place}: {shown}.",
             "It is accepted once its runs show that it keeps the rate of f, and dropped once that is unlikely.",
         )
-    before = _last(state, candidate)
     return (
-        f"Re-run {_number(candidate, test)} of {options.most_runs - 1} of {place}: {_why_again(before)}",
+        f"Re-run {number} of {options.most_runs - 1} of {place}: {_why_again(_last(state, candidate))}",
         f"A failure can be flaky: a candidate is dissimilar after at most {count(options.most_runs, 'test')} without f.",
     )
-
-
-def _number(candidate: Candidate, test: Test) -> int:
-    """The place of a test among those of its candidate, from 0. Its run number differs where chosen runs are repeated."""
-    return candidate.tests.index(test.id) if test.id in candidate.tests else test.run
 
 
 def _shown_of(state: RunState, candidate: Candidate) -> str:
@@ -255,34 +330,15 @@ def _shown_of(state: RunState, candidate: Candidate) -> str:
 def _why_again(before: Test | None) -> str:
     if before is None:
         return "another seed is tried at the same time."
+    away = metres(before.distance)
+    how = f"{'' if before.failure in DEEDS else ' elsewhere,'} {away} from f's end" if away else ", but not as in f"
     reasons = {
         "pass": "the goal was reached.",
-        "other": _otherwise(before),
+        "other": f"the robot {deed(before.failure)}{how}.",
         "error": "the simulation broke.",
         "timeout": "the test took too long on the clock.",
     }
     return f"last time {reasons.get(before.outcome, 'f was not seen.')}"
-
-
-def _otherwise(test: Test) -> str:
-    away = metres(test.distance)
-    if not away:
-        return f"the robot {deed(test.failure)}, but not as in f."
-    return f"the robot {deed(test.failure)}{'' if test.failure in DEEDS else ' elsewhere,'} {away} from f's end."
-
-
-def _reduced(state: RunState, candidate: Candidate, options: Settings) -> Happening:
-    before, after = len(candidate.split.environment), candidate.size
-    gone = "f shows without the others" if before - after > 1 else "f shows without the other one"
-    return "reduced", (
-        f"{candidate.label} shows f: {_ended(state, candidate, options)}",
-        f"E is now {candidate.label}: {before} → {count(after, 'model')}; {gone}.",
-    )
-
-
-def _nothing_found(state: RunState, current: Round, options: Settings) -> tuple[str, ...]:
-    first = f"No candidate of round {current.number} showed f."
-    return (first, fruitless(options, current, len(state.environment)))
 
 
 def _finished(state: RunState) -> Happening:
@@ -294,7 +350,7 @@ def _finished(state: RunState) -> Happening:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else helping(found)
         out = (f"{plain(helps[0])} only helps: press H to leave it out and search again.",) if helps else ()
-        return "returned", (_reason(state, "The run ended early."), *out, *out_of_budget(state), left)
+        return "returned", (_reason(state, "The run ended early."), *out, *_out_of_budget(state), left)
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
@@ -342,22 +398,60 @@ def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> 
     return next((test for test in tests if test.outcome == outcome or (outcome is None and test.is_finished)), None)
 
 
-def sliced(state: RunState) -> tuple[str, ...]:
-    """How the environment was cut down to its slice, until the next test is made."""
-    here = state.here
-    if here is None or here.how != "sliced" or here.tests != state.tests_done:
+# While fresh runs show what the result of the rounds is worth, or find the nearest world that passes.
+
+
+def _certifying(snapshot: Snapshot) -> tuple[str, ...]:
+    state = snapshot.state
+    if state.isolating is not None:
+        return (
+            "Isolation: removing as few models as possible from the whole world so that the robot reaches its goal.",
+            f"Now {plain(isolating(state))}. The result of the reduction does not change.",
+        )
+    if state.margining is not None:
+        return (
+            "Margins: each number is changed in turn, to see how far it can go before f disappears.",
+            f"Now {plain(finding(state))}. The result of the reduction does not change.",
+        )
+    certificate = state.certificate
+    if certificate is None:
+        return ("The rounds are over.",)
+    if certificate.claims:
+        over = "The certificate is finished."
+        if certificate.claims[0].verdict == "lost":
+            over = "What is left keeps too little of the rate. Earlier ones are run to find the last one not shown to have lost it."
+        return (over, *_now(snapshot, certificate))
+    made = fresh_runs_made(state, certificate)
+    done = f"{made} {'is' if made == 1 else 'are'} done"
+    rows, aim = fresh_runs(state), certificate.certify_rate
+    shown = rows[0].bound or 0.0 if rows else 0.0
+    kept = f"at least {percent(shown)} is kept" if shown else "nothing is shown yet"
+    return (
+        *(() if certificate.seeds else (f"{bar(shown, aim)} {kept}, aim {percent(aim)}",)),
+        f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
+        f"By the rate of the whole world, this takes about {usual_runs(state, certificate)}; {done}.",
+        *_so_far(rows),
+        *_now(snapshot, certificate),
+    )
+
+
+def _so_far(rows: Sequence[FreshRuns]) -> tuple[str, ...]:
+    if not rows or not rows[0].runs:
         return ()
-    words = plain(slice_words(state, here))
-    return (TEACHING, f"{words}. u takes it back.")
+    left, whole = rows[0], rows[-1]
+    beside = ""
+    if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
+        beside = f", and in {of_runs(whole.shown, whole.runs)} of {environment_named(whole.node)}"
+    return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
 
 
-def implied(state: RunState) -> tuple[str, ...]:
-    last = next((test for test in reversed(state.tests) if test.is_finished), None)
-    if last is None or last.implied_by is None or state.ended:
+def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
+    # A test of the certificate before may still run.
+    running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
+    if not running:
         return ()
-    return (f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",)
-
-
-def refuted(state: RunState) -> tuple[str, ...]:
-    words = refuted_words(state)
-    return (as_sentence(words),) if words else ()
+    test = running[0]
+    what = "everything that is left" if test.node == certificate.node else environment_named(test.node)
+    if test.without is not None:
+        what = f"everything that is left except {plain(test.without)}"
+    return (f"Now: run {test.run - certificate.first_run + 1} of {what}.",)

@@ -45,16 +45,15 @@ class Row:
 
 def rows(margins: Margins) -> tuple[Row, ...]:
     """The table of all numbers that were looked at."""
-    return tuple(map(_row, margins_of(margins)))
-
-
-def _row(one: Margin) -> Row:
-    name, now = one.asked.name, f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
-    sides = [side for side in one.sides if side.tried]
-    until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_all(side)}" for side in sides)
-    instead = ", ".join(words for side in sides if (words := _from(side)))
-    sentence = f"{name} ({now}): {'; '.join(_said(side) for side in sides)}"
-    return Row((name, now, until, instead or "-", str(one.runs)), sentence, one)
+    found = []
+    for one in margins_of(margins):
+        name, now = one.asked.name, f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
+        sides = [side for side in one.sides if side.tried]
+        until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_all(side)}" for side in sides)
+        instead = ", ".join(words for side in sides if (words := _from(side)))
+        sentence = f"{name} ({now}): {'; '.join(_said(side) for side in sides)}"
+        found.append(Row((name, now, until, instead or "-", str(one.runs)), sentence, one))
+    return tuple(found)
 
 
 def _all(side: Side) -> str:
@@ -73,7 +72,6 @@ def _from(side: Side) -> str:
 
 
 def _said(side: Side) -> str:
-    """What the values on one side show: only of these."""
     words = []
     if side.until is not None:
         all_of_them = ", the farthest value tried" if _all(side) else ""

@@ -11,7 +11,7 @@ from ddenv.evidence.claims import in_the_making, never_left_out
 from ddenv.runfile.deeds import DEEDS
 from ddenv.runfile.events import Implied, TestFinished, TestLost, TestStarted
 from ddenv.runfile.position import Moment
-from ddenv.runfile.progress import Removal, Returned
+from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import purpose
@@ -27,11 +27,7 @@ CONFIRMING = "certifying what is left with fresh runs"
 # A line names so many of the models that a removal leaves out.
 MOST_NAMES = 3
 # Events whose text is always the same.
-SAID = {
-    "paused": "paused",
-    "resumed": "resumed",
-    "supports_started": SETTLING,
-}
+SAID = {"paused": "paused", "resumed": "resumed", "supports_started": SETTLING}
 # Hints for readers who see only these lines.
 HINTS = {
     "paused": " from a workbench; to resume, attach with 'ddenv open'",
@@ -131,19 +127,18 @@ def _candidate_judged(before: RunState, after: RunState) -> str:
 
 
 def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> str:
-    return "".join(f"  {_judgement(state, one)}" for one in judged)
-
-
-def _judgement(state: RunState, one: Candidate | Trial | Removal) -> str:
-    """A verdict, and how its tests ended: "part A (3 models): dissimilar after 4 tests (2 pass, 2 stuck), implied by test 3"."""
-    if isinstance(one, Removal):
-        what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
-    else:
-        what = f"{one.label} ({count(one.size, 'model')})"
-    tests, implied = [test for test in state.tests_of(one.tests) if test.is_finished], implied_words(state, one.tests)
-    endings = Counter(_ending(state, test) for test in tests)
-    ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
-    return f"{what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{f', {implied}' if implied else ''}"
+    """Verdicts, and how the tests ended: "part A (3 models): dissimilar after 4 tests (2 pass, 2 stuck), implied by test 3"."""
+    said = []
+    for one in judged:
+        if isinstance(one, Removal):
+            what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
+        else:
+            what = f"{one.label} ({count(one.size, 'model')})"
+        endings = Counter(_ending(state, test) for test in state.tests_of(one.tests) if test.is_finished)
+        ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
+        implied = f", {words}" if (words := implied_words(state, one.tests)) else ""
+        said.append(f"  {what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{implied}")
+    return "".join(said)
 
 
 def _ending(state: RunState, test: Test) -> str:
@@ -175,15 +170,6 @@ def _certificate_started(_: RunState, after: RunState) -> str:
     return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
 
 
-def _certificate_finished(_: RunState, after: RunState) -> str:
-    last = after.certificates[-1]
-    return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
-
-
-def _passes(first: Returned) -> str:
-    return f"  fresh runs: the robot reaches its goal in {first.reached} of {first.runs}: {first.verdict}"
-
-
 def _ended(_: RunState, after: RunState) -> str:
     known = smaller_known(after)
     return f"{after.status}: {after.reason}{f'; {known}' if known else ''}"
@@ -209,7 +195,10 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
     "sliced": lambda _, after: f"  reduced to {_left(after)}: {slice_words(after, after.nodes[after.node])}",
     "slices_refuted": lambda _, after: refuted_words(after),
     "certificate_started": _certificate_started,
-    "certificate_finished": _certificate_finished,
+    "certificate_finished": lambda _, after: (
+        f"  certificate {after.certificates[-1].number}: "
+        f"{verdict_on(after.certificates[-1], never_left_out(after, after.certificates[-1]))}"
+    ),
     "rate_lost": lambda _, after: f"  back to {_left(after)}, the last environment not shown to have lost the rate",
     "left_out": lambda _, after: (
         f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
@@ -218,7 +207,11 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
         f"{ISOLATING}: removing as few models as possible from the whole world so that the robot reaches its goal"
     ),
     "removal_judged": lambda before, after: _judged(after, after.removals.changed_since(before.removals)),
-    "isolation_checked": lambda _, after: _passes(after.isolations[-1].checks[-1].claims[0]),
+    "isolation_checked": lambda _, after: (
+        "  fresh runs: the robot reaches its goal in {0.reached} of {0.runs}: {0.verdict}".format(
+            after.isolations[-1].checks[-1].claims[0]
+        )
+    ),
     "isolation_given_up": lambda *_: (
         "the search for the nearest world that passes is abandoned; the reduction is unchanged"
     ),

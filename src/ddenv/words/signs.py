@@ -57,6 +57,17 @@ CLAIM = {
     "not shown": "?",
     "unknown": "✗",
 }
+# How a run came to an environment, by the `how` of its node: in few words, and in a line.
+CAME_BY = {
+    "start": ("", "where the run began"),
+    "reduced": ("", "reduced to what shows f"),
+    "adopted": ("adopted by hand", "a try by hand that showed f"),
+    "accepted": ("another failure, accepted by hand", "another failure, accepted as f, too"),
+    "instead": ("a branch to its failure", "a branch: the failure of this test is f here"),
+    "certified": ("by a certificate", "reduced by a certificate: fresh runs show f as often"),
+    "left_out": ("left out by hand", "left out by hand: it only helped (certificate)"),
+    "sliced": ("without a test", "reduced to the models that affected runs"),
+}
 # What would fall once one of its supports is gone, on the map and in the table.
 DROPS = "↓"
 _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")

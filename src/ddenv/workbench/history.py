@@ -17,7 +17,7 @@ from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.progress import Node
 from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.claims import of_runs, seen
-from ddenv.words.decisions import CAME_BY
+from ddenv.words.signs import CAME_BY
 from ddenv.words.slices import slice_in_short
 from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.help.footer import KeyFooter

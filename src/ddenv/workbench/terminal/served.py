@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.page.policy import of_scripts, policy
+from ddenv.page.html import of_scripts, policy
 from ddenv.runs.programs import how_to_install
 
 HOST = "127.0.0.1"
