@@ -81,7 +81,7 @@ async def test_names_that_cannot_be_files_are_told(scenarios, run, started):
     async with Opened() as session:
         for name, words in NAMES:
             # A NUL can be pasted, though not typed.
-            field = session.screen.query_one("#name", Input)
+            field = session.screen.query_one("#run_name", Input)
             field.value = name
             await session.press("ctrl+s")
             assert words in session.wrong(), name
@@ -112,7 +112,7 @@ async def test_what_is_typed_right_after_tab_goes_to_the_next_field(scenarios):
         assert [session.value(id) for id in ("epsilon", "jobs", "spawn_x")] == [before, "3", "-1"]
 
 
-NUMBERS = {"spawn_x": "-0.56", "spawn_y": "6.75", "spawn_yaw": "-1.571", "goal_x": "-12.05", "goal_y": "-104.5"}
+NUMBERS = {"spawn_x": "-0.56", "spawn_y": "6.75", "yaw": "-1.571", "goal_x": "-12.05", "goal_y": "-104.5"}
 
 
 def shown(session, id):

@@ -35,7 +35,7 @@ def scenario_of(path):
 async def test_it_starts_from_the_run_file_alone(made, runs, started):
     async with Opened(screen=lambda: SetupScreen(like=made)) as session:
         assert session.told("about").startswith("11 models. As in the run crates-1.")
-        assert session.value("name") == "crates-2"
+        assert session.value("run_name") == "crates-2"
         assert "save it as a file" in session.told("command")
         session.fill(iterations="9", spawn_y="1")
         await session.press("ctrl+s")
@@ -150,7 +150,7 @@ async def test_the_key_asks_for_a_name_and_never_overwrites_unasked(scenarios, t
         await session.settle()
         saved = load_scenario(taken)
         assert (saved.reduction.iterations, saved.goal.y) == (8, 1.5)
-        assert same(saved, session.screen._scenario())
+        assert same(saved, session.screen._asked()[1])
     assert recent_files() == [taken]
 
 

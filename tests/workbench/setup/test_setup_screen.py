@@ -20,7 +20,7 @@ async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
         assert "11 models. A robot drives" in session.screen.query_one("#about", Static).render().plain
         settings = {"iterations": "3", "timeout": "45", "epsilon": "0.33", "seed": "0", "jobs": "4"}
         assert {id: session.value(id) for id in settings} == settings
-        assert session.value("name") == "crates-1"
+        assert session.value("run_name") == "crates-1"
         assert session.method() == ["ddenv", "model2model", "failure-proximal"]
 
 
@@ -139,9 +139,9 @@ async def test_an_open_list_shows_all_its_names(scenarios):
 WRONG = (
     ("iterations", "three", "iterations: expected a whole number, found 'three'"),
     ("timeout", "", "timeout s: missing"),
-    ("spawn_yaw", "-inf", "yaw rad: expected -1000 to 1000, found -inf"),
+    ("yaw", "-inf", "yaw rad: expected -1000 to 1000, found -inf"),
     ("jobs", "0", "jobs: expected 1 to 1024, found 0"),
-    ("name", " ", "run name: missing"),
+    ("run_name", " ", "run name: missing"),
 )
 
 
@@ -226,11 +226,11 @@ async def test_a_world_that_cannot_be_read_leaves_nothing_of_the_one_before(scen
         assert session.value("spawn_x") and session.told("about")
         await session.open(broken)
         assert "found no <world>" in session.screen.query_one(WorldMap).notice
-        assert [session.value(id) for id in ("spawn_x", "goal_y", "name")] == ["", "", ""]
+        assert [session.value(id) for id in ("spawn_x", "goal_y", "run_name")] == ["", "", ""]
         assert [session.told(id) for id in ("about", "picking", "command")] == ["", "", ""]
         assert session.told("cost") == "not ready: choose a scenario or a world that can be read"
         await session.open(scenarios / "crates.yaml")
-        assert session.value("spawn_x") and session.value("name") == "crates-1"
+        assert session.value("spawn_x") and session.value("run_name") == "crates-1"
 
 
 @pytest.mark.screens
@@ -255,7 +255,7 @@ async def test_recent_runs_are_listed_and_opened(scenarios, runs):
 @pytest.mark.screens
 async def test_letters_are_typed_into_fields_and_help_and_quit_elsewhere(scenarios):
     async with Opened() as session:
-        field = session.screen.query_one("#name", Input)
+        field = session.screen.query_one("#run_name", Input)
         field.focus()
         field.value = ""
         await session.press("q", "question_mark", "s", "g", "h", "0", "minus")
