@@ -25,7 +25,7 @@ from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.fields import OptionsForm
-from ddenv.workbench.setup.files import FileList, recent_files
+from ddenv.workbench.setup.files import FileList, OpenFile, SaveScenario, recent_files
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file, whole_cost
 from ddenv.workbench.shared.background import call_if_open
@@ -168,8 +168,6 @@ class SetupScreen(Screen[None]):
         self.post_message(ShowRun(self.query_one(RunList).run_of(event.option_id).path))
 
     def action_open(self) -> None:
-        from ddenv.workbench.setup.files import OpenFile
-
         self.app.push_screen(OpenFile(Path.cwd()), self._opened)
 
     def _opened(self, path: Path | None) -> None:
@@ -302,8 +300,6 @@ class SetupScreen(Screen[None]):
         self.form.complain(error)
 
     def action_save(self) -> None:
-        from ddenv.workbench.setup.save_scenario import SaveScenario
-
         try:
             _, scenario = self._asked()
         except UserError as error:
