@@ -22,7 +22,7 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.text import plain
 from ddenv.workbench.shared.bindings import keys
-from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
+from ddenv.workbench.shared.messages import Attention, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
 
@@ -75,7 +75,7 @@ class Workbench(App[int]):
     """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
 
     `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start
-    with. With `watch` the run is only watched, never guided. `first` is another screen to start at.
+    with. With `watch` the run is only watched, never guided. `first` makes another screen to start at, and may raise UserError.
     """
 
     TITLE = "ddenv"
@@ -106,7 +106,7 @@ class Workbench(App[int]):
         watch: bool = False,
         config: Config | None = None,
         file: Path | None = None,
-        first: ShowLessons | ShowLesson | ShowRace | None = None,
+        first: Callable[[], Screen[Any]] | None = None,
     ) -> None:
         super().__init__()
         self._written = Written()
@@ -117,7 +117,7 @@ class Workbench(App[int]):
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
         self._held: tuple[str, dict[str, Any]] | None = None
-        self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
+        self._first, self._run, self._watch, self._file = first, run, watch, file
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
 
@@ -126,7 +126,7 @@ class Workbench(App[int]):
 
     def compose(self) -> ComposeResult:
         # Shown at once: the first screen takes a moment to load.
-        what = f"  opening {plain(self._first.run.stem)} ..." if isinstance(self._first, ShowRun) else ""
+        what = "" if self._run is None else f"  opening {plain(self._run.stem)} ..."
         yield Static(Text(" ddenv", "bold").append(what, "not bold dim"), markup=False)
 
     def get_css_variables(self) -> dict[str, str]:
@@ -165,8 +165,9 @@ class Workbench(App[int]):
             self.call_after_refresh(self._begin)
 
     def _begin(self) -> None:
+        asked = ShowSetup(file=self._file) if self._run is None else ShowRun(self._run, self._watch)
         try:
-            self.push_screen(self._screen_for(self._first))
+            self.push_screen(self._screen_for(asked) if self._first is None else self._first())
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
         if not self.is_headless:
@@ -185,23 +186,11 @@ class Workbench(App[int]):
             self.clear_notifications()
             super().notify(message, **options)
 
-    def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson | ShowRace) -> Screen[Any]:
+    def _screen_for(self, asked: ShowRun | ShowSetup) -> Screen[Any]:
         if isinstance(asked, ShowRun):
             from ddenv.workbench.run.run_screen import RunScreen
 
             return RunScreen(asked.run, asked.engine, asked.watch, classes_at(RunScreen, self.size))
-        if isinstance(asked, ShowLessons):
-            from ddenv.workbench.learn.lessons_screen import LessonsScreen
-
-            return LessonsScreen(asked.opens)
-        if isinstance(asked, ShowLesson):
-            from ddenv.workbench.learn.lesson_screen import LessonScreen
-
-            return LessonScreen(asked.run)
-        if isinstance(asked, ShowRace):
-            from ddenv.workbench.learn.race_screen import race_of_runs
-
-            return race_of_runs(asked.runs)
         from ddenv.workbench.setup.setup_screen import SetupScreen
 
         return SetupScreen(self._reading, asked.like, asked.file, classes_at(SetupScreen, self.size))

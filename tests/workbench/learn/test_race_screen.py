@@ -10,8 +10,8 @@ from ddenv.learn.score import Score
 from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.race_screen import RacerPane, RaceScreen
-from ddenv.workbench.shared.messages import ShowLessons, ShowRace
+from ddenv.workbench.learn.lessons_screen import LessonsScreen
+from ddenv.workbench.learn.race_screen import RacerPane, RaceScreen, race_of_runs
 from tests.command import in_process
 from tests.tiers import slow
 from tests.waiting import eventually
@@ -32,7 +32,7 @@ def titles(pilot):
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_a_race_in_a_lesson(size):
     keep_score(NAME, Score(step=STEP))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=size) as pilot:
+    async with Workbench(first=lambda: LessonsScreen(bundled()[0])).run_test(size=size) as pilot:
         await pilot.pause()
         course = pilot.app.screen.course
         right = course.page.question.right
@@ -62,7 +62,7 @@ async def test_a_race_in_a_lesson(size):
 
 async def test_a_race_is_skipped():
     keep_score(NAME, Score(step=STEP))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
+    async with Workbench(first=lambda: LessonsScreen(bundled()[0])).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         await pilot.press("s")
         assert pilot.app.screen.course.due and "Skipped" in said(pilot, "lesson-text")
@@ -84,7 +84,7 @@ def two_runs(tmp_path):
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_runs_race_by_themselves_to_the_end(two_runs, size, monkeypatch):
     monkeypatch.setattr("ddenv.workbench.learn.race_screen.PACE", 0.01)
-    async with Workbench(first=ShowRace(two_runs)).run_test(size=size) as pilot:
+    async with Workbench(first=lambda: race_of_runs(two_runs)).run_test(size=size) as pilot:
         await pilot.pause()
         screen = pilot.app.screen
         assert "ddenv model2model/" in str(screen.query(RacerPane).first()._said.content)
@@ -99,7 +99,7 @@ async def test_runs_race_by_themselves_to_the_end(two_runs, size, monkeypatch):
 async def test_a_race_is_paused(two_runs, monkeypatch):
     # The next test would come in an hour.
     monkeypatch.setattr("ddenv.workbench.learn.race_screen.PACE", 3600.0)
-    async with Workbench(first=ShowRace(two_runs)).run_test(size=(80, 24)) as pilot:
+    async with Workbench(first=lambda: race_of_runs(two_runs)).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         for key, words in (
             ("space", "runs"),

@@ -8,9 +8,9 @@ from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_screen import LessonScreen
+from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.messages import ShowLessons
 from tests.tiers import slow
 from tests.waiting import eventually
 
@@ -22,7 +22,7 @@ STEP = next(number for number, step in enumerate(open_lesson(bundled()[0]).lesso
 @pytest.fixture
 def at_the_step():
     keep_score(NAME, Score(step=STEP))
-    return Workbench(first=ShowLessons(bundled()[0]))
+    return Workbench(first=lambda: LessonsScreen(bundled()[0]))
 
 
 async def begin(pilot):
