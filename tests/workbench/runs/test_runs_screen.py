@@ -10,10 +10,9 @@ from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.side_by_side import SideBySide
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.runs.compare_runs import differences, lines
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
-from ddenv.workbench.runs.runs_table import RunTable
+from ddenv.workbench.runs.runs_table import RunTable, compared, differences
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from tests.tiers import slow
 
@@ -218,7 +217,7 @@ async def test_two_runs_are_compared(several, runs):
         await listed.press("c")
         assert isinstance(listed.app.screen, SideBySide)
         other = next(run for run in RunsFolder(runs).look() if run.path.stem == "other")
-    said = {name: values for name, *values in lines(marked, other)}
+    said = {name: values for name, *values in compared(marked, other)}
     assert said["models left"] == ["2 of 11 models", "5 of 11 models"]
     assert said["in both"][0] == "2: crate_00, crate_01"
     assert said["only in this one"] == ["none", "3: crate_02, crate_03, crate_04"]
