@@ -39,10 +39,16 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
     words = [sys.executable, "-m", "ddenv"]
     if run is not None:
         from ddenv.runs.folder import find_run
+        from ddenv.workbench.shared.observed import Observed
 
-        words += ["open", str(_existing(find_run(run)))]
-    _check_free(port)
-
+        Observed(path := find_run(run)).close()
+        words += ["open", str(path.resolve())]
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError as error:
+            raise UserError(f"--port {port}: {error.strerror}; give another --port") from None
     token = secrets.token_urlsafe(TOKEN_BYTES)
 
     class Guarded(Server):
@@ -97,39 +103,18 @@ def guard(port: int, token: str) -> Any:
             # Other pages must not show it in a frame to catch clicks.
             response.headers["X-Frame-Options"] = "DENY"
             response.headers["Referrer-Policy"] = "no-referrer"
-            response.headers["Content-Security-Policy"] = _policy(response, sources)
+            text = response.text if response.content_type == "text/html" and hasattr(response, "text") else ""
+            # What a page may load and run: the terminal of textual-serve, and the connection to the workbench.
+            rules = {
+                "script-src": f"'self' {of_scripts(text or '')}".strip(),
+                # The terminal writes the style of each cell.
+                "style-src": "'self' 'unsafe-inline'",
+                "font-src": "'self'",
+                "img-src": "'self' data:",
+                "connect-src": f"'self' {sources}",
+                "frame-ancestors": "'none'",
+            }
+            response.headers["Content-Security-Policy"] = policy(rules)
         return response
 
     return only_own
-
-
-def _policy(response: Any, sources: str) -> str:
-    """What a page may load and run: the terminal of textual-serve, and the connection to the workbench."""
-    text = response.text if response.content_type == "text/html" and hasattr(response, "text") else ""
-    return policy(
-        {
-            "script-src": f"'self' {of_scripts(text or '')}".strip(),
-            # The terminal writes the style of each cell.
-            "style-src": "'self' 'unsafe-inline'",
-            "font-src": "'self'",
-            "img-src": "'self' data:",
-            "connect-src": f"'self' {sources}",
-            "frame-ancestors": "'none'",
-        }
-    )
-
-
-def _existing(run: Path) -> Path:
-    from ddenv.workbench.shared.observed import Observed
-
-    Observed(run).close()
-    return run.resolve()
-
-
-def _check_free(port: int) -> None:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except OSError as error:
-            raise UserError(f"--port {port}: {error.strerror}; give another --port") from None
