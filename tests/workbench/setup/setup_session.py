@@ -1,6 +1,6 @@
 """The setup screen in a test: what it shows, and what is typed into it."""
 
-from contextlib import suppress
+from contextlib import asynccontextmanager, suppress
 
 import fake_run
 import yaml
@@ -50,7 +50,7 @@ class Session:
             self.screen.query_one(f"#{id}").value = text
 
     def wrong(self):
-        return self.screen.query_one("#wrong", Static).render().plain
+        return self.told("wrong")
 
     def method(self):
         return [self.screen.query_one(f"#{kind}", Select).value for kind in KINDS]
@@ -81,10 +81,14 @@ class Session:
         """What stands in the place of the map."""
         return self.screen.query_one(WorldMap).notice
 
-    def place(self, **others):
+    async def filled(self, **texts):
+        self.fill(**texts)
+        await self.pilot.pause()
+
+    async def place(self, **others):
         """A start and a goal in an empty place."""
         places = {"spawn_x": "-6", "spawn_y": "0", "spawn_z": "0.16", "yaw": "0", "goal_x": "6", "goal_y": "0"}
-        self.fill(**places | others)
+        await self.filled(**places | others)
 
     def refused(self):
         """What the dialog says is wrong."""
@@ -97,20 +101,13 @@ class Session:
         await self.settle()
 
 
-class Opened:
-    def __init__(self, size=(120, 36), reading=None, screen=None):
-        self.size, self.reading, self.screen = size, reading, screen
-
-    async def __aenter__(self):
-        app = Workbench(reading=self.reading)
-        self._context = app.run_test(size=self.size)
-        pilot = await self._context.__aenter__()
+@asynccontextmanager
+async def Opened(size=(120, 36), reading=None, screen=None):
+    app = Workbench(reading=reading)
+    async with app.run_test(size=size) as pilot:
         await pilot.pause()
-        if self.screen is not None:
-            await app.switch_screen(self.screen())
+        if screen is not None:
+            await app.switch_screen(screen())
         session = Session(app, pilot)
         await session.settle()
-        return session
-
-    async def __aexit__(self, *error):
-        await self._context.__aexit__(*error)
+        yield session

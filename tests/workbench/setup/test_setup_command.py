@@ -133,8 +133,7 @@ async def test_the_options_of_the_command_line_are_part_of_it(scenarios, tmp_pat
     world.write_text(f"<sdf version='1.9'><world name='w'>{house}</world></sdf>")
     async with Opened(reading=reading) as session:
         await session.open(world)
-        session.place()
-        await session.pilot.pause()
+        await session.place()
         words = shlex.split(session.told("command"))
         assert ("--inside" in words) == bool(given), words
 
@@ -149,27 +148,12 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
         await session.open(path)
         assert session.told("command") == ""
         assert "not ready: spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
-        session.place()
-        await session.pilot.pause()
+        await session.press("f8")
+        assert session.app.clipboard == "" and session.app.focused.id == "spawn_x"
+        await session.place()
         words = shlex.split(session.told("command"))[1:]
         assert words[2] == str(path)
         assert words[3:5] == ["--spawn=-6,0,0.16,0", "--goal=6,0"]
         scenario, run = asked_by(words)
         assert scenario == session.screen._asked()[1]
         assert run.stem == "it-s-1"
-
-
-@pytest.mark.screens
-async def test_what_is_wrong_has_no_command_to_copy(scenarios):
-    async with Opened() as session:
-        session.fill(timeout="soon")
-        await session.pilot.pause()
-        assert "not ready: timeout s: expected a number" in session.told("cost")
-        await session.press("f8")
-        assert session.app.clipboard == ""
-        assert session.app.focused.id == "timeout"
-
-
-def test_other_files_are_named_whole(own, tmp_path):
-    words = told(tmp_path / "crates.yaml", own, own)
-    assert words == ["ddenv", "run", str(tmp_path / "crates.yaml")]

@@ -2,8 +2,6 @@
 
 import fake_run
 
-from ddenv.workbench.setup import form
-from ddenv.workbench.setup.fields import not_used
 from ddenv.workbench.setup.start_run import Past, past_of, whole_cost
 from ddenv.world.scenario import Scenario
 
@@ -36,21 +34,3 @@ def test_tests_and_time_are_told():
     assert whole_cost(scenario(budget=9), 43, 1, known) == (
         "9 tests at most: 4 for the baseline, then the search; 25 s with 1 job at 3.0 s a test, as before"
     )
-
-
-def test_more_iterations_and_more_models_cost_more():
-    def tests(models, **reduction):
-        return int(whole_cost(scenario(**reduction), models, 2, Past()).split()[1].replace(",", ""))
-
-    assert tests(43, accept_rate="first", iterations=0) < tests(43, accept_rate="first", iterations=8)
-    assert tests(10, slice=False) < tests(300, slice=False) < tests(5000, slice=False)
-    # With slices the size of the world matters little.
-    assert whole_cost(scenario(), 43, 2, Past()) == whole_cost(scenario(), 5000, 2, Past())
-    theirs = scenario().model_copy(update={"oracle": object()})
-    assert whole_cost(theirs, 5000, 2, Past()) == whole_cost(scenario(slice=False), 5000, 2, Past())
-
-
-def test_what_is_not_used_is_said():
-    assert "Not used by ddmin" in not_used(form.FIELDS["as_printed"], "ddmin")
-    assert not not_used(form.FIELDS["as_printed"], "ddenv")
-    assert not not_used(form.FIELDS["as_printed"], "of-another-package")

@@ -156,8 +156,7 @@ async def test_an_error_is_shown_beside_the_field_and_nothing_is_written(scenari
             assert session.app.focused.id == field
             assert started == []
             assert list(runs.iterdir()) == []
-            session.fill(**{field: right})
-            await session.pilot.pause()
+            await session.filled(**{field: right})
             assert not session.screen.query_one(f"#{field}", Input).has_class("-wrong")
             assert session.wrong() == ""
         await session.press("ctrl+s")
@@ -174,8 +173,7 @@ async def test_all_wrong_fields_are_named_and_the_first_one_gets_the_cursor(scen
         assert session.app.focused.id == "iterations"
         for field in ("iterations", "goal_x", "goal_y"):
             assert session.screen.query_one(f"#{field}", Input).has_class("-wrong")
-        session.fill(iterations="3")
-        await session.pilot.pause()
+        await session.filled(iterations="3")
         assert session.wrong() == f"✗ {missing}"
 
 
@@ -201,22 +199,12 @@ async def test_a_robot_inside_a_model_is_an_error_of_the_whole_spawn(scenarios, 
         session.fill(spawn_z="-3")
         await session.press("ctrl+s")
         assert session.wrong().startswith("✗ spawn (-6, 0, -3): the robot stands inside")
-        session.fill(spawn_z="0.2")
-        await session.pilot.pause()
+        await session.filled(spawn_z="0.2")
         assert session.wrong() == ""
         session.screen.query_one("#start", Button).press()
         await session.pilot.pause()
         await session.settle()
         assert len(started) == 1
-
-
-@pytest.mark.screens
-async def test_the_preview_shows_what_is_wrong_with_a_scenario(scenarios, started):
-    (scenarios / "crates.yaml").write_text("name: x\nwrold: y\n")
-    async with Opened() as session:
-        assert "crates.yaml" in session.screen.query_one(WorldMap).notice
-        await session.press("ctrl+s")
-        assert "choose a scenario" in session.wrong()
 
 
 async def test_a_world_that_cannot_be_read_leaves_nothing_of_the_one_before(scenarios):

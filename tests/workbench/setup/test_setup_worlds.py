@@ -31,8 +31,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert "12 models" in session.screen.query_one("#about", Static).render().plain
         await session.press("ctrl+s")
         assert "spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.wrong()
-        session.place()
-        await session.pilot.pause()
+        await session.place()
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
         session.fill(goal_x="inf")
         await session.press("ctrl+s")
