@@ -18,8 +18,6 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile, recorded
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.config import read_config
 from ddenv.workbench.export import write
 from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.run_screen import RunScreen
@@ -124,34 +122,9 @@ def test_a_locked_run_is_read_again(run):
     assert folder.look()[0].status == "finished"
 
 
-KEYS = [
-    *(
-        "up",
-        "down",
-        "left",
-        "right",
-        "enter",
-        "space",
-        "tab",
-        "shift+tab",
-        "escape",
-        "home",
-        "end",
-        "pageup",
-        "pagedown",
-    ),
-    *(
-        "backspace",
-        "plus",
-        "minus",
-        "slash",
-        "shift+up",
-        "question_mark",
-        "left_square_bracket",
-        "right_square_bracket",
-    ),
-    *("f1", "ctrl+p", *"abcefghijklnopstuvwxyzACEGLNPSW0123456"),
-]
+WORDS = """up down left right enter space tab shift+tab escape home end pageup pagedown backspace plus minus slash shift+up f1
+ctrl+p question_mark left_square_bracket right_square_bracket"""
+KEYS = [*WORDS.split(), *"abcefghijklnopstuvwxyzACEGLNPSW0123456"]
 SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 
 
@@ -196,32 +169,9 @@ async def test_an_engine_that_hangs_is_told(run, monkeypatch):
 def test_paths_that_cannot_be(text):
     with pytest.raises(UserError, match="no such file"):
         path_to_open(text)
-    with pytest.raises(UserError):
-        scenario_path(f"{text}/x")
-
-
-@pytest.mark.parametrize("text", [".", "..", "~nobody-of-this-name", " "])
-def test_names_that_no_scenario_can_have(text):
-    with pytest.raises(UserError):
-        scenario_path(text)
-
-
-async def test_a_path_that_cannot_be_is_told_in_the_dialog(scenarios):
-    app = Workbench()
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press("ctrl+o")
-        for text in ("~nobody-of-this-name/x.sdf", "x" * 5000):
-            app.screen.query_one("Input").value = text
-            await pilot.press("enter")
-            assert "no such file" in str(app.screen.query_one("#wrong").render())
-
-
-def test_a_date_that_no_calendar_has_is_no_setting(tmp_path, monkeypatch):
-    path = tmp_path / "config.yaml"
-    path.write_text("theme: 2024-13-45")
-    monkeypatch.setenv("DDENV_CONFIG", str(path))
-    with pytest.raises(UserError, match="not valid YAML"):
-        read_config()
+    for name in (f"{text}/x", ".", "..", "~nobody-of-this-name", " "):
+        with pytest.raises(UserError):
+            scenario_path(name)
 
 
 @pytest.mark.parametrize(
