@@ -155,8 +155,13 @@ class Workbench(App[int]):
 
     def on_mount(self) -> None:
         self.screen_change_signal.subscribe(self, lambda _: self._show_held())
+
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
-        self.app_resume_signal.subscribe(self, lambda _: self._redraw())
+        def redraw(_: object) -> None:
+            self._written.forget()
+            self.refresh(layout=True)
+
+        self.app_resume_signal.subscribe(self, redraw)
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
         if self.is_headless:
@@ -273,10 +278,6 @@ class Workbench(App[int]):
 
     async def action_quit(self) -> None:
         self.action_leave()
-
-    def _redraw(self) -> None:
-        self._written.forget()
-        self.refresh(layout=True)
 
     def on_resize(self) -> None:
         self._written.forget()

@@ -13,7 +13,6 @@ from ddenv.words.methods import KINDS
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.setup.fields import Explained
 from ddenv.workbench.setup.setup_screen import SetupScreen
 
 
@@ -57,8 +56,8 @@ class Session:
 
     def explained(self):
         """The title and the words of the explanation."""
-        panel = self.screen.query_one(Explained)
-        return panel.title, panel.query_one(Static).render().plain.removeprefix(f"{panel.title}  ")
+        title, _, words = self.screen.query_one("#explained Static").render().plain.partition("  ")
+        return title, words
 
     def value(self, id):
         return self.screen.form.texts[id]

@@ -8,7 +8,6 @@ from textual.widgets import Select, Static
 from ddenv.schemas import explanation
 from ddenv.settings import SETTINGS
 from ddenv.words.methods import KINDS
-from ddenv.workbench.setup.fields import Explained
 from tests.workbench.setup.setup_session import Opened, write_scenario
 
 
@@ -73,7 +72,7 @@ async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
 async def test_a_long_explanation_scrolls(scenarios):
     async with Opened((64, 18)) as session:
         await session.press("enter", "down", "end", "enter")
-        panel = session.screen.query_one(Explained)
+        panel = session.screen.query_one("#explained")
         assert session.explained()[0] == "algorithm splitting"
         panel.focus()
         await session.press("pagedown")

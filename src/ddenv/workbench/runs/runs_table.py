@@ -195,10 +195,10 @@ class RunTable(DataTable[Text]):
         self.clear(columns=True)
         room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
         self._shown = list(FIRST)
-        for column in MORE:
-            if room - column[1] - AROUND >= NARROWEST_NAME:
-                self._shown.append(column)
-                room -= column[1] + AROUND
+        for more in MORE:
+            if room - more[1] - AROUND >= NARROWEST_NAME:
+                self._shown.append(more)
+                room -= more[1] + AROUND
         self._shown.insert(0, ("name", max(NARROWEST_NAME, room), False, lambda run: plain(run.path.stem)))
         for name, width, number, _ in self._shown:
             title = f"▾{name}" if name == order else name

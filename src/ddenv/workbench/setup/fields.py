@@ -18,6 +18,7 @@ from textual.widgets import Button, Input, Label, Select, Static
 from ddenv.errors import UserError
 from ddenv.runs import processor
 from ddenv.schemas import OURS, names, uses
+from ddenv.settings import JOBS, Setting
 from ddenv.text import as_sentence, plain
 from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
@@ -25,7 +26,6 @@ from ddenv.workbench.setup.form import FIELDS
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:
-    from ddenv.settings import Setting
     from ddenv.world.scenario import Scenario
 
 MARK = "✗ "
@@ -35,24 +35,6 @@ MORE = f"▸ more settings (f9): {', '.join(one.label for one in form.ADVANCED)}
 def not_used(one: Setting, algorithm: str) -> str:
     unused = one.used_by and algorithm in OURS["algorithm"] and algorithm not in one.used_by
     return f"Not used by {plain(algorithm)}." if unused else ""
-
-
-class Explained(VerticalScroll):
-    """The meaning of the focused field, in a few lines that scroll."""
-
-    title = ""
-
-    def compose(self) -> ComposeResult:
-        yield Static("", markup=False)
-
-    def show(self, title: str, words: str, warning: str = "") -> None:
-        """A `warning` comes first and stands out."""
-        self.title = title
-        text = Text(title, "bold").append("  ")
-        if warning:
-            text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
-        self.query_one(Static).update(text.append(words, "not bold"))
-        self.scroll_home(animate=False)
 
 
 class OptionsForm(Vertical):
@@ -88,7 +70,7 @@ class OptionsForm(Vertical):
             yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
         yield Static("", id="wrong", markup=False)
-        yield Explained(id="explained")
+        yield VerticalScroll(Static("", markup=False), id="explained")
         with Horizontal(id="last"):
             yield from _widgets((form.NAME, form.ACCEPT))
             yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
@@ -115,7 +97,7 @@ class OptionsForm(Vertical):
     @property
     def jobs(self) -> int:
         """Raises FieldError."""
-        return int(form.value(form.JOBS, self.texts["jobs"]) or 0)
+        return int(form.value(JOBS, self.texts["jobs"]) or 0)
 
     @property
     def texts(self) -> dict[str, str]:
@@ -134,7 +116,7 @@ class OptionsForm(Vertical):
     def show_settings(self, scenario: Scenario, places: Mapping[str, str] | None = None) -> None:
         """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
         texts = form.texts_of(scenario) | dict(places or {})
-        if form.problem(form.JOBS, self.texts["jobs"]):
+        if form.problem(JOBS, self.texts["jobs"]):
             texts["jobs"] = str(processor.usable_cores())
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
@@ -169,21 +151,27 @@ class OptionsForm(Vertical):
         self._explain(event.widget)
 
     def _explain(self, widget: Widget | None) -> None:
-        """The field that has the focus, or else the algorithm, which most depends on."""
+        """In a few lines that scroll, the field that has the focus, or else the algorithm, which most depends on."""
         # An open list of names is a widget inside its field.
         near = [] if widget is None else [each.id for each in (widget, widget.parent) if each is not None]
         id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
         pair, algorithm = self.method
         partitioning, _, prioritization = pair.partition("/")
-        panel = self.query_one(Explained)
+        panel = self.query_one("#explained")
+        if widget is panel:
+            return
+        kind = next((kind for kind in KINDS if kind == id), KINDS[0])
+        name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
+        title, words, warning = f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm)
         if id in FIELDS:
             one = FIELDS[id]
             words = " ".join(filter(None, (as_sentence(one.summary), one.more, one.cost)))
-            panel.show(one.label, words, not_used(one, algorithm))
-        elif widget is not panel:
-            kind = next((kind for kind in KINDS if kind == id), KINDS[0])
-            name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
-            panel.show(f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm))
+            title, warning = one.label, not_used(one, algorithm)
+        text = Text(title, "bold").append("  ")
+        if warning:
+            text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
+        panel.query_one(Static).update(text.append(words, "not bold"))
+        panel.scroll_home(animate=False)
 
     def _dim(self) -> None:
         """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
@@ -194,13 +182,11 @@ class OptionsForm(Vertical):
         for id, field in self._fields():
             field.set_class(bool(not_used(FIELDS[id], algorithm)), "-unused")
 
-    def show_cost(self, words: str) -> None:
-        self.query_one("#cost", Static).update(Text(words))
-
-    def tell_command(self, words: str, typed: bool = True) -> None:
-        line = Text("$ " if typed and words else "", "bold")
+    def show_outcome(self, cost: str, words: str, typed: bool) -> None:
+        """What the run will cost, and the command that does the same, or why there is none."""
+        self.query_one("#cost", Static).update(Text(cost))
         command = self.query_one("#command", Static)
-        command.update(line.append(plain(words), "not bold"))
+        command.update(Text("$ " if typed and words else "", "bold").append(plain(words), "not bold"))
         command.tooltip = plain(words) or None
 
     def complain(self, error: UserError) -> None:

@@ -68,7 +68,7 @@ class SetupScreen(Screen[None]):
     BINDINGS: ClassVar = keys(
         "setup",
         ("start", "ctrl+s,f5", "start", "start", "start the reduction", "^s"),
-        ("baseline", "f6,ctrl+b", "baseline", "baseline", BASELINE, "f6"),
+        ("baseline", "f6,ctrl+b", "start(True)", "baseline", BASELINE, "f6"),
         ("save", "f7,ctrl+g", "save", "save", "save as a scenario file", "f7"),
         ("copy", "f8,ctrl+y", "copy", "copy", "copy the ddenv run command that does the same", "f8"),
         ("more", "f9", "more", "more", "show or hide the rarely used settings"),
@@ -218,8 +218,7 @@ class SetupScreen(Screen[None]):
                 cost = whole_cost(scenario, choice.models, self.form.jobs, self.preview.past)
             except UserError as error:
                 cost = f"not ready: {error}"
-        self.form.show_cost(cost)
-        self.form.tell_command(words, typed)
+        self.form.show_outcome(cost, words, typed)
 
     def _asked(self) -> tuple[Choice, Scenario]:
         """The choice, and its scenario with the form's settings. Raises UserError while there is none."""
@@ -249,13 +248,10 @@ class SetupScreen(Screen[None]):
 
     @on(Button.Pressed, "#start")
     @on(Input.Submitted)
-    def action_start(self) -> None:
-        self._begin(only_baseline=False)
+    def _start_pressed(self) -> None:
+        self.action_start()
 
-    def action_baseline(self) -> None:
-        self._begin(only_baseline=True)
-
-    def _begin(self, only_baseline: bool) -> None:
+    def action_start(self, only_baseline: bool = False) -> None:
         from ddenv.runs.trust import trust_own
 
         if self._busy:
