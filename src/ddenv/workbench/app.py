@@ -20,6 +20,7 @@ from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.runs.folder import dropped_run
 from ddenv.text import plain
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowRun, ShowSetup
@@ -214,8 +215,6 @@ class Workbench(App[int]):
 
     def on_paste(self, event: events.Paste) -> None:
         """A run file that is dropped on the terminal is opened: the terminal pastes its name."""
-        from ddenv.runs.folder import dropped_run
-
         path = dropped_run(event.text)
         if path is not None:
             self.post_message(ShowRun(path))

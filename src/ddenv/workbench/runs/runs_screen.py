@@ -19,7 +19,7 @@ from textual.widgets import DataTable, Input, Static
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
-from ddenv.runs.folder import SUFFIX
+from ddenv.runs.folder import SUFFIX, dropped_run, find_run, runs_folder
 from ddenv.text import count, plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
@@ -142,8 +142,6 @@ class RunsScreen(Screen[None]):
 
     @work(thread=True, group="runs")
     def _read(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(PATIENCE)
 
@@ -157,8 +155,6 @@ class RunsScreen(Screen[None]):
         call_if_open(self, show)
 
     def _list(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
         part = self.query_one("#filter", Input).value
         shown = sorted(named(self._runs, part), key=ORDERS[self._order])
         table = self.query_one(RunTable)
@@ -221,8 +217,6 @@ class RunsScreen(Screen[None]):
             self.app.run_worker(self._change(delete_run, run.path, said))
 
     def action_undo(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
         self.app.run_worker(self._change(bring_back, runs_folder(), "is back"))
 
     async def _change(self, change: Callable[[Path], Path | None], path: Path, said: str) -> None:
@@ -270,8 +264,6 @@ class RunsScreen(Screen[None]):
 
     @on(Input.Submitted, "#path")
     def _path_entered(self, event: Input.Submitted) -> None:
-        from ddenv.runs.folder import dropped_run, find_run
-
         words = event.value.strip()
         path = dropped_run(words) or find_run(words)
         if words and path.is_file():

@@ -13,9 +13,11 @@ from textual import work
 from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
+from ddenv.runs.folder import runs_folder
 from ddenv.text import count, first_of, plain, shortened, truncated
 from ddenv.words.signs import brief
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
+from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import keys
 
@@ -41,8 +43,6 @@ class RunList(OptionList):
 
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(most=SHOWN)
         call_if_open(self, self._show, runs)
@@ -151,8 +151,6 @@ def moment(time: float) -> str:
     """A Unix time, s: the time of day if it is today, else the date."""
     if not time:
         return ""
-    from ddenv.workbench.shared import poll
-
     try:
         then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
     except (ValueError, OverflowError, OSError):

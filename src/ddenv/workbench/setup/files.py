@@ -22,7 +22,7 @@ from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import SDF_ENDINGS, is_world
+from ddenv.world.access import SDF_ENDINGS, is_file, is_folder, is_world, without_tilde, write_file
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -34,8 +34,6 @@ SUFFIXES = (*SCENARIO, *SDF_ENDINGS)
 
 
 def recent_files() -> list[Path]:
-    from ddenv.world.access import is_file
-
     return [path for path in _listed() if is_file(path)]
 
 
@@ -113,8 +111,6 @@ class WorldTree(DirectoryTree):
     ICON_FILE = "  "
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
-        from ddenv.world.access import is_folder
-
         return [
             path
             for path in paths
@@ -173,8 +169,6 @@ class OpenFile(Asks[Path | None]):
 
 def path_to_open(text: str) -> Path:
     """The path of a scenario or world file. Raises UserError."""
-    from ddenv.world.access import is_file, is_folder, without_tilde
-
     path = without_tilde(text.strip())
     if path == Path():
         raise UserError("give the path of a file")
@@ -189,8 +183,6 @@ def path_to_open(text: str) -> Path:
 
 def scenario_path(text: str) -> Path:
     """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid name."""
-    from ddenv.world.access import is_folder, without_tilde
-
     text = text.strip()
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
@@ -212,7 +204,6 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     """
     from ddenv.runs.export import keys_in
     from ddenv.runs.trust import scenario_text
-    from ddenv.world.access import write_file
 
     for each in (scenario.world, scenario.robot.model):
         if not each.is_file():
@@ -245,8 +236,6 @@ class SaveScenario(Asks[Path | None]):
         self.complain("")
 
     def take(self, text: str) -> None:
-        from ddenv.world.access import is_file
-
         path = scenario_path(text)
         if is_file(path) and path != self._replace:
             self._replace = path

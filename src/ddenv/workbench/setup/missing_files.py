@@ -28,6 +28,7 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.files import Asks
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
+from ddenv.world.access import MissingFiles
 
 if TYPE_CHECKING:
     from ddenv.world.model import Note, World
@@ -62,7 +63,6 @@ def read_with_remedies(
     `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
     """
     from ddenv.runs.subject import reading_of
-    from ddenv.world.access import MissingFiles
     from ddenv.world.sdf.read import read_world
     from ddenv.world.sdf.standin import AUTO
 

@@ -19,6 +19,7 @@ from textual.widgets import Static
 from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
+from ddenv.runs.folder import free_run_path, runs_folder
 from ddenv.runs.remedies import remember_remedies
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
@@ -116,8 +117,6 @@ class Preview(Vertical):
 
     @work(thread=True, group="world", exclusive=True)
     def _read(self, path: Path, opened: bool, again: bool = False) -> None:
-        from ddenv.runs.folder import free_run_path, runs_folder
-
         worker = get_current_worker()
 
         def tell(callback: Callable[..., object], *words: object) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ddenv.errors import UserError
 from ddenv.runs import processor
+from ddenv.runs.folder import run_path
 from ddenv.settings import OPTIONS, PRINTED, number_text, read
 from ddenv.text import about, between, count, rounded
 from ddenv.workbench.setup import form
@@ -144,8 +145,6 @@ def create(choice: Choice, scenario: Scenario, path: Path, jobs: int, accept_mod
 
 def run_file(scenario_name: str, name: str) -> Path:
     """The path of a new run with this `name` or path. Raises FieldError."""
-    from ddenv.runs.folder import run_path
-
     is_path = len(Path(name).parts) > 1
     try:
         path = run_path(scenario_name, None, Path(name)) if is_path else run_path(scenario_name, name, None)

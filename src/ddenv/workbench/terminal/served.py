@@ -16,6 +16,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
+from ddenv.runs.folder import find_run
 from ddenv.runs.programs import how_to_install
 
 HOST = "127.0.0.1"
@@ -38,7 +39,6 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
         raise UserError(f"serving needs another package: {how_to_install('serve')}") from None
     words = [sys.executable, "-m", "ddenv"]
     if run is not None:
-        from ddenv.runs.folder import find_run
         from ddenv.workbench.shared.observed import Observed
 
         Observed(path := find_run(run)).close()
