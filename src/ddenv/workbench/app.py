@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import gc
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -26,9 +26,6 @@ from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
-
-if TYPE_CHECKING:
-    from ddenv.workbench.map.world_map import WorldMap
 
 BELL = "\x07"
 # Textual's actions that move the focus.
@@ -94,7 +91,7 @@ class Workbench(App[int]):
         *keys(
             "app",
             ("theme", "ctrl+t", "change_theme", "theme", "choose the colours for this session"),
-            ("names", "n", "names", "names", "show or hide the models' names on the map"),
+            ("names", "n", "map('toggle_layer', 'names')", "names", "show or hide the models' names on the map"),
             ("screenshot", "f12", "screenshot", "screenshot", "save a picture of the screen (SVG)"),
         ),
     ]
@@ -230,23 +227,12 @@ class Workbench(App[int]):
 
         super().action_screenshot(filename, path or (None if platformdirs.user_downloads_path().is_dir() else "."))
 
-    def action_names(self) -> None:
-        for world in self._maps:
-            world.toggle_layer("names")
-
-    def action_zoom(self, factor: float) -> None:
-        for world in self._maps:
-            world.zoom(factor)
-
-    def action_fit(self) -> None:
-        for world in self._maps:
-            world.fit()
-
-    @property
-    def _maps(self) -> Iterable[WorldMap]:
+    def action_map(self, does: str, *words: Any) -> None:
+        """Has the maps of the screen do something: `zoom`, `fit`, or `toggle_layer`."""
         from ddenv.workbench.map.world_map import WorldMap
 
-        return self.screen.query(WorldMap)
+        for world in self.screen.query(WorldMap):
+            getattr(world, does)(*words)
 
     def action_signs(self) -> None:
         from ddenv.workbench.help.signs import SignsDialog

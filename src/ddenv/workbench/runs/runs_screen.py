@@ -111,7 +111,7 @@ class RunsScreen(Screen[None]):
 
     def __init__(self) -> None:
         super().__init__()
-        self._folder: RunsFolder | None = None
+        self._folder = RunsFolder(runs_folder())
         self._runs: list[Recent] = []
         self._reading = False
         self._order = next(iter(ORDERS))
@@ -142,7 +142,6 @@ class RunsScreen(Screen[None]):
 
     @work(thread=True, group="runs")
     def _read(self) -> None:
-        self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(PATIENCE)
 
         def show() -> None:

@@ -36,14 +36,13 @@ class RunList(OptionList):
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)
         self._runs: dict[str, Recent] = {}
-        self._folder: RunsFolder | None = None
+        self._folder = RunsFolder(runs_folder())
 
     def run_of(self, option_id: str | None) -> Recent:
         return self._runs[option_id or ""]
 
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
-        self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(most=SHOWN)
         call_if_open(self, self._show, runs)
 
