@@ -14,7 +14,6 @@ from ddenv.guiding.course import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.shared import poll as polling
-from ddenv.workbench.shared.observed import Busy, Observed
 from ddenv.workbench.shared.poll import Poll
 from tests.waiting import eventually
 
@@ -149,20 +148,6 @@ def test_a_writer_that_holds_the_file_does_not_stop_the_screen(run, runs):
     look(poll)
     assert poll._snapshot.state.elements == first.state.elements
     poll.close()
-
-
-def test_a_busy_file_keeps_what_was_read(run, poll, monkeypatch):
-    snapshot = look(poll)
-    run.write("paused")
-
-    def busy(*_):
-        raise Busy("busy")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Observed, "_all", busy)
-        assert look(poll) is None
-    assert poll._snapshot is snapshot
-    assert look(poll).state.paused
 
 
 async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run):

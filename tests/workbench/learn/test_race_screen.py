@@ -55,14 +55,6 @@ async def test_a_race_in_a_lesson(size):
     assert all_scores()[NAME].answered[str(STEP)] is True
 
 
-async def test_a_race_is_skipped():
-    async with opened((80, 24), STEP) as pilot:
-        await pilot.press("s")
-        assert pilot.app.screen.course.due and "Skipped" in said(pilot, "lesson-text")
-        await pilot.press("s", "enter")
-        assert pilot.app.screen.course.step == STEP + 1
-
-
 @pytest.fixture
 def two_runs(tmp_path):
     """The run of the first lesson, and one that was stopped in the middle."""

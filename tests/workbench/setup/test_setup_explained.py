@@ -3,7 +3,7 @@
 import fake_run
 import pytest
 import yaml
-from textual.widgets import Select, Static
+from textual.widgets import Select
 
 from ddenv.schemas import explanation
 from ddenv.settings import SETTINGS
@@ -16,9 +16,12 @@ async def test_a_description_that_does_not_fit_says_so(scenarios):
     write_scenario(scenarios, description="far " * 60 + "end")
     for size, whole in (((80, 24), False), ((200, 60), True)):
         async with Opened(size) as session:
-            told = session.screen.query_one("#about", Static).render().plain
+            told = session.told("about")
             assert told.endswith("far end" if whole else " far …")
             assert whole or len(told.splitlines()) == 2
+            # What is too long there is whole on the map's pane.
+            await session.press("f3")
+            assert session.told("about") == session.screen.preview.choice.about
 
 
 @pytest.mark.screens

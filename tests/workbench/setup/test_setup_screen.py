@@ -82,35 +82,6 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
 
 
 @pytest.mark.screens
-async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenarios, runs):
-    fake_moments.finished(fake_run.FakeRun(runs / "crates-world-1.ddenv")).close()
-    fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
-    long = "A robot drives through crates and gets stuck on one of them. " * 4
-    write_scenario(scenarios, description=long)
-    async with Opened((80, 24)) as session:
-        title = session.screen.query_one("#title", Static)
-        assert len(title.render().plain) < title.size.width
-        options = session.screen.query_one("#run-list", OptionList)
-        shown = {str(options.get_option_at_index(index).prompt) for index in range(2)}
-        assert shown == {"■ crates-world-1  2/11", "■ a  2/11"}
-        # The keys of panes are written as those of the footer.
-        assert session.told("pane-map").strip() == "f3 map"
-        # What is too long here is whole on the map's pane.
-        assert session.told("about").endswith("…") and session.told("picking").endswith(" m")
-        await session.press("f3")
-        assert session.told("about") == session.screen.preview.choice.about
-
-
-@pytest.mark.screens
-@pytest.mark.parametrize("size", [(120, 36), (200, 60)], ids=str)
-async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, size):
-    async with Opened(size) as session:
-        for id in ("#choice", "#preview", "#fields", "#explained"):
-            assert session.screen.query_one(id).region
-        assert session.screen.query_one(WorldMap).size.height >= size[1] * 4 // 10
-
-
-@pytest.mark.screens
 @pytest.mark.parametrize("size", [(64, 18), (80, 24), (120, 36), (200, 60)], ids=str)
 async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios, size):
     async with Opened(size) as session:
