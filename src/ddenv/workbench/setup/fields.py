@@ -113,9 +113,9 @@ class OptionsForm(Vertical):
         name = self.texts["run_name"].strip()
         return name if self._name_given and name != self._suggested else ""
 
-    def show_settings(self, scenario: Scenario, places: Mapping[str, str] | None = None) -> None:
-        """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
-        texts = form.texts_of(scenario) | dict(places or {})
+    def show_settings(self, scenario: Scenario, places: Mapping[str, str]) -> None:
+        """Fills in the scenario's settings, in place of all earlier texts, with the texts of `places` in place of its own."""
+        texts = form.texts_of(scenario) | dict(places)
         if form.problem(JOBS, self.texts["jobs"]):
             texts["jobs"] = str(processor.usable_cores())
         self.set_texts(texts)

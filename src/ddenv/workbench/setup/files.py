@@ -146,10 +146,6 @@ class OpenFile(Asks[Path | None]):
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="open.cancel", tooltip="choose no file")]
 
-    def __init__(self, folder: Path) -> None:
-        super().__init__()
-        self._folder = folder
-
     def compose(self) -> ComposeResult:
         with Framed(
             "Open a scenario (.yaml) or a world (.sdf, .world, .dmd.yaml)",
@@ -157,7 +153,7 @@ class OpenFile(Asks[Path | None]):
         ):
             yield PathEntry(placeholder="path of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)
-            yield WorldTree(self._folder, id="tree")
+            yield WorldTree(Path.cwd(), id="tree")
 
     @on(DirectoryTree.FileSelected)
     def _chosen(self, event: DirectoryTree.FileSelected) -> None:

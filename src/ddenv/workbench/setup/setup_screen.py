@@ -168,7 +168,7 @@ class SetupScreen(Screen[None]):
         self.post_message(ShowRun(self.query_one(RunList).run_of(event.option_id).path))
 
     def action_open(self) -> None:
-        self.app.push_screen(OpenFile(Path.cwd()), self._opened)
+        self.app.push_screen(OpenFile(), self._opened)
 
     def _opened(self, path: Path | None) -> None:
         if path is not None:
