@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -162,9 +162,3 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
 def computed(state: RunState) -> float:
     """How long the simulations of a run took, s; results that were copied or implied cost nothing."""
     return sum(test.wall_seconds for test in state.tests if not test.taken and test.implied_by is None)
-
-
-def named(runs: Iterable[Recent], part: str) -> list[Recent]:
-    wanted = part.strip().casefold()
-    said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in runs)
-    return [run for run, words in said if any(wanted in each.casefold() for each in words)]

@@ -24,7 +24,7 @@ from ddenv.text import count, plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.side_by_side import SideBySide
-from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
+from ddenv.workbench.runs.recent_runs import Recent, RunsFolder
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, compared
 from ddenv.workbench.shared.background import call_if_open, is_open, refuse
 from ddenv.workbench.shared.bindings import HELP, ids, keys
@@ -155,7 +155,10 @@ class RunsScreen(Screen[None]):
 
     def _list(self) -> None:
         part = self.query_one("#filter", Input).value
-        shown = sorted(named(self._runs, part), key=ORDERS[self._order])
+        wanted = part.strip().casefold()
+        said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in self._runs)
+        found = (run for run, words in said if any(wanted in each.casefold() for each in words))
+        shown = sorted(found, key=ORDERS[self._order])
         table = self.query_one(RunTable)
         table.show(shown, self._order)
         table.display = bool(shown)
@@ -168,10 +171,10 @@ class RunsScreen(Screen[None]):
         works = sum(run.is_worked_on for run in self._runs)
         panel = self.query_one("#list")
         panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
-        said = [f"{count(works, 'engine')} running"] if works else []
+        now = [f"{count(works, 'engine')} running"] if works else []
         if self._marked is not None:
-            said.append(f"marked: {shortened(plain(self._marked.stem), 20)}")
-        panel.border_subtitle = Text(" · ".join(said))
+            now.append(f"marked: {shortened(plain(self._marked.stem), 20)}")
+        panel.border_subtitle = Text(" · ".join(now))
         self._show_title()
 
     @on(DataTable.RowHighlighted)

@@ -62,23 +62,20 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
             return app
 
         async def on_startup(self, app: Any) -> None:
-            print("\n".join(address_lines(port, token, font_size)), flush=True)
+            size, user = "" if font_size == FONT_SIZE else f"?fontsize={font_size}", getpass.getuser()
+            lines = (
+                f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
+                f"Anyone with that address acts as {user} on this machine: the workbench can read, write and start "
+                "programs in your name.",
+                "Other machines cannot reach it. From yours, type there first:",
+                f"  ssh -L {port}:{HOST}:{port} {user}@{socket.gethostname()}",
+            )
+            print("\n".join(lines), flush=True)
 
         def initialize_logging(self) -> None:
             """Requests are not logged."""
 
     Guarded(shlex.join(words), host=HOST, port=port, title="ddenv", templates_path=PAGE).serve()
-
-
-def address_lines(port: int, token: str, font_size: int = FONT_SIZE) -> list[str]:
-    size = "" if font_size == FONT_SIZE else f"?fontsize={font_size}"
-    return [
-        f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
-        f"Anyone with that address acts as {getpass.getuser()} on this machine: the workbench can read, write and start "
-        "programs in your name.",
-        "Other machines cannot reach it. From yours, type there first:",
-        f"  ssh -L {port}:{HOST}:{port} {getpass.getuser()}@{socket.gethostname()}",
-    ]
 
 
 def guard(port: int, token: str) -> Any:
