@@ -209,20 +209,15 @@ async def test_the_question_for_the_start_comes_back_to_the_map(depot):
         assert "spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
 
 
-def test_commands_on_a_world_use_what_the_workbench_remembers(depot, monkeypatch, capsys):
-    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none"})
+def test_commands_use_what_the_workbench_remembers_and_say_so(depot, monkeypatch, capsys):
+    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none", "model://another": "auto"})
     done = in_process(monkeypatch, capsys, "world", "check", depot)
     assert done.returncode == 0
     assert BARREL in done.stderr and "--no-remembered" in done.stderr
     is_one_line(in_process(monkeypatch, capsys, "world", "check", depot, "--no-remembered"), "construction_barrel")
-
-
-def test_commands_use_what_the_workbench_remembers_and_say_so(depot):
-    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none", "model://another": "auto"})
     given = {"model_path": (), "stand_in": (), "ignore": (), "spawn": (0, 0, 0.2, 0), "goal": (9, 0), "world": None}
     said = []
-    scenario = scenario_named(str(depot), {**given, "remembered": True}, said.append)
-    world, _ = load_parts(scenario)
+    world, _ = load_parts(scenario_named(str(depot), {**given, "remembered": True}, said.append))
     assert {model.name for model in world.models if model.name in ("one", "two")} == {"one", "two"}
     assert all(name in said[-1] for name in (BARREL, SHELF, str(state_file(REMEDIES)), "--no-remembered"))
     assert "another" not in said[-1]
