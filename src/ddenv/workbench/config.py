@@ -163,14 +163,13 @@ def lines() -> list[str]:
 def example_lines() -> list[str]:
     """An example file that changes nothing: every action is a comment."""
     begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
-    found = begin.splitlines()
-    for id, action in actions().items():
-        keys = _written(",".join(action.keys))
-        bare = keys[0].isalpha() and all(char.isalnum() or char in "+, " for char in keys)
-        quote = "" if bare else '"'
-        found.append(f"  # {id}: {quote}{keys}{quote}  # {action.words}")
-    return found
+    keys = {id: _quoted(_written(",".join(action.keys))) for id, action in actions().items()}
+    return [*begin.splitlines(), *(f"  # {id}: {keys[id]}  # {action.words}" for id, action in actions().items())]
 
 
 def _written(keys: str) -> str:
     return ", ".join(written(key) for key in keys.split(","))
+
+
+def _quoted(keys: str) -> str:
+    return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
