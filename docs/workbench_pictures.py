@@ -37,9 +37,9 @@ from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.learn.lesson_screen import LessonScreen
+from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.shared.messages import ShowLessons
 from ddenv.world.load import SDF, find_scenario, load_scenario
 
 SCREENS = Path(__file__).resolve().parent / "screens"
@@ -168,7 +168,7 @@ async def make_all() -> None:
 async def teach() -> None:
     """The list of lessons, and a prediction in the first one."""
     for name, size in (("lesson-small", SMALL), ("lesson", MIDDLE)):
-        app = Workbench(config=Config(), first=ShowLessons(bundled()[0]))
+        app = Workbench(config=Config(), first=lambda: LessonsScreen(bundled()[0]))
         async with app.run_test(size=size) as pilot:
             await drawn(pilot)
             screen = pilot.app.screen
@@ -212,7 +212,7 @@ async def in_lesson(step: int, size: tuple[int, int]) -> AsyncIterator[Pilot[int
     """The first lesson at one of its steps."""
     lesson = open_lesson(bundled()[0]).lesson
     keep_score(lesson.name, Score(step=step))
-    app = Workbench(config=Config(), first=ShowLessons(lesson.file))
+    app = Workbench(config=Config(), first=lambda: LessonsScreen(lesson.file))
     async with app.run_test(size=size) as pilot:
         await drawn(pilot)
         yield pilot

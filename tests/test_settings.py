@@ -75,7 +75,7 @@ def test_a_scenario_takes_what_is_in_its_range(one):
 @EVERY
 def test_it_is_where_it_shows_and_nowhere_else(one):
     options = {name for command in ("run", "test") for each in parameters(command) for name in each.opts}
-    fields = {field.id for field in form.ALL} | {"algorithm", "pair"}
+    fields = set(form.FIELDS) | {"algorithm", "pair"}
     assert (one.option in options) == (one.shown != "scenario") or not one.option
     assert (one.name in fields) == (one.shown in ("method", "basic", "more"))
     assert f"--{one.name.replace('_', '-')}" not in options or one.option

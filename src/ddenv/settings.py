@@ -82,7 +82,9 @@ class Setting:
             return f"more than {self.above:g}, at most {self.most:g}"
         if self.least is None:
             return ""
-        return f"{self.least:g} or more" if self.most is None else f"{self.least:g} to {number_text(self.most)}"
+        return (
+            f"{self.least:g} or more" if self.most is None else f"{number_text(self.least)} to {number_text(self.most)}"
+        )
 
     @property
     def wanted(self) -> str:

@@ -15,27 +15,28 @@ from ddenv.scene.player import Player
 from ddenv.scene.stage import Stage
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.lesson_screen import LessonScreen
+from ddenv.workbench.learn.lessons_screen import LessonsScreen
+from ddenv.workbench.learn.race_screen import race_of_runs
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.messages import ShowLesson, ShowLessons, ShowRace
 
 TOY, REAL = LESSONS / "delivery.ddenv", LESSONS / "ditch.ddenv"
 
 
 async def main() -> None:
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
+    async with Workbench(first=lambda: LessonsScreen(bundled()[0])).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("enter", "enter", "s", "right")
         assert isinstance(pilot.app.screen, LessonScreen) and pilot.app.screen.course.step == 2
         await pilot.press("s", "enter", "enter")
         await shown(pilot)
         assert isinstance(pilot.app.screen, TryScreen)
-    async with Workbench(first=ShowLesson(REAL)).run_test(size=(120, 36)) as pilot:
+    async with Workbench(first=lambda: LessonScreen(REAL)).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("right_curly_bracket")
         assert len(pilot.app.screen.course.position.now.environment) == 31
     copy(TOY, other := Path(mkdtemp()) / "other.ddenv")
-    async with Workbench(first=ShowRace((TOY, other))).run_test(size=(120, 36)) as pilot:
+    async with Workbench(first=lambda: race_of_runs((TOY, other))).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("end")
         assert pilot.app.screen.race.over

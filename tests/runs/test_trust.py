@@ -12,7 +12,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
 from ddenv.runs.trust import check_trusted, program_of, trust, trust_own
-from ddenv.workbench.setup.save_scenario import save_scenario
+from ddenv.workbench.setup.files import save_scenario
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.tiers import slow

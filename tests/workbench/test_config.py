@@ -64,6 +64,7 @@ def test_a_file_sets_theme_and_keys(config):
         ("keys: {run.pause: ctrl+q}", "'ctrl+q' is the key of app.leave already"),
         ("keys: [run.pause]", "keys: should be a valid dictionary"),
         ("keys: {run.pause: ?}", "not valid YAML"),
+        ("theme: 2024-13-45", "not valid YAML"),
         ("notify: maybe", "notify: should be a valid boolean"),
         ("- theme", "expected lines such as"),
     ],

@@ -14,7 +14,6 @@ from ddenv.guiding.commands import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.shared import poll as polling
-from ddenv.workbench.shared.observed import Busy, Observed
 from ddenv.workbench.shared.poll import Poll
 from tests.waiting import eventually
 
@@ -26,6 +25,12 @@ def look(poll):
 
 def files(folder):
     return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """A look reads all there is, however slow the machine."""
+    monkeypatch.setattr(polling, "PATIENCE", 60.0)
 
 
 @pytest.fixture
@@ -59,31 +64,23 @@ def test_the_path_of_f_itself_comes_with_the_snapshot(run, poll):
     assert look(poll).original is snapshot.original
 
 
-def test_a_deleted_file_is_told_and_never_made_again(run, poll):
+@pytest.mark.parametrize("becomes", ["deleted", "replaced"])
+def test_a_file_that_is_gone_is_told_and_neither_made_again_nor_another_one_touched(run, runs, poll, becomes):
     before = look(poll)
     run.close()
-    for path in run.path.parent.glob("crates-1*"):
-        path.unlink()
+    for path in runs.glob("crates-1*"):
+        path.rename(runs / f"moved-{path.name}")
+    if becomes == "replaced":
+        fake_run.FakeRun(run.path).close()
+    there = files(runs)
     after = look(poll)
     assert after.gone and after.state is before.state
-    assert "deleted" in after.error and after.status == "lost"
+    assert becomes in after.error and after.status == "lost"
     assert look(poll) is None
     with pytest.raises(UserError, match="is gone"):
         poll.file.send("pause")
     poll.close()
-    assert not list(run.path.parent.glob("crates-1*"))
-
-
-def test_another_file_in_its_place_is_left_alone(run, poll):
-    look(poll)
-    run.path.rename(run.path.with_name("moved.ddenv"))
-    other = fake_run.FakeRun(run.path)
-    after = look(poll)
-    assert after.gone and "replaced" in after.error
-    with pytest.raises(UserError):
-        poll.file.send("pause")
-    assert other.file.commands() == []
-    other.close()
+    assert files(runs) == there
 
 
 def test_watching_writes_nothing(run, runs):
@@ -151,20 +148,6 @@ def test_a_writer_that_holds_the_file_does_not_stop_the_screen(run, runs):
     look(poll)
     assert poll._snapshot.state.elements == first.state.elements
     poll.close()
-
-
-def test_a_busy_file_keeps_what_was_read(run, poll, monkeypatch):
-    snapshot = look(poll)
-    run.write("paused")
-
-    def busy(*_):
-        raise Busy("busy")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Observed, "_all", busy)
-        assert look(poll) is None
-    assert poll._snapshot is snapshot
-    assert look(poll).state.paused
 
 
 async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run):

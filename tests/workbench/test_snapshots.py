@@ -14,7 +14,7 @@ from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
-from ddenv.workbench.shared.messages import ShowLessons
+from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from tests.tiers import slow
 
 SMALL, USUAL, LARGE = (80, 24), (120, 36), (200, 60)
@@ -225,7 +225,7 @@ def test_what_a_lesson_lets_students_do(snap_compare, runs, does, size):
     lesson = open_lesson(bundled()[0]).lesson
     step = next(number for number, step in enumerate(lesson.steps) if getattr(step, does))
     keep_score(lesson.name, Score(step=step))
-    app, next_model = Workbench(first=ShowLessons(lesson.file)), "right_square_bracket"
+    app, next_model = Workbench(first=lambda: LessonsScreen(lesson.file)), "right_square_bracket"
     keys = {"budget": ["enter", next_model, "enter", "w", "m", "m"], "race": ["s", "enter", "end"]}
     assert snap_compare(app, terminal_size=size, run_before=shown("ddenv", *keys[does]))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +12,9 @@ from ddenv.cli.options import given_reading, reading_options, runs, runs_and_sce
 from ddenv.cli.terminal import say_written
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
 
 PORT = 8000
 
@@ -135,14 +138,18 @@ def _list() -> None:
 def _race(names: list[str]) -> int:
     from ddenv.learn.race import RACERS, plays_of_runs
     from ddenv.workbench.launch import run_workbench
-    from ddenv.workbench.shared.messages import ShowRace
+
+    def screen() -> Screen[Any]:
+        from ddenv.workbench.learn.race_screen import race_of_runs
+
+        return race_of_runs(runs)
 
     if not RACERS[0] <= len(names) <= RACERS[1]:
         raise UserError(f"--race: expected {RACERS[0]} to {RACERS[1]} runs, found {len(names)}")
     runs = tuple(map(find_run, names))
     # Read before the screen, so that runs that cannot race are one line in the terminal.
     plays_of_runs(runs)
-    return run_workbench(first=ShowRace(runs))
+    return run_workbench(first=screen)
 
 
 def _page(name: str | None, file: Path) -> None:
@@ -167,15 +174,19 @@ def _page(name: str | None, file: Path) -> None:
 def _open(name: str | None) -> int:
     from ddenv.learn.shelf import find_lesson, open_lesson
     from ddenv.workbench.launch import run_workbench
-    from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 
-    if name is None:
-        return run_workbench(first=ShowLessons())
-    if (lesson := find_lesson(name)) is not None:
+    lesson = None if name is None else find_lesson(name)
+    path = None if name is None or lesson is not None else find_run(name)
+    if lesson is not None:
         # Opened before the screen, so that a mistake in it is one line in the terminal.
         open_lesson(lesson)
-        return run_workbench(first=ShowLessons(lesson))
-    path = find_run(name)
-    if not path.is_file():
+    if path is not None and not path.is_file():
         raise UserError(f"no lesson or run {name!r}; 'ddenv learn --list' and 'ddenv runs' list them")
-    return run_workbench(first=ShowLesson(path))
+
+    def screen() -> Screen[Any]:
+        from ddenv.workbench.learn.lesson_screen import LessonScreen
+        from ddenv.workbench.learn.lessons_screen import LessonsScreen
+
+        return LessonsScreen(lesson) if path is None else LessonScreen(path)
+
+    return run_workbench(first=screen)

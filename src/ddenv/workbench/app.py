@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import gc
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -20,14 +20,12 @@ from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.runs.folder import dropped_run
 from ddenv.text import plain
 from ddenv.workbench.shared.bindings import keys
-from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
+from ddenv.workbench.shared.messages import Attention, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
-
-if TYPE_CHECKING:
-    from ddenv.workbench.map.world_map import WorldMap
 
 BELL = "\x07"
 # Textual's actions that move the focus.
@@ -75,7 +73,7 @@ class Workbench(App[int]):
     """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
 
     `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start
-    with. With `watch` the run is only watched, never guided. `first` is another screen to start at.
+    with. With `watch` the run is only watched, never guided. `first` makes another screen to start at, and may raise UserError.
     """
 
     TITLE = "ddenv"
@@ -93,7 +91,7 @@ class Workbench(App[int]):
         *keys(
             "app",
             ("theme", "ctrl+t", "change_theme", "theme", "choose the colours for this session"),
-            ("names", "n", "names", "names", "show or hide the models' names on the map"),
+            ("names", "n", "map('toggle_layer', 'names')", "names", "show or hide the models' names on the map"),
             ("screenshot", "f12", "screenshot", "screenshot", "save a picture of the screen (SVG)"),
         ),
     ]
@@ -106,7 +104,7 @@ class Workbench(App[int]):
         watch: bool = False,
         config: Config | None = None,
         file: Path | None = None,
-        first: ShowLessons | ShowLesson | ShowRace | None = None,
+        first: Callable[[], Screen[Any]] | None = None,
     ) -> None:
         super().__init__()
         self._written = Written()
@@ -117,7 +115,7 @@ class Workbench(App[int]):
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
         self._held: tuple[str, dict[str, Any]] | None = None
-        self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
+        self._first, self._run, self._watch, self._file = first, run, watch, file
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
 
@@ -126,7 +124,7 @@ class Workbench(App[int]):
 
     def compose(self) -> ComposeResult:
         # Shown at once: the first screen takes a moment to load.
-        what = f"  opening {plain(self._first.run.stem)} ..." if isinstance(self._first, ShowRun) else ""
+        what = "" if self._run is None else f"  opening {plain(self._run.stem)} ..."
         yield Static(Text(" ddenv", "bold").append(what, "not bold dim"), markup=False)
 
     def get_css_variables(self) -> dict[str, str]:
@@ -155,8 +153,13 @@ class Workbench(App[int]):
 
     def on_mount(self) -> None:
         self.screen_change_signal.subscribe(self, lambda _: self._show_held())
+
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
-        self.app_resume_signal.subscribe(self, lambda _: self._redraw())
+        def redraw(_: object) -> None:
+            self._written.forget()
+            self.refresh(layout=True)
+
+        self.app_resume_signal.subscribe(self, redraw)
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
         if self.is_headless:
@@ -165,8 +168,9 @@ class Workbench(App[int]):
             self.call_after_refresh(self._begin)
 
     def _begin(self) -> None:
+        asked = ShowSetup(file=self._file) if self._run is None else ShowRun(self._run, self._watch)
         try:
-            self.push_screen(self._screen_for(self._first))
+            self.push_screen(self._screen_for(asked) if self._first is None else self._first())
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
         if not self.is_headless:
@@ -185,23 +189,11 @@ class Workbench(App[int]):
             self.clear_notifications()
             super().notify(message, **options)
 
-    def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson | ShowRace) -> Screen[Any]:
+    def _screen_for(self, asked: ShowRun | ShowSetup) -> Screen[Any]:
         if isinstance(asked, ShowRun):
             from ddenv.workbench.run.run_screen import RunScreen
 
             return RunScreen(asked.run, asked.engine, asked.watch, classes_at(RunScreen, self.size))
-        if isinstance(asked, ShowLessons):
-            from ddenv.workbench.learn.lessons_screen import LessonsScreen
-
-            return LessonsScreen(asked.opens)
-        if isinstance(asked, ShowLesson):
-            from ddenv.workbench.learn.lesson_screen import LessonScreen
-
-            return LessonScreen(asked.run)
-        if isinstance(asked, ShowRace):
-            from ddenv.workbench.learn.race_screen import race_of_runs
-
-            return race_of_runs(asked.runs)
         from ddenv.workbench.setup.setup_screen import SetupScreen
 
         return SetupScreen(self._reading, asked.like, asked.file, classes_at(SetupScreen, self.size))
@@ -220,8 +212,6 @@ class Workbench(App[int]):
 
     def on_paste(self, event: events.Paste) -> None:
         """A run file that is dropped on the terminal is opened: the terminal pastes its name."""
-        from ddenv.runs.folder import dropped_run
-
         path = dropped_run(event.text)
         if path is not None:
             self.post_message(ShowRun(path))
@@ -237,23 +227,12 @@ class Workbench(App[int]):
 
         super().action_screenshot(filename, path or (None if platformdirs.user_downloads_path().is_dir() else "."))
 
-    def action_names(self) -> None:
-        for world in self._maps:
-            world.toggle_layer("names")
-
-    def action_zoom(self, factor: float) -> None:
-        for world in self._maps:
-            world.zoom(factor)
-
-    def action_fit(self) -> None:
-        for world in self._maps:
-            world.fit()
-
-    @property
-    def _maps(self) -> Iterable[WorldMap]:
+    def action_map(self, does: str, *words: Any) -> None:
+        """Has the maps of the screen do something: `zoom`, `fit`, or `toggle_layer`."""
         from ddenv.workbench.map.world_map import WorldMap
 
-        return self.screen.query(WorldMap)
+        for world in self.screen.query(WorldMap):
+            getattr(world, does)(*words)
 
     def action_signs(self) -> None:
         from ddenv.workbench.help.signs import SignsDialog
@@ -284,10 +263,6 @@ class Workbench(App[int]):
 
     async def action_quit(self) -> None:
         self.action_leave()
-
-    def _redraw(self) -> None:
-        self._written.forget()
-        self.refresh(layout=True)
 
     def on_resize(self) -> None:
         self._written.forget()

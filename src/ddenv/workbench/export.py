@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -24,14 +26,14 @@ from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 
-# What can be written: its id, its label, and the endings that its name may have.
+# What can be written: its id, its label, how the suggested name ends, and the endings that a name may have.
 KINDS = (
-    ("world", "world (SDF)", WORLD_ENDINGS),
-    ("scenario", "scenario (YAML)", (".yaml", ".yml")),
-    ("report", "report (HTML)", (".html", ".htm", ".md")),
-    ("bundle", "bundle (ZIP)", (".zip",)),
-    ("mcap", "messages (MCAP)", (".mcap",)),
-    ("test", "pytest (folder)", ("",)),
+    ("world", "world (SDF)", ".minimal", WORLD_ENDINGS),
+    ("scenario", "scenario (YAML)", ".minimal.yaml", (".yaml", ".yml")),
+    ("report", "report (HTML)", ".html", (".html", ".htm", ".md")),
+    ("bundle", "bundle (ZIP)", ".zip", (".zip",)),
+    ("mcap", "messages (MCAP)", ".mcap", (".mcap",)),
+    ("test", "pytest (folder)", "", ("",)),
 )
 TICKED = ("world", "scenario", "report")
 # What the one under the cursor is good for.
@@ -46,8 +48,6 @@ MEANINGS = {
 WRITING = "writing ... escape stops it"
 # Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
-
-
 # The files to write, by the ids of `KINDS`.
 Wanted = Mapping[str, Path]
 
@@ -86,13 +86,17 @@ class ExportScreen(ModalScreen[None]):
         self._busy = False
 
     def compose(self) -> ComposeResult:
-        names = suggested(self._file, self._world)
+        stem = "".join(char if char.isprintable() else "-" for char in self._file.stem)
+        folder = Path.home()
+        with suppress(OSError):
+            folder = Path.cwd()
         with Framed("Export", "tab moves   space ticks   enter writes   ? help   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)
-                yield PathEntry(str(_here()), id="export-folder")
-            for (id, title, _), name in zip(KINDS, names, strict=True):
+                yield PathEntry(str(folder), id="export-folder")
+            for id, title, end, _ in KINDS:
+                name = f"{stem}{end}{ending_of(self._world) if id == 'world' else ''}" if end else "."
                 with Horizontal(classes="row"):
                     title = title.replace("SDF", "YAML") if is_directives(self._world) else title
                     yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")
@@ -104,12 +108,20 @@ class ExportScreen(ModalScreen[None]):
             with Horizontal(id="export-buttons"):
                 yield Button("Write", id="export-write", variant="primary", compact=True)
 
-    def on_mount(self) -> None:
-        self._look()
-
     @work(thread=True, group="look")
-    def _look(self) -> None:
-        call_if_open(self, self.query_one("#export-left", Static).update, what_is_left(self._file))
+    def on_mount(self) -> None:
+        """Says how much of the world would be written, or why nothing can be."""
+        from ddenv.runfile.fold import fold
+        from ddenv.runfile.store import RunFile
+
+        try:
+            with RunFile(self._file) as file:
+                state = fold(file.events())
+            words = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
+            words += f": {ended(state)}" if state.ended else " so far: not minimal yet."
+        except UserError as error:
+            words = str(error)
+        call_if_open(self, self.query_one("#export-left", Static).update, words)
 
     def on_descendant_focus(self, event: events.DescendantFocus) -> None:
         kind = (event.widget.id or "").removeprefix("export-").removesuffix("-name")
@@ -141,37 +153,33 @@ class ExportScreen(ModalScreen[None]):
             return
         self._busy = True
         self._report(WRITING)
-        self._write(wanted, self._agreed)
+        self._write(wanted)
 
     def _wanted(self) -> Wanted:
         """Raises UserError for names that cannot be used."""
-        folder = without_tilde(self._value("folder") or ".")
-        wanted = {id: self._path(folder, id, title, endings) for id, title, endings in KINDS if self._ticked(id)}
+        folder, wanted = without_tilde(self._value("folder") or "."), {}
+        for id, title, _, endings in KINDS:
+            if not self.query_one(f"#export-{id}", Checkbox).value:
+                continue
+            name = self._value(f"{id}-name")
+            if not name or not f"{folder}{name}".isprintable():
+                raise UserError(f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}")
+            wanted[id] = folder / without_tilde(name)
+            if endings[0] and not wanted[id].name.lower().endswith(endings):
+                raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
         if not wanted:
             raise UserError("nothing is chosen: tick what to write (space)")
         return wanted
-
-    def _ticked(self, id: str) -> bool:
-        return self.query_one(f"#export-{id}", Checkbox).value
-
-    def _path(self, folder: Path, id: str, title: str, endings: tuple[str, ...]) -> Path:
-        name = self._value(f"{id}-name")
-        if not name or not f"{folder}{name}".isprintable():
-            raise UserError(f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}")
-        path = folder / without_tilde(name)
-        if endings[0] and not path.name.lower().endswith(endings):
-            raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
-        return path
 
     def _value(self, id: str) -> str:
         return self.query_one(f"#export-{id}", Input).value.strip()
 
     @work(thread=True, group="write")
-    def _write(self, wanted: Wanted, agreed: frozenset[Path]) -> None:
+    def _write(self, wanted: Wanted) -> None:
         from ddenv.report.report import is_there
 
         there = [path for path in files_of(wanted) if is_there(path)]
-        if there and not agreed.issuperset(there):
+        if there and not self._agreed.issuperset(there):
             call_if_open(self, self._ask, there)
             return
         written, wrong, worker = list[str](), "", get_current_worker()
@@ -203,50 +211,15 @@ class ExportScreen(ModalScreen[None]):
         self.query_one("#export-wrong", Static).update(wrong)
 
 
-def suggested(run: Path, world: Path = Path()) -> tuple[str, ...]:
-    stem = "".join(char if char.isprintable() else "-" for char in run.stem)
-    return (
-        f"{stem}.minimal{ending_of(world)}",
-        f"{stem}.minimal.yaml",
-        f"{stem}.html",
-        f"{stem}.zip",
-        f"{stem}.mcap",
-        ".",
-    )
-
-
-def _here() -> Path:
-    try:
-        return Path.cwd()
-    except OSError:
-        return Path.home()
-
-
-def what_is_left(run: Path) -> str:
-    """How much of the world would be written, or why nothing can be."""
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.store import RunFile
-
-    try:
-        with RunFile(run) as file:
-            state = fold(file.events())
-    except UserError as error:
-        return str(error)
-    left = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
-    return f"{left}: {ended(state)}" if state.ended else f"{left} so far: not minimal yet."
-
-
 def files_of(wanted: Wanted) -> Iterator[Path]:
+    """The files that would be replaced: a bundle and a test replace nothing."""
     from ddenv.report.report import files_of as files_of_report
 
     for id, path in wanted.items():
         if id == "report":
             yield from files_of_report(path)
-            continue
-        # A bundle and a test replace nothing.
-        if id in ("bundle", "test"):
-            continue
-        yield path
+        elif id not in ("bundle", "test"):
+            yield path
         if id == "scenario":
             yield from (path.with_suffix(f".robot{kind}") for kind in (".sdf", ".urdf"))
 
@@ -264,12 +237,9 @@ def write(run: Path, wanted: Wanted, stopped: Callable[[], bool]) -> Iterator[st
         if exported.needs:
             needs = [shortened(uri, LONGEST_NEED) for uri in exported.needs]
             yield f"the world still needs {first_of(needs, MOST_NEEDS)}"
-    if "report" in wanted:
-        yield from (f"wrote {plain(path)}" for path in write_report(run, wanted["report"], force=True))
-    if "bundle" in wanted:
-        yield from (f"wrote {plain(path)}" for path in write_bundle(run, wanted["bundle"]))
-    if "test" in wanted:
-        yield from (f"wrote {plain(path)}" for path in write_test(run, wanted["test"]))
+    for id, writer in (("report", partial(write_report, force=True)), ("bundle", write_bundle), ("test", write_test)):
+        if id in wanted:
+            yield from (f"wrote {plain(path)}" for path in writer(run, wanted[id]))
     if "mcap" in wanted:
         export_mcap(run, wanted["mcap"], stopped)
         yield f"wrote {plain(wanted['mcap'])}"

@@ -5,14 +5,14 @@ from __future__ import annotations
 import gc
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 
 if TYPE_CHECKING:
-    from ddenv.workbench.shared.messages import ShowLesson, ShowLessons, ShowRace
+    from textual.screen import Screen
 
 # One character of each kind that is drawn.
 SIGNS = "╭▶●⠒█…"
@@ -24,7 +24,7 @@ def run_workbench(
     *,
     watch: bool = False,
     file: Path | None = None,
-    first: ShowLessons | ShowLesson | ShowRace | None = None,
+    first: Callable[[], Screen[Any]] | None = None,
 ) -> int:
     """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
     # With the usual ones the slowest keys take twice as long. There is no garbage yet: the app begins to look for it.

@@ -7,7 +7,7 @@ from test_snapshots import SMALL, USUAL, settled
 from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.shared.messages import ShowLessons
+from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from tests.tiers import slow
 from tests.waiting import eventually
 
@@ -44,7 +44,7 @@ def opened(run, name):
     if name in OF_A_RUN:
         return Workbench(run.path), OF_A_RUN[name][1]
     lesson = open_lesson(bundled()[0]).lesson.file
-    return Workbench(first=ShowLessons(lesson) if name == "lesson" else None), OTHERS[name]
+    return Workbench(first=(lambda: LessonsScreen(lesson)) if name == "lesson" else None), OTHERS[name]
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)

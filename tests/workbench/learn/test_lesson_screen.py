@@ -8,15 +8,14 @@ from ddenv.learn.score import Score
 from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.runfile.store import RunFile
 from ddenv.runs.remembered import state_file
-from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 from tests.tiers import slow
+from tests.workbench.learn.opened import NAME, opened
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
 
@@ -31,8 +30,7 @@ def footer(pilot):
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_a_lesson_from_start_to_end(size):
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=size) as pilot:
-        await pilot.pause()
+    async with opened(size) as pilot:
         screen = pilot.app.screen
         assert isinstance(screen, LessonScreen)
         turn = 0
@@ -57,13 +55,12 @@ async def test_a_lesson_from_start_to_end(size):
         assert isinstance(pilot.app.screen, LessonsScreen)
         row = pilot.app.screen.query_one(OptionList).get_option_at_index(0).prompt
         assert "done" in str(row)
-    assert all_scores()["what-delta-debugging-is"].done
+    assert all_scores()[NAME].done
     assert state_file("lessons.json").stat().st_mode & 0o077 == 0, "nobody else reads a student's answers"
 
 
 async def test_enter_shows_the_rest_of_a_long_text_first():
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(64, 20)) as pilot:
-        await pilot.pause()
+    async with opened((64, 20)) as pilot:
         pane, course = pilot.app.screen.query_one(LessonPane), pilot.app.screen.course
         assert pane.max_scroll_y and pane.parent.border_subtitle == "enter shows the rest"
         while pane.scroll_y < pane.max_scroll_y:
@@ -78,9 +75,7 @@ async def test_enter_shows_the_rest_of_a_long_text_first():
 
 @pytest.mark.screens
 async def test_at_80_columns_a_hint_is_in_sight_and_the_map_has_the_way_of_the_test_that_is_told():
-    keep_score("what-delta-debugging-is", Score(step=10))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
+    async with opened((80, 24), step=10) as pilot:
         screen = pilot.app.screen
         await pilot.press("h")
         await pilot.pause()
@@ -103,8 +98,7 @@ async def test_after_a_lesson_comes_the_next_one_by_itself_and_the_list_shows_ho
     names = [open_lesson(file).lesson.name for file in bundled()]
     for name in names[:2]:
         keep_score(name, Score(step=99, done=True))
-    async with Workbench(first=ShowLessons()).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened(first=LessonsScreen) as pilot:
         options = pilot.app.screen.query_one(OptionList)
         assert options.highlighted == 2, "the first one that is not done"
         assert "2 of 7 done" in str(pilot.app.screen.query_one("#lessons-header", Static).content)
@@ -121,17 +115,14 @@ async def test_after_a_lesson_comes_the_next_one_by_itself_and_the_list_shows_ho
         await pilot.pause()
         assert pilot.app.screen.query_one(OptionList).highlighted == 2
     keep_score(names[-1], Score(step=99, done=True))
-    async with Workbench(first=ShowLessons(bundled()[-1])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened(lesson=-1) as pilot:
         await pilot.press("enter")
         assert "next lesson" not in text(pilot) and isinstance(pilot.app.screen, LessonScreen)
 
 
 @pytest.mark.screens
 async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it():
-    keep_score("what-delta-debugging-is", Score(step=2))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
+    async with opened((80, 24), step=2) as pilot:
         pane = pilot.app.screen.query_one(LessonPane)
         assert pane.parent.border_subtitle == "a to c, or ↑ ↓ and enter; s skips"
         assert footer(pilot)[:3] == ["a to c answer", "s skip", "h hint"] and "enter go on" not in footer(pilot)
@@ -149,9 +140,8 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
 
 
 async def test_a_lesson_that_is_done_shows_the_end_of_its_run_and_can_be_started_again():
-    keep_score("what-delta-debugging-is", Score(step=99, done=True, answered={"2": True, "5": False}))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
+    keep_score(NAME, Score(step=99, done=True, answered={"2": True, "5": False}))
+    async with opened((80, 24)) as pilot:
         screen = pilot.app.screen
         assert screen.course.position.now.status == "finished"
         assert "1 of 2 questions right" in text(pilot) and "r starts it again" in text(pilot)
@@ -159,16 +149,14 @@ async def test_a_lesson_that_is_done_shows_the_end_of_its_run_and_can_be_started
         assert screen.course.step == 0 and not screen.course.score.answered
         await pilot.press("enter", "r")
         assert screen.course.step == 1, "anywhere else the key does nothing"
-    assert all_scores()["what-delta-debugging-is"].done
+    assert all_scores()[NAME].done
 
 
 @pytest.mark.screens
 async def test_the_letters_of_answers_leave_out_f_and_the_key_of_the_hint():
     lesson = open_lesson(bundled()[0]).lesson
     round_2 = next(number for number, step in enumerate(lesson.steps) if step.foretell == "winner")
-    keep_score(lesson.name, Score(step=round_2))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened(step=round_2) as pilot:
         question = pilot.app.screen.course.page.question
         assert "6 candidates, tested in this order" in question.text and len(question.answers) == 7
         assert footer(pilot)[0] == "a b c d e g i answer"
@@ -179,8 +167,7 @@ async def test_the_letters_of_answers_leave_out_f_and_the_key_of_the_hint():
 
 
 async def test_a_lesson_goes_on_where_it_was_left():
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened() as pilot:
         await pilot.press("enter", "escape", "enter")
         await pilot.pause()
         assert pilot.app.screen.course.step == 1
@@ -189,8 +176,7 @@ async def test_a_lesson_goes_on_where_it_was_left():
 
 
 async def test_any_run_is_stepped_through_forward_and_back():
-    async with Workbench(first=ShowLesson(LESSONS / "delivery.ddenv")).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened(first=lambda: LessonScreen(LESSONS / "delivery.ddenv")) as pilot:
         course = pilot.app.screen.course
         begin = course.at
         await pilot.press("right", "right", "left", "left")
@@ -212,33 +198,18 @@ async def test_any_run_is_stepped_through_forward_and_back():
         assert course.page.question is None
 
 
-async def test_the_setup_screen_leads_to_the_lessons():
-    async with Workbench().run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
-        await pilot.press("L")
-        await pilot.pause()
-        assert isinstance(pilot.app.screen, LessonsScreen)
-        await pilot.press("escape")
-        assert not isinstance(pilot.app.screen, LessonsScreen)
-
-
 @pytest.mark.screens
 async def test_the_algorithm_is_shown_from_the_step_that_speaks_of_it_on():
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened() as pilot:
         screen = pilot.app.screen
         speaks = next(number for number, step in enumerate(screen._opened.lesson.steps) if "*Algorithm*" in step.text)
         assert speaks > 2 and not screen.query_one("#lesson-now").display
-        keep_score("what-delta-debugging-is", Score(step=speaks))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened(step=speaks) as pilot:
         assert pilot.app.screen.query_one("#lesson-now").display
 
 
 async def test_arrows_choose_an_answer_and_enter_takes_it():
-    keep_score("what-delta-debugging-is", Score(step=2))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
+    async with opened(step=2) as pilot:
         course = pilot.app.screen.course
         await pilot.press("down", "down", "up", "down")
         assert "▸ b" in text(pilot)

@@ -6,18 +6,15 @@ import sqlite3
 import pytest
 from textual.widgets import Static
 
-from ddenv.learn.score import Score
 from ddenv.learn.shelf import LESSONS, bundled, open_lesson
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.race_screen import RacerPane, RaceScreen
-from ddenv.workbench.shared.messages import ShowLessons, ShowRace
+from ddenv.workbench.learn.kept_scores import all_scores
+from ddenv.workbench.learn.race_screen import RacerPane, RaceScreen, race_of_runs
 from tests.command import in_process
 from tests.tiers import slow
 from tests.waiting import eventually
+from tests.workbench.learn.opened import NAME, opened
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
-NAME = "what-delta-debugging-is"
 STEP = next(number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.race)
 
 
@@ -31,9 +28,7 @@ def titles(pilot):
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_a_race_in_a_lesson(size):
-    keep_score(NAME, Score(step=STEP))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=size) as pilot:
-        await pilot.pause()
+    async with opened(size, STEP) as pilot:
         course = pilot.app.screen.course
         right = course.page.question.right
         await pilot.press("abcde"[right], "enter")
@@ -60,16 +55,6 @@ async def test_a_race_in_a_lesson(size):
     assert all_scores()[NAME].answered[str(STEP)] is True
 
 
-async def test_a_race_is_skipped():
-    keep_score(NAME, Score(step=STEP))
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
-        await pilot.press("s")
-        assert pilot.app.screen.course.due and "Skipped" in said(pilot, "lesson-text")
-        await pilot.press("s", "enter")
-        assert pilot.app.screen.course.step == STEP + 1
-
-
 @pytest.fixture
 def two_runs(tmp_path):
     """The run of the first lesson, and one that was stopped in the middle."""
@@ -84,8 +69,7 @@ def two_runs(tmp_path):
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_runs_race_by_themselves_to_the_end(two_runs, size, monkeypatch):
     monkeypatch.setattr("ddenv.workbench.learn.race_screen.PACE", 0.01)
-    async with Workbench(first=ShowRace(two_runs)).run_test(size=size) as pilot:
-        await pilot.pause()
+    async with opened(size, first=lambda: race_of_runs(two_runs)) as pilot:
         screen = pilot.app.screen
         assert "ddenv model2model/" in str(screen.query(RacerPane).first()._said.content)
         await pilot.press("space")
@@ -99,8 +83,7 @@ async def test_runs_race_by_themselves_to_the_end(two_runs, size, monkeypatch):
 async def test_a_race_is_paused(two_runs, monkeypatch):
     # The next test would come in an hour.
     monkeypatch.setattr("ddenv.workbench.learn.race_screen.PACE", 3600.0)
-    async with Workbench(first=ShowRace(two_runs)).run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
+    async with opened((80, 24), first=lambda: race_of_runs(two_runs)) as pilot:
         for key, words in (
             ("space", "runs"),
             ("space", "space runs it"),

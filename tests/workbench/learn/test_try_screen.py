@@ -3,30 +3,20 @@
 import pytest
 from textual.widgets import Static
 
-from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, open_lesson
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.learn.kept_scores import all_scores, keep_score
+from ddenv.workbench.learn.kept_scores import all_scores
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.shared.messages import ShowLessons
 from tests.tiers import slow
 from tests.waiting import eventually
+from tests.workbench.learn.opened import NAME, opened
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
-NAME = "what-delta-debugging-is"
 STEP = next(number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.budget)
 
 
-@pytest.fixture
-def at_the_step():
-    keep_score(NAME, Score(step=STEP))
-    return Workbench(first=ShowLessons(bundled()[0]))
-
-
 async def begin(pilot):
-    await pilot.pause()
     assert isinstance(pilot.app.screen, LessonScreen)
     await pilot.press("enter")
     screen = pilot.app.screen
@@ -47,8 +37,8 @@ async def without(pilot, *names):
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
-async def test_a_search_by_keys_that_finds_a_minimal_set(at_the_step, size):
-    async with at_the_step.run_test(size=size) as pilot:
+async def test_a_search_by_keys_that_finds_a_minimal_set(size):
+    async with opened(size, STEP) as pilot:
         screen = await begin(pilot)
         # The first model and the third.
         await pilot.press(*["right_square_bracket", "enter", "right_square_bracket", "right_square_bracket", "space"])
@@ -81,8 +71,8 @@ async def test_a_search_by_keys_that_finds_a_minimal_set(at_the_step, size):
     assert all_scores()[NAME].answered[str(STEP)] is True
 
 
-async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again(at_the_step):
-    async with at_the_step.run_test(size=(80, 24)) as pilot:
+async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again():
+    async with opened((80, 24), STEP) as pilot:
         screen = await begin(pilot)
         await pilot.press("w")
         assert not screen.attempt.tried, "nothing is marked"
@@ -109,9 +99,8 @@ async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again(at_the_s
     assert str(STEP) not in kept.answered and kept.moves[str(STEP)][-1] == "back"
 
 
-async def test_a_search_is_skipped_and_gone_back_to(at_the_step):
-    async with at_the_step.run_test(size=(80, 24)) as pilot:
-        await pilot.pause()
+async def test_a_search_is_skipped_and_gone_back_to():
+    async with opened((80, 24), STEP) as pilot:
         course = pilot.app.screen.course
         await pilot.press("s", "enter")
         assert course.step == STEP + 1 and not course.score.answered
@@ -122,8 +111,8 @@ async def test_a_search_is_skipped_and_gone_back_to(at_the_step):
         assert isinstance(pilot.app.screen, TryScreen)
 
 
-async def test_models_are_marked_by_mouse_on_the_map_and_in_the_list(at_the_step):
-    async with at_the_step.run_test(size=(120, 36)) as pilot:
+async def test_models_are_marked_by_mouse_on_the_map_and_in_the_list():
+    async with opened((120, 36), STEP) as pilot:
         screen = await begin(pilot)
         world = screen.query_one(WorldMap)
         world.go_to("pallet")

@@ -1,5 +1,7 @@
 """The list of all runs: how each stands, and what can be done with it."""
 
+from contextlib import asynccontextmanager
+
 import fake_moments
 import fake_run
 import pytest
@@ -10,10 +12,9 @@ from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.runs.compare_runs import differences, lines
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
-from ddenv.workbench.runs.runs_table import RunTable
+from ddenv.workbench.runs.runs_table import RunTable, compared, differences
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from tests.tiers import slow
 
@@ -32,19 +33,13 @@ def several(runs, run):
 class Listed:
     """The runs screen above an attached run."""
 
-    def __init__(self, run, size=(120, 36)):
-        self.app, self.size = Workbench(run.path), size
+    def __init__(self, app, pilot):
+        self.app, self.pilot = app, pilot
 
-    async def __aenter__(self):
-        self._context = self.app.run_test(size=self.size)
-        self.pilot = await self._context.__aenter__()
-        await self.pilot.pause()
+    async def again(self):
+        """Opens the screen."""
         self.app.action_runs()
         await self.look()
-        return self
-
-    async def __aexit__(self, *error):
-        await self._context.__aexit__(*error)
 
     async def look(self):
         await self.pilot.pause()
@@ -81,8 +76,18 @@ class Listed:
         return [notice.message for notice in self.app._notifications]
 
 
+@asynccontextmanager
+async def listing(run, size=(120, 36)):
+    app = Workbench(run.path)
+    async with app.run_test(size=size) as pilot:
+        await pilot.pause()
+        listed = Listed(app, pilot)
+        await listed.again()
+        yield listed
+
+
 async def test_every_run_says_how_it_stands(several, runs):
-    async with Listed(several, (200, 60)) as listed:
+    async with listing(several, (200, 60)) as listed:
         states = {name: row[1:4] for name, row in listed.rows().items()}
         assert states == {
             "crates-1": ["▶ running", "6/11", "10"],
@@ -108,35 +113,27 @@ async def test_every_run_says_how_it_stands(several, runs):
 async def test_at_80_columns_the_run_under_the_cursor_is_whole_below_the_list(several, runs):
     name = "a run whose name takes more than the list has room for"
     fake_moments.finished(fake_run.FakeRun(runs / f"{name}.ddenv")).close()
-    async with Listed(several, (80, 24)) as listed:
+    async with listing(several, (80, 24)) as listed:
         await listed.choose(name)
         assert name in listed.about() and "model2model/failure-proximal" in listed.about()
         assert listed.app.screen.query_one("#preview").region.height >= 5
-
-
-@pytest.mark.screens
-@pytest.mark.parametrize("size", [(64, 12), (20, 5)], ids=str)
-async def test_small_terminals_show_what_there_is_room_for(several, size):
-    async with Listed(several, size) as listed:
-        assert listed.app.screen.query_one("#small").display == (size == (20, 5))
-        if size != (20, 5):
-            assert all(len(row) >= 5 for row in listed.rows().values())
+        for size in ((64, 12), (20, 5)):
+            await listed.pilot.resize_terminal(*size)
+            assert listed.app.screen.query_one("#small").display == (size == (20, 5))
 
 
 @pytest.mark.screens
 async def test_enter_opens_a_run_w_watches_it_and_n_makes_one_like_it(several, scenarios):
-    async with Listed(several) as listed:
+    async with listing(several) as listed:
         await listed.choose("done")
         await listed.press("enter")
         assert isinstance(listed.app.screen, RunScreen) and listed.app.screen.run.stem == "done"
         assert sum(isinstance(screen, RunScreen) for screen in listed.app.screen_stack) == 1
-        listed.app.action_runs()
-        await listed.look()
+        await listed.again()
         await listed.choose("crates-1")
         await listed.press("w")
         assert listed.app.screen.run.stem == "crates-1"
-        listed.app.action_runs()
-        await listed.look()
+        await listed.again()
         await listed.choose("done")
         await listed.press("n")
         assert isinstance(listed.app.screen, SetupScreen)
@@ -145,7 +142,7 @@ async def test_enter_opens_a_run_w_watches_it_and_n_makes_one_like_it(several, s
 
 @pytest.mark.screens
 async def test_what_cannot_be_done_says_why(several):
-    async with Listed(several) as listed:
+    async with listing(several) as listed:
         await listed.choose("broken")
         for key in ("enter", "w", "n"):
             await listed.press(key)
@@ -164,7 +161,7 @@ async def test_what_cannot_be_done_says_why(several):
 async def test_d_deletes_and_u_brings_back(several, runs):
     (runs / "done.ddenv.log").write_text("its log")
     content = (runs / "done.ddenv").read_bytes()
-    async with Listed(several) as listed:
+    async with listing(several) as listed:
         await listed.choose("done")
         # What SQLite leaves after a kill would come back in the next run of this name.
         (runs / "done.ddenv-journal").touch()
@@ -193,7 +190,7 @@ def test_a_deleted_run_is_kept_for_a_week_and_replaces_none(several, runs, monke
 
 
 async def test_the_list_is_sorted_by_any_column_and_filtered_by_state(several):
-    async with Listed(several, (200, 60)) as listed:
+    async with listing(several, (200, 60)) as listed:
         while listed.app.screen._order != "tests":
             await listed.press("s")
         assert next(iter(listed.rows())) == "done"
@@ -207,7 +204,7 @@ async def test_two_runs_are_compared(several, runs):
     data = fake_run.as_printed()
     data["reduction"]["iterations"] = 7
     fake_moments.guided(fake_run.FakeRun(runs / "other.ddenv", data)).close()
-    async with Listed(several) as listed:
+    async with listing(several) as listed:
         await listed.press("c")
         assert "mark a run first" in listed.notices()[-1]
         await listed.choose("done")
@@ -218,7 +215,7 @@ async def test_two_runs_are_compared(several, runs):
         await listed.press("c")
         assert isinstance(listed.app.screen, SideBySide)
         other = next(run for run in RunsFolder(runs).look() if run.path.stem == "other")
-    said = {name: values for name, *values in lines(marked, other)}
+    said = {name: values for name, *values in compared(marked, other)}
     assert said["models left"] == ["2 of 11 models", "5 of 11 models"]
     assert said["in both"][0] == "2: crate_00, crate_01"
     assert said["only in this one"] == ["none", "3: crate_02, crate_03, crate_04"]
@@ -236,7 +233,7 @@ async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
     path = folder / "far.ddenv"
     fake_moments.finished(fake_run.FakeRun(path)).close()
     text = {"quoted": f"'{path}' ", "url": path.as_uri()}.get(how, str(path))
-    async with Listed(run) as listed:
+    async with listing(run) as listed:
         if how == "typed":
             await listed.press("o")
             listed.app.screen.query_one("#path", Input).value = text
@@ -253,7 +250,7 @@ async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
 
 
 async def test_a_path_that_is_no_run_says_so(run):
-    async with Listed(run) as listed:
+    async with listing(run) as listed:
         await listed.press("o", *"nowhere", "enter")
         assert "nowhere.ddenv: no such run file" in listed.notices()[-1]
         await listed.press("escape")
@@ -262,7 +259,7 @@ async def test_a_path_that_is_no_run_says_so(run):
 
 @pytest.mark.screens
 async def test_slash_filters_and_escape_goes_back(several):
-    async with Listed(several) as listed:
+    async with listing(several) as listed:
         await listed.press("slash", *"ONE")
         assert set(listed.rows()) == {"done", "gone [b]x"}
         await listed.press("enter")
@@ -276,11 +273,10 @@ async def test_slash_filters_and_escape_goes_back(several):
 
 
 async def test_no_runs_say_how_to_make_one(run, tmp_path, monkeypatch):
-    async with Listed(run) as listed:
+    async with listing(run) as listed:
         await listed.press("escape")
         monkeypatch.setenv("DDENV_HOME", str(tmp_path / "elsewhere"))
-        listed.app.action_runs()
-        await listed.look()
+        await listed.again()
         assert "ddenv run ditch" in str(listed.app.screen.query_one("#empty", Static).render())
         await listed.press("enter", "d")
         assert isinstance(listed.app.screen, RunsScreen)

@@ -1,6 +1,6 @@
 """The setup screen in a test: what it shows, and what is typed into it."""
 
-from contextlib import suppress
+from contextlib import asynccontextmanager, suppress
 
 import fake_run
 import yaml
@@ -13,7 +13,6 @@ from ddenv.words.methods import KINDS
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.setup.fields import Explained
 from ddenv.workbench.setup.setup_screen import SetupScreen
 
 
@@ -50,15 +49,15 @@ class Session:
             self.screen.query_one(f"#{id}").value = text
 
     def wrong(self):
-        return self.screen.query_one("#wrong", Static).render().plain
+        return self.told("wrong")
 
     def method(self):
         return [self.screen.query_one(f"#{kind}", Select).value for kind in KINDS]
 
     def explained(self):
         """The title and the words of the explanation."""
-        panel = self.screen.query_one(Explained)
-        return panel.title, panel.query_one(Static).render().plain.removeprefix(f"{panel.title}  ")
+        title, _, words = self.screen.query_one("#explained Static").render().plain.partition("  ")
+        return title, words
 
     def value(self, id):
         return self.screen.form.texts[id]
@@ -81,10 +80,14 @@ class Session:
         """What stands in the place of the map."""
         return self.screen.query_one(WorldMap).notice
 
-    def place(self, **others):
+    async def filled(self, **texts):
+        self.fill(**texts)
+        await self.pilot.pause()
+
+    async def place(self, **others):
         """A start and a goal in an empty place."""
-        places = {"spawn_x": "-6", "spawn_y": "0", "spawn_z": "0.16", "spawn_yaw": "0", "goal_x": "6", "goal_y": "0"}
-        self.fill(**places | others)
+        places = {"spawn_x": "-6", "spawn_y": "0", "spawn_z": "0.16", "yaw": "0", "goal_x": "6", "goal_y": "0"}
+        await self.filled(**places | others)
 
     def refused(self):
         """What the dialog says is wrong."""
@@ -97,20 +100,13 @@ class Session:
         await self.settle()
 
 
-class Opened:
-    def __init__(self, size=(120, 36), reading=None, screen=None):
-        self.size, self.reading, self.screen = size, reading, screen
-
-    async def __aenter__(self):
-        app = Workbench(reading=self.reading)
-        self._context = app.run_test(size=self.size)
-        pilot = await self._context.__aenter__()
+@asynccontextmanager
+async def Opened(size=(120, 36), reading=None, screen=None):
+    app = Workbench(reading=reading)
+    async with app.run_test(size=size) as pilot:
         await pilot.pause()
-        if self.screen is not None:
-            await app.switch_screen(self.screen())
+        if screen is not None:
+            await app.switch_screen(screen())
         session = Session(app, pilot)
         await session.settle()
-        return session
-
-    async def __aexit__(self, *error):
-        await self._context.__aexit__(*error)
+        yield session

@@ -10,6 +10,7 @@ from ddenv.cli.workbench import open_command
 from ddenv.runs.subject import READING
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
+from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.start_run import command_words
 from ddenv.world.load import load_scenario
 from tests.workbench.setup.setup_session import Opened, write_scenario
@@ -20,6 +21,11 @@ def own(scenarios):
     """The bundled scenario, with a limit."""
     write_scenario(scenarios, reduction=fake_run.scenario()["reduction"] | {"budget": 50})
     return load_scenario(scenarios / "crates.yaml")
+
+
+def told(path, own, asked, jobs=4, name=""):
+    """The command for a scenario of the file `path`."""
+    return command_words(Choice(path, None, own), asked, jobs, name)
 
 
 @pytest.fixture
@@ -61,7 +67,7 @@ PLACES = {
     "spawn_x": "-5.5",
     "spawn_y": "-0.25",
     "spawn_z": "0.3",
-    "spawn_yaw": "-1e-05",
+    "yaw": "-1e-05",
     "goal_x": "-6.125",
     "goal_y": "2",
 }
@@ -69,9 +75,9 @@ OTHER = PLACES | {one.name: another(one) for one in OPTIONS if one.shown in ("ba
 
 
 def test_every_setting_has_an_option(scenarios, own, asked_by):
-    assert set(OTHER) == {field.id for field in form.ALL if field.key}
+    assert set(OTHER) == set(form.FIELDS) - {"jobs", "run_name", "accept"}
     asked = form.asked_of(own, OTHER, "timeseg/random", "ddmin")
-    words = command_words(scenarios / "crates.yaml", own, asked, jobs=3, reading={}, name="it's <mine>")
+    words = told(scenarios / "crates.yaml", own, asked, 3, "it's <mine>")
     assert words[:3] == ["ddenv", "run", "crates"]
     scenario, path = asked_by(shlex.split(shlex.join(words)))
     assert scenario == asked
@@ -83,7 +89,7 @@ def test_a_long_number_is_shown_rounded_and_stays_what_it_is(scenarios, own, ask
     assert texts["certify_rate"] == "0.667"
     asked = form.asked_of(own, texts, own.reduction.pair, own.reduction.algorithm)
     assert asked.reduction.certify_rate == own.reduction.certify_rate == 2 / 3
-    assert command_words(scenarios / "crates.yaml", own, asked, jobs=4, reading={})[3:] == []
+    assert told(scenarios / "crates.yaml", own, asked)[3:] == []
     asked = form.asked_of(own, texts | {"certify_rate": "0.66"}, own.reduction.pair, own.reduction.algorithm)
     assert asked.reduction.certify_rate == 0.66
 
@@ -92,7 +98,7 @@ def test_a_long_number_is_shown_rounded_and_stays_what_it_is(scenarios, own, ask
 def test_a_limit_can_be_taken_back(scenarios, own, asked_by, typed):
     asked = form.asked_of(own, form.texts_of(own) | {"budget": typed}, "timeseg/random", "ddmin")
     assert asked.reduction.budget is None
-    scenario, _ = asked_by(command_words(scenarios / "crates.yaml", own, asked, jobs=4, reading={}))
+    scenario, _ = asked_by(told(scenarios / "crates.yaml", own, asked))
     assert scenario == asked
 
 
@@ -101,7 +107,7 @@ async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, start
     async with Opened() as session:
         assert session.told("command") == "$ ddenv run crates"
         await session.press("f9")
-        session.fill(iterations="5", as_printed="on", spawn_x="-6.25", goal_y="-0.5", jobs="2", name="mine")
+        session.fill(iterations="5", as_printed="on", spawn_x="-6.25", goal_y="-0.5", jobs="2", run_name="mine")
         session.screen.query_one("#algorithm").value = "ddmin"
         await session.pilot.pause()
         shown = session.told("command").removeprefix("$ ")
@@ -127,8 +133,7 @@ async def test_the_options_of_the_command_line_are_part_of_it(scenarios, tmp_pat
     world.write_text(f"<sdf version='1.9'><world name='w'>{house}</world></sdf>")
     async with Opened(reading=reading) as session:
         await session.open(world)
-        session.place()
-        await session.pilot.pause()
+        await session.place()
         words = shlex.split(session.told("command"))
         assert ("--inside" in words) == bool(given), words
 
@@ -143,27 +148,12 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
         await session.open(path)
         assert session.told("command") == ""
         assert "not ready: spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
-        session.place()
-        await session.pilot.pause()
+        await session.press("f8")
+        assert session.app.clipboard == "" and session.app.focused.id == "spawn_x"
+        await session.place()
         words = shlex.split(session.told("command"))[1:]
         assert words[2] == str(path)
         assert words[3:5] == ["--spawn=-6,0,0.16,0", "--goal=6,0"]
         scenario, run = asked_by(words)
-        assert scenario == session.screen._scenario()
+        assert scenario == session.screen._asked()[1]
         assert run.stem == "it-s-1"
-
-
-@pytest.mark.screens
-async def test_what_is_wrong_has_no_command_to_copy(scenarios):
-    async with Opened() as session:
-        session.fill(timeout="soon")
-        await session.pilot.pause()
-        assert "not ready: timeout s: expected a number" in session.told("cost")
-        await session.press("f8")
-        assert session.app.clipboard == ""
-        assert session.app.focused.id == "timeout"
-
-
-def test_other_files_are_named_whole(own, tmp_path):
-    words = command_words(tmp_path / "crates.yaml", own, own, jobs=4, reading={})
-    assert words == ["ddenv", "run", str(tmp_path / "crates.yaml")]

@@ -2,12 +2,8 @@
 
 import fake_run
 
-from ddenv.workbench.setup import form
-from ddenv.workbench.setup.costs import Past, past_of, whole_cost
-from ddenv.workbench.setup.fields import not_used
+from ddenv.workbench.setup.start_run import Past, past_of, whole_cost
 from ddenv.world.scenario import Scenario
-
-FIELDS = {field.id: field for field in form.ALL}
 
 
 def scenario(**reduction):
@@ -16,28 +12,18 @@ def scenario(**reduction):
     return Scenario.model_validate(data)
 
 
-def test_every_field_has_a_meaning_and_the_choices_of_the_scenario():
-    for field in form.ALL:
-        assert field.meaning.endswith(".") and field.meaning[0].isupper()
-        if not field.key or not field.choices or field.kind is bool:
-            continue
-        section, key = field.key.split(".")
-        allowed = Scenario.model_fields[section].annotation.model_fields[key].annotation.__args__
-        assert field.choices == allowed
-
-
 def test_seconds_come_from_earlier_runs_of_the_same_scenario(runs):
     assert past_of(scenario(), runs) == Past()
     fake_run.FakeRun(runs / "a.ddenv").created().baseline().close()
     other = fake_run.scenario(name="other")
     fake_run.FakeRun(runs / "b.ddenv", other).created().baseline(4).close()
     (runs / "bad.ddenv").write_text("no run")
-    assert past_of(scenario(), runs) == Past(1, 2.0, 0.75)
+    assert past_of(scenario(), runs) == Past(2.0, 0.75)
     assert past_of(scenario(), runs / "none") == Past()
 
 
 def test_tests_and_time_are_told():
-    known = Past(1, 3.0, 0.9)
+    known = Past(3.0, 0.9)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
     assert "tests (35 to 250): 4 for the baseline, 35 for the search, 50 for the certificate; " in words
@@ -48,21 +34,3 @@ def test_tests_and_time_are_told():
     assert whole_cost(scenario(budget=9), 43, 1, known) == (
         "9 tests at most: 4 for the baseline, then the search; 25 s with 1 job at 3.0 s a test, as before"
     )
-
-
-def test_more_iterations_and_more_models_cost_more():
-    def tests(models, **reduction):
-        return int(whole_cost(scenario(**reduction), models, 2, Past()).split()[1].replace(",", ""))
-
-    assert tests(43, accept_rate="first", iterations=0) < tests(43, accept_rate="first", iterations=8)
-    assert tests(10, slice=False) < tests(300, slice=False) < tests(5000, slice=False)
-    # With slices the size of the world matters little.
-    assert whole_cost(scenario(), 43, 2, Past()) == whole_cost(scenario(), 5000, 2, Past())
-    theirs = scenario().model_copy(update={"oracle": object()})
-    assert whole_cost(theirs, 5000, 2, Past()) == whole_cost(scenario(slice=False), 5000, 2, Past())
-
-
-def test_what_is_not_used_is_said():
-    assert "Not used by ddmin" in not_used(FIELDS["as_printed"], "ddmin")
-    assert not not_used(FIELDS["as_printed"], "ddenv")
-    assert not not_used(FIELDS["as_printed"], "of-another-package")

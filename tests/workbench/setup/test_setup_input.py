@@ -81,7 +81,7 @@ async def test_names_that_cannot_be_files_are_told(scenarios, run, started):
     async with Opened() as session:
         for name, words in NAMES:
             # A NUL can be pasted, though not typed.
-            field = session.screen.query_one("#name", Input)
+            field = session.screen.query_one("#run_name", Input)
             field.value = name
             await session.press("ctrl+s")
             assert words in session.wrong(), name
@@ -112,7 +112,7 @@ async def test_what_is_typed_right_after_tab_goes_to_the_next_field(scenarios):
         assert [session.value(id) for id in ("epsilon", "jobs", "spawn_x")] == [before, "3", "-1"]
 
 
-NUMBERS = {"spawn_x": "-0.56", "spawn_y": "6.75", "spawn_yaw": "-1.571", "goal_x": "-12.05", "goal_y": "-104.5"}
+NUMBERS = {"spawn_x": "-0.56", "spawn_y": "6.75", "yaw": "-1.571", "goal_x": "-12.05", "goal_y": "-104.5"}
 
 
 def shown(session, id):
@@ -121,9 +121,7 @@ def shown(session, id):
 
 
 @pytest.mark.screens
-@pytest.mark.parametrize(
-    "size", slow(pytest.mark.screens, [(64, 18), (80, 24), (110, 32), (120, 36), (170, 50)], but=[(120, 36)]), ids=str
-)
+@pytest.mark.parametrize("size", [(64, 18), (80, 24), (120, 36)], ids=str)
 async def test_numbers_begin_with_their_sign(scenarios, size):
     own = fake_run.scenario()
     own["robot"]["spawn"] |= {"x": -0.56, "y": 6.75, "yaw": -1.571}
@@ -142,8 +140,7 @@ async def test_numbers_begin_with_their_sign(scenarios, size):
 async def test_a_number_that_does_not_fit_says_so_and_is_replaced_by_typing(scenarios):
     async with Opened() as session:
         await session.press("f4")
-        session.fill(spawn_x="-0.78539816339")
-        await session.pilot.pause()
+        await session.filled(spawn_x="-0.78539816339")
         assert shown(session, "spawn_x").startswith("-0.78") and shown(session, "spawn_x").endswith("…")
         session.screen.query_one("#spawn_x").focus()
         await session.pilot.pause()

@@ -65,7 +65,7 @@ async def test_missing_files_are_rows_with_a_guess_that_is_on_the_map(depot, sta
         ]
         assert shape(session, "one") == Cylinder(0.296, 1.315)
         assert session.screen.query_one(WorldMap).notice == ""
-        session.place(spawn_x="0", goal_x="8")
+        await session.place(spawn_x="0", goal_x="8")
         await session.press("ctrl+s")
         assert "2 missing files without a remedy: press m" in session.wrong()
         await session.press("m", "down", "w")
@@ -123,8 +123,7 @@ async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_pa
     async with Opened() as session:
         await session.open(other)
         assert [row[0] for row in rows(session)] == ["✓", "✓"]
-        session.place(spawn_x="0", goal_x="8")
-        await session.pilot.pause()
+        await session.place(spawn_x="0", goal_x="8")
         assert f"--stand-in {SHELF}=auto" in session.told("command")
         await session.press("m", "enter")
         session.app.screen.query_one("#remedy", Input).value = ""
@@ -147,8 +146,7 @@ async def test_a_folder_is_a_remedy_if_the_file_is_in_it(depot, tmp_path):
         assert f"not in {folder.parent}; guess cylinder" in rows(session)[1]
         assert shape(session, "shelf") == Box((3, 1, 2))
         await session.press("m", "a")
-        session.place(spawn_x="0", goal_x="8")
-        await session.pilot.pause()
+        await session.place(spawn_x="0", goal_x="8")
         assert f"--model-path '{folder.parent}'" in session.told("command")
 
 
@@ -165,8 +163,7 @@ async def test_a_world_that_misses_nothing_has_no_rows(scenarios, depot):
     async with Opened(reading={"stand_in": ("auto",)}) as session:
         await session.open(depot)
         assert rows(session) == []
-        session.place(spawn_x="0", goal_x="8")
-        await session.pilot.pause()
+        await session.place(spawn_x="0", goal_x="8")
         assert "--stand-in auto" in session.told("command")
 
 
@@ -212,20 +209,15 @@ async def test_the_question_for_the_start_comes_back_to_the_map(depot):
         assert "spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
 
 
-def test_commands_on_a_world_use_what_the_workbench_remembers(depot, monkeypatch, capsys):
-    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none"})
+def test_commands_use_what_the_workbench_remembers_and_say_so(depot, monkeypatch, capsys):
+    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none", "model://another": "auto"})
     done = in_process(monkeypatch, capsys, "world", "check", depot)
     assert done.returncode == 0
     assert BARREL in done.stderr and "--no-remembered" in done.stderr
     is_one_line(in_process(monkeypatch, capsys, "world", "check", depot, "--no-remembered"), "construction_barrel")
-
-
-def test_commands_use_what_the_workbench_remembers_and_say_so(depot):
-    remember_remedies({BARREL: "cylinder:0.3,1", SHELF: "none", "model://another": "auto"})
     given = {"model_path": (), "stand_in": (), "ignore": (), "spawn": (0, 0, 0.2, 0), "goal": (9, 0), "world": None}
     said = []
-    scenario = scenario_named(str(depot), {**given, "remembered": True}, said.append)
-    world, _ = load_parts(scenario)
+    world, _ = load_parts(scenario_named(str(depot), {**given, "remembered": True}, said.append))
     assert {model.name for model in world.models if model.name in ("one", "two")} == {"one", "two"}
     assert all(name in said[-1] for name in (BARREL, SHELF, str(state_file(REMEDIES)), "--no-remembered"))
     assert "another" not in said[-1]

@@ -21,7 +21,7 @@ class Places:
         await self.session.pilot.pause()
 
     def numbers(self):
-        fields = ("spawn_x", "spawn_y", "spawn_z", "spawn_yaw", "goal_x", "goal_y")
+        fields = ("spawn_x", "spawn_y", "spawn_z", "yaw", "goal_x", "goal_y")
         return [self.session.value(id) for id in fields]
 
     @property
@@ -120,7 +120,7 @@ async def test_the_ground_gives_the_z_of_a_start_that_is_typed_until_one_types_t
         assert session.value("spawn_z") == ""
         await typed("spawn_y", "0")
         assert float(session.value("spawn_z")) == pytest.approx(0.167, abs=0.005)
-        assert session.value("spawn_yaw") == "0"
+        assert session.value("yaw") == "0"
         await typed("spawn_z", "0.3")
         await typed("spawn_x", "-5")
         assert session.value("spawn_z") == "0.3"
@@ -134,7 +134,7 @@ async def test_the_crosshair_and_the_mouse_pick(scenarios):
         x, y = float(session.value("spawn_x")), float(session.value("spawn_y"))
         assert "the heading" in places.says()
         await session.press("up", "up", "enter")
-        assert session.value("spawn_yaw") == "1.571"
+        assert session.value("yaw") == "1.571"
         await session.press("g", "right", "right", "right", "enter")
         assert float(session.value("goal_x")) > x
         await session.press("s")
@@ -198,7 +198,7 @@ async def test_models_inside_each_other_are_told_of_a_world_without_a_start(scen
         await session.open(scenarios / "inside.sdf")
         why = "loose starts 0.30 m inside wall: they push each other apart"
         await says(session, f"▲ move one model, or make both static: {why}")
-        session.fill(spawn_x="4", spawn_y="0", spawn_z="2", spawn_yaw="0")
+        session.fill(spawn_x="4", spawn_y="0", spawn_z="2", yaw="0")
         line = await says(
             session, "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it and drops"
         )

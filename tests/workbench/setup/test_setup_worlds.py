@@ -31,8 +31,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert "12 models" in session.screen.query_one("#about", Static).render().plain
         await session.press("ctrl+s")
         assert "spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.wrong()
-        session.place()
-        await session.pilot.pause()
+        await session.place()
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
         session.fill(goal_x="inf")
         await session.press("ctrl+s")
@@ -97,7 +96,18 @@ def test_the_newest_come_first_once_and_not_without_end(files):
     assert recent_files() == [files[0], *found[2:]]
 
 
-@pytest.mark.parametrize("content", ["", "no list", "{", '{"a": 1}', "[1, null, {}]", "[" * 50_000, '["\\u0000"]'])
+DAMAGED = [
+    "",
+    "no list",
+    "{",
+    '{"a": 1, "b": "tube:1", "c": "/no/where"}',
+    "[1, null, {}]",
+    "[" * 50_000,
+    '["\\u0000"]',
+]
+
+
+@pytest.mark.parametrize("content", DAMAGED)
 def test_what_is_damaged_is_passed_over(content, files):
     for name, read, empty in (
         (RECENT, recent_files, []),
@@ -107,11 +117,6 @@ def test_what_is_damaged_is_passed_over(content, files):
         assert read() == empty
     remember(files[0])
     assert recent_files() == [files[0]]
-
-
-def test_what_is_damaged_in_a_remedy_is_passed_over():
-    state_file(REMEDIES).write_text('{"a": 1, "b": "tube:1", "c": "/no/where"}')
-    assert remembered() == {}
 
 
 def test_where_nothing_can_be_written_nothing_is_remembered(files, monkeypatch, tmp_path):

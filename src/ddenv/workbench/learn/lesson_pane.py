@@ -144,18 +144,13 @@ def _question(question: Question, page: Page, room: int, cursor: int | None) -> 
         text.append("\n").append_text(line)
     # Answered, the hint would only take the room of what is said of the answers.
     if page.chosen is not None:
-        text.append_text(_verdict(question, page.chosen, page, room))
+        right = f"{LETTERS[question.right]} is right."
+        verdict = "✓ Right." if page.chosen == question.right else f"✗ No: {right}"
+        text.append(f"\n\n{f'Skipped. {right}' if page.chosen < 0 else verdict}", "bold")
+        for mark, why in page.remarks:
+            text.append("\n").append_text(_hung(Text(f"{mark} {plain(why)}"), REMARK, room))
     elif page.hint:
         text.append(f"\nHint: {plain(question.hint)}", "italic")
-    return text
-
-
-def _verdict(question: Question, chosen: int, page: Page, room: int) -> Text:
-    right = f"{LETTERS[question.right]} is right."
-    first = f"Skipped. {right}" if chosen < 0 else "✓ Right." if chosen == question.right else f"✗ No: {right}"
-    text = Text().append(f"\n\n{first}", "bold")
-    for mark, why in page.remarks:
-        text.append("\n").append_text(_hung(Text(f"{mark} {plain(why)}"), REMARK, room))
     return text
 
 

@@ -18,8 +18,6 @@ from ddenv.learn.lesson_course import LETTERS, Course
 from ddenv.learn.shelf import Opened
 from ddenv.learn.variables import variables
 from ddenv.runfile.position import Position, Step
-from ddenv.runfile.snapshot import Snapshot
-from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
 from ddenv.text import plain
@@ -126,10 +124,12 @@ class LessonScreen(LearnScreen[bool]):
             done = f"Done. `backspace` goes back through it, `r` starts it again.{following}"
             page = replace(page, after=blocks(done))
         self.query_one(LessonPane).show(page)
-        self.query_one("#lesson-header", Static).update(self._heading())
+        self._show_heading()
         footer, due = self.query_one(KeyFooter), course.due and not course.is_open
         asked = page.question if page.chosen is None else None
-        plain = not self._algorithm_is_due()
+        # The pane *Algorithm* comes with the first step that speaks of it; where none does, it is shown from the start.
+        steps = () if self._opened is None else self._opened.lesson.steps
+        plain = course.step < next((at for at, step in enumerate(steps) if "*Algorithm*" in step.text), 0)
         self.set_class(plain, "-plain")
         can = {
             "lesson.activity": course.activity or "",
@@ -147,12 +147,6 @@ class LessonScreen(LearnScreen[bool]):
         on = f"{course.activity}" if due else "next lesson" if self._at_next else "" if ended else "go on"
         footer.say("lesson.on", "answer" if asked else on, letters(asked) if asked else "")
         self._keep_score()
-
-    def _algorithm_is_due(self) -> bool:
-        """Whether a step up to this one speaks of the pane *Algorithm*; where none does, it is shown from the start."""
-        steps = () if self._opened is None else self._opened.lesson.steps
-        said = [number for number, step in enumerate(steps) if "*Algorithm*" in step.text]
-        return not said or self.course.step >= said[0]
 
     @property
     def _at_next(self) -> bool:
@@ -175,7 +169,10 @@ class LessonScreen(LearnScreen[bool]):
         snapshot = self._moments.of(moment, f"{words[:1].upper()}{words[1:].rstrip('.')}.")
         test = told(moment)
         if test is not None:
-            snapshot = self._with_way(snapshot, test)
+            # With its path, as far as it is recorded, and the robot where it ended.
+            pose = test.end_pose
+            live = () if pose is None or len(pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, pose),)
+            snapshot = replace(snapshot, evidence=self._moments.path(test.id), live=live)
         self.query_one("#lesson-world").border_title = "World" if test is None else f"World: path of test {test.id}"
         self.query_one(Happening).show(snapshot)
         self.query_one(Variables).show(variables(moment))
@@ -184,26 +181,18 @@ class LessonScreen(LearnScreen[bool]):
         number, all_moments = self.course.position.place
         self.query_one("#lesson-now").border_subtitle = f"moment {number} of {all_moments}"
 
-    def _with_way(self, snapshot: Snapshot, test: Test) -> Snapshot:
-        """With the path of the test that is told, as far as it is recorded, and the robot where it ended."""
-        pose = test.end_pose
-        live = () if pose is None or len(pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, pose),)
-        return replace(snapshot, evidence=self._moments.path(test.id), live=live)
-
-    def _heading(self) -> Text:
+    def _show_heading(self) -> None:
         course, score = self.course, self.course.score
         left = f" {plain(self._run.stem)}, step by step"
         if self._opened is not None:
             last = course.step == course.last
             place = "summary" if last else f"step {course.step + 1} of {course.last}"
             left = f" {plain(self._opened.lesson.title)} · {place}"
-        right = f"{score.right} of {len(score.answered)} right"
+        right = f"{score.right} of {len(score.answered)} right" if score.answered else ""
         right += f" · {score.streak} in a row" if score.streak > 1 else ""
-        right = right if score.answered else ""
-        room = max(1, self.size.width - len(right) - 2)
         text = Text(left, "bold", no_wrap=True)
-        text.truncate(room, overflow="ellipsis", pad=True)
-        return text.append(f" {right} ", "not bold")
+        text.truncate(max(1, self.size.width - len(right) - 2), overflow="ellipsis", pad=True)
+        self.query_one("#lesson-header", Static).update(text.append(f" {right} ", "not bold"))
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._show)
@@ -260,21 +249,22 @@ class LessonScreen(LearnScreen[bool]):
         if opened is None or here is None or moment is None or course.activity is None:
             self.say("there is nothing to try here")
             return
-        base = self._moments.of(moment, "")
-        if (attempt := course.attempt) is not None:
-            search = TryScreen(self._run, base, attempt, course.plays, self._keep)
-            self.app.push_screen(search, lambda _: self._show())
+        base, attempt = self._moments.of(moment, ""), course.attempt
+
+        def keep(attempt: Attempt) -> None:
+            course.keep(attempt)
+            self._keep_score()
+
+        def done(_: object) -> None:
+            if attempt is None:
+                course.watched()
+            self._show()
+
+        if attempt is not None:
+            self.app.push_screen(TryScreen(self._run, base, attempt, course.plays, keep), done)
         else:
             racers = opened.racers(here)
-            self.app.push_screen(RaceScreen(racers, [base] * len(racers), self._run), lambda _: self._watched())
-
-    def _keep(self, attempt: Attempt) -> None:
-        self.course.keep(attempt)
-        self._keep_score()
-
-    def _watched(self) -> None:
-        self.course.watched()
-        self._show()
+            self.app.push_screen(RaceScreen(racers, [base] * len(racers), self._run), done)
 
     def action_move(self, what: Step, by: int) -> None:
         if self.course.move(what, by):

@@ -11,7 +11,7 @@ from textual.app import ComposeResult
 from textual.containers import Container, Vertical, VerticalScroll
 from textual.widgets import Static
 
-from ddenv.learn.race import Play, Race, Turn, plays_of_runs, result, spent
+from ddenv.learn.race import Play, Race, plays_of_runs, result, spent
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.snapshot import Snapshot
@@ -58,15 +58,13 @@ class RacerPane(Vertical):
         self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
         self.map.show(snapshot_of(self._base, left, turn), None if turn is None else turn.candidate)
         there = frozenset(left if turn is None else turn.candidate.models)
-        bar, signs = _bar(play.begins, frozenset(left), there, room), _signs(play.turns[:tests], room)
-        self._said.update(Text(f"{truncated(_what(play, turn), room)}\n{bar}\n{signs}"))
-
-
-def _what(play: Play, turn: Turn | None) -> str:
-    if turn is None:
-        return plain(play.method) or f"{count(len(play.begins), 'model')}, no test yet"
-    again = ", again" if turn.again else ""
-    return f"{turn.candidate.label}{again}: {count(turn.candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
+        signs = "".join(SIGNS.get(each.outcome, "?") for each in play.turns[:tests])
+        what = plain(play.method) or f"{count(len(play.begins), 'model')}, no test yet"
+        if turn is not None:
+            candidate, again = turn.candidate, ", again" if turn.again else ""
+            what = f"{candidate.label}{again}: {count(candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
+        last = signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
+        self._said.update(Text(f"{truncated(what, room)}\n{_bar(play.begins, frozenset(left), there, room)}\n{last}"))
 
 
 def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> str:
@@ -76,11 +74,6 @@ def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], r
     kept = max(bool(left), round(room * len(left) / len(models)))
     tested = min(kept, max(bool(there & left), round(room * len(there & left) / len(models))))
     return IN * tested + OUT * (kept - tested) + GONE * (room - kept)
-
-
-def _signs(turns: tuple[Turn, ...], room: int) -> str:
-    signs = "".join(SIGNS.get(turn.outcome, "?") for turn in turns)
-    return signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
 
 
 class RaceScreen(LearnScreen[None]):
@@ -112,7 +105,12 @@ class RaceScreen(LearnScreen[None]):
             yield Static("", id="race-said", markup=False)
 
     def on_mount(self) -> None:
-        self._clock = self.set_interval(PACE, self._tick, pause=True)
+        def tick() -> None:
+            if not self.race.go(self.race.at + 1) or self.race.over:
+                self._pause()
+            self._show()
+
+        self._clock = self.set_interval(PACE, tick, pause=True)
         self._runs_on = False
         self._arrange()
         self._show()
@@ -146,15 +144,17 @@ class RaceScreen(LearnScreen[None]):
         panel = self.query_one("#race-panel", VerticalScroll)
         panel.border_title = "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
         panel.border_subtitle = LEGEND
-        said = _table(race)
+        # A line for each search: its tests so far, those that showed f, and those that did not, by kind.
+        width = min(LONGEST_NAME, max(len(play.name) for play in race.plays))
+        heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
+        said = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
+        for play in race.plays:
+            numbers, name = spent(play, race.at), shortened(plain(play.name), width)
+            cells = "".join(f"{numbers[kind] or '':>{len(head)}}" for kind, head in heads.items())
+            said.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
         if race.over:
             said.append("\n").append("\n".join(map(plain, result(race.plays))), "bold not dim")
         self.query_one("#race-said", Static).update(said)
-
-    def _tick(self) -> None:
-        if not self.race.go(self.race.at + 1) or self.race.over:
-            self._pause()
-        self._show()
 
     def _pause(self) -> None:
         self._runs_on = False
@@ -192,16 +192,3 @@ def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
             baseline = position.moment(position.chapters[0].last)
             bases.append(Snapshot() if baseline is None else Moments(file).of(baseline, ""))
     return RaceScreen(plays, bases, runs[0])
-
-
-def _table(race: Race) -> Text:
-    """A line for each search: its tests so far, those that showed f, and those that did not, by kind."""
-    width = min(LONGEST_NAME, max(len(play.name) for play in race.plays))
-    heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
-    text = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
-    for play in race.plays:
-        numbers = spent(play, race.at)
-        cells = "".join(f"{numbers[kind] or '':>{len(head)}}" for kind, head in heads.items())
-        name = shortened(plain(play.name), width)
-        text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
-    return text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -23,6 +23,7 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.bindings import HELP, keys
 
 LONGEST_NAME = 16
+NO_TESTS = "None yet. Each one runs the robot with some of the models that you keep."
 SAID = {
     "similar": "f again without {out}: you keep {held} now.",
     "other": "another failure. That is not f, so nothing goes.",
@@ -79,17 +80,14 @@ class TryScreen(LearnScreen[None]):
         header.append(f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} kept", "not bold")
         header.append(f" · {attempt.tests_left} of {count(attempt.budget, 'test')} left", "not bold")
         self.query_one("#try-header", Static).update(header)
-        tests = self.query_one("#try-tests", VerticalScroll)
-        tests.border_title, tests.border_subtitle = "Your tests", "● f  ◇ other  ○ goal"
+        tests, table = self.query_one("#try-tests", VerticalScroll), self.query_one("#try-table", Static)
         if attempt.ended:
             tests.border_title, tests.border_subtitle = "Side by side", ""
-        table = self.query_one("#try-table", Static)
-        if attempt.ended:
             table.update(_side_by_side(list(comparison(attempt.oracle, self._plays, attempt)), tests.size.width))
         else:
-            table.update(
-                Text("\n").join(_row(number, each) for number, each in enumerate(attempt.tried, 1)) or Text(NO_TESTS)
-            )
+            tests.border_title, tests.border_subtitle = "Your tests", "● f  ◇ other  ○ goal"
+            rows = [_row(number, each) for number, each in enumerate(attempt.tried, 1)]
+            table.update(Text("\n").join(rows or [Text(NO_TESTS)]))
             tests.scroll_end(animate=False)
         self._say_where()
         # With the focus the map would take enter, which goes back to the lesson at the end.
@@ -97,35 +95,34 @@ class TryScreen(LearnScreen[None]):
         self.refresh_bindings()
 
     def _say_where(self) -> None:
-        said, attempt = self.query_one("#try-said", Static), self.attempt
+        said, attempt, many = self.query_one("#try-said", Static), self.attempt, count(len(self.attempt.held), "model")
         if attempt.ended:
-            sign = "✓" if attempt.found else "✗"
-            verdict = Text(f"{sign} {plain(attempt.verdict)}", "bold")
-            sentence = in_one_sentence(attempt.oracle, self._plays, attempt)
-            said.update(Text("\n\n").join((verdict, Text(plain(sentence)))))
+            verdict = Text(f"{'✓' if attempt.found else '✗'} {plain(attempt.verdict)}", "bold")
+            said.update(
+                verdict.append(f"\n\n{plain(in_one_sentence(attempt.oracle, self._plays, attempt))}", "not bold")
+            )
             return
-        many = count(len(attempt.held), "model")
-        sure = Text(
-            f"Sure that no single one of {many} can go? m again confirms it and ends the search, esc goes on.", "bold"
-        )
-        said.update(Text("\n").join((sure if self._asked else _last(attempt), *self._models())))
-
-    def _models(self) -> tuple[Text, Text]:
-        marked = self._map.selection
-        models = Text("Kept: ")
-        for name in self.attempt.held:
+        first = "You keep the whole world, and it shows f. Which models does f need?"
+        if self._asked:
+            first = f"Sure that no single one of {many} can go? m again confirms it and ends the search, esc goes on."
+        elif attempt.tried:
+            last = attempt.tried[-1]
+            what = SAID[last.outcome].format(out=_names(last.out), held=many)
+            first = f"Test {len(attempt.tried)}: {SIGNS[last.outcome]} {what}"
+        marked, models = self._map.selection, Text("Kept: ")
+        for name in attempt.held:
             sign = "*" if name in marked else ""
             word = Text(f"{sign}{shortened(plain(name), LONGEST_NAME)}", "bold reverse" if sign else "bold")
-            word.apply_meta({"@click": f"screen.mark_one({self.attempt.oracle.models.index(name)})"})
+            word.apply_meta({"@click": f"screen.mark_one({attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
-        if not self.attempt.tests_left:
-            return models, Text("No tests are left. m: the verdict on what you keep.", "dim")
-        if not marked:
-            return models, Text(
-                "space or a click marks a model, ] goes to the next. When no single one can go, press m.", "dim"
-            )
-        left = len(self.attempt.held) - len(marked)
-        return models, Text(f"{len(marked)} marked (*): w tests the other {left}, o tests these alone.", "dim")
+        left = len(attempt.held) - len(marked)
+        then = "space or a click marks a model, ] goes to the next. When no single one can go, press m."
+        if not attempt.tests_left:
+            then = "No tests are left. m: the verdict on what you keep."
+        elif marked:
+            then = f"{len(marked)} marked (*): w tests the other {left}, o tests these alone."
+        bold = "bold" if self._asked or attempt.tried else ""
+        said.update(Text("\n").join((Text(first, bold), models, Text(then, "dim"))))
 
     def on_world_map_selection_changed(self) -> None:
         self._asked = False
@@ -191,25 +188,17 @@ class TryScreen(LearnScreen[None]):
         self._show()
 
 
-NO_TESTS = "None yet. Each one runs the robot with some of the models that you keep."
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(shortened(plain(name), LONGEST_NAME) for name in names)
 
 
 def _row(number: int, tried: Tried) -> Text:
     text = Text(f"{number:>2} ", no_wrap=True, overflow="ellipsis")
     text.append(f"{SIGNS[tried.outcome]} ", "bold")
     # The shorter list says it best.
-    kept, out = (", ".join(shortened(plain(name), LONGEST_NAME) for name in names) for names in (tried.kept, tried.out))
-    words = f"without {out}" if len(tried.out) <= len(tried.kept) else f"only {kept or 'no model'}"
+    shorter = len(tried.out) <= len(tried.kept)
+    words = f"without {_names(tried.out)}" if shorter else f"only {_names(tried.kept) or 'no model'}"
     return text.append(words, "bold" if tried.outcome == "similar" else "")
-
-
-def _last(attempt: Attempt) -> Text:
-    if not attempt.tried:
-        return Text("You keep the whole world, and it shows f. Which models does f need?")
-    last = attempt.tried[-1]
-    out = ", ".join(shortened(plain(name), LONGEST_NAME) for name in last.out)
-    said = SAID[last.outcome].format(out=out, held=count(len(attempt.held), "model"))
-    return Text(f"Test {len(attempt.tried)}: {SIGNS[last.outcome]} {said}", "bold")
 
 
 def _side_by_side(lines: list[Line], room: int) -> Text:

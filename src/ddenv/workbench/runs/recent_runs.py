@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -90,7 +90,11 @@ class RunsFolder:
 
         Not for the screen's thread.
         """
-        stamps = dict(_stamps(self._folder))
+        stamps: dict[Path, tuple[int, ...]] = {}
+        with suppress(OSError):
+            for path in self._folder.glob("[!.]*.ddenv"):
+                with suppress(OSError):
+                    stamps[path] = _stamp(path)
         self._read = {path: read for path, read in self._read.items() if path in stamps}
         latest = sorted(stamps, key=lambda path: (-stamps[path][0], path.name))[:most]
         until = time.monotonic() + patience
@@ -101,8 +105,8 @@ class RunsFolder:
         read = self._read.get(path)
         if (read is None or read.stamp != stamp) and time.monotonic() < until:
             last, read = read, _read(path, stamp, read.state if read else None)
-            if not read.stamp and last is not None:
-                read = last
+            # A file that another program has locked is read again at the next call.
+            read = last if last is not None and not read.stamp else read
             self._read[path] = read
         if read is None:
             return Recent(path, stamp[0] / 1e9)
@@ -114,22 +118,13 @@ class RunsFolder:
         return recent
 
 
-def _stamps(folder: Path) -> Iterator[tuple[Path, tuple[int, ...]]]:
-    """When each run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
-    with suppress(OSError):
-        for path in folder.glob("*.ddenv"):
-            with suppress(OSError):
-                if not path.name.startswith("."):
-                    yield path, _stamp(path)
-
-
 def _stamp(path: Path) -> tuple[int, ...]:
-    file = path.stat()
-    try:
-        log = path.with_name(f"{path.name}-wal").stat()
-    except OSError:
-        return (file.st_mtime_ns, file.st_size, 0, 0)
-    return (max(file.st_mtime_ns, log.st_mtime_ns), file.st_size, log.st_mtime_ns, log.st_size)
+    """When a run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
+    file, log = path.stat(), path.with_name(f"{path.name}-wal")
+    with suppress(OSError):
+        logged = log.stat()
+        return (max(file.st_mtime_ns, logged.st_mtime_ns), file.st_size, logged.st_mtime_ns, logged.st_size)
+    return (file.st_mtime_ns, file.st_size, 0, 0)
 
 
 def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
@@ -142,7 +137,6 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
         with Observed(path) as file:
             state = fold(file.events(state.revision if state else 0), state)
     except UserError as error:
-        # A file that another program has locked is read again at the next call.
         locked = isinstance(error, Busy) or LOCKED in str(error)
         return _Read(() if locked else stamp, Recent(path, age, trouble=str(error)))
     options = settings(state)
@@ -168,9 +162,3 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
 def computed(state: RunState) -> float:
     """How long the simulations of a run took, s; results that were copied or implied cost nothing."""
     return sum(test.wall_seconds for test in state.tests if not test.taken and test.implied_by is None)
-
-
-def named(runs: Iterable[Recent], part: str) -> list[Recent]:
-    wanted = part.strip().casefold()
-    said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in runs)
-    return [run for run, words in said if any(wanted in each.casefold() for each in words)]

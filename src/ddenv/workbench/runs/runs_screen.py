@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from asyncio import to_thread
+from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,13 +19,13 @@ from textual.widgets import DataTable, Input, Static
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
-from ddenv.runs.folder import SUFFIX
+from ddenv.runs.folder import SUFFIX, dropped_run, find_run, runs_folder
 from ddenv.text import count, plain, shortened
 from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
-from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
+from ddenv.workbench.runs.recent_runs import Recent, RunsFolder
+from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, compared
 from ddenv.workbench.shared.background import call_if_open, is_open, refuse
 from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup
@@ -47,9 +48,10 @@ def delete_run(path: Path) -> None:
     Raises UserError while an engine works on it, or if it cannot be moved.
     """
     with engine_lock(path):
-        home = path.parent / FOLDER
-        _clear(home)
-        place = home / f"{time.time_ns()}"
+        for old in _places(path.parent):
+            if int(old.name) / 1e9 < time.time() - KEPT:
+                shutil.rmtree(old, ignore_errors=True)
+        place = path.parent / FOLDER / f"{time.time_ns()}"
         try:
             place.mkdir(parents=True)
             for each in (path, *(path.with_name(f"{path.name}{ending}") for ending in BESIDE)):
@@ -62,7 +64,7 @@ def delete_run(path: Path) -> None:
 
 def bring_back(folder: Path) -> Path:
     """Brings back the run of `folder` that was deleted last. Raises UserError if there is none, or if its name is taken."""
-    for place in sorted(_places(folder / FOLDER), reverse=True):
+    for place in sorted(_places(folder), reverse=True):
         run = next(place.glob(f"*{SUFFIX}"), None)
         if run is None:
             continue
@@ -80,15 +82,10 @@ def bring_back(folder: Path) -> Path:
     raise UserError("there is no deleted run to bring back")
 
 
-def _places(home: Path) -> list[Path]:
+def _places(folder: Path) -> list[Path]:
     """A folder for each deletion, named by its time in ns."""
+    home = folder / FOLDER
     return [each for each in home.iterdir() if each.name.isdecimal()] if home.is_dir() else []
-
-
-def _clear(home: Path) -> None:
-    for place in _places(home):
-        if int(place.name) / 1e9 < time.time() - KEPT:
-            shutil.rmtree(place, ignore_errors=True)
 
 
 class RunsScreen(Screen[None]):
@@ -114,7 +111,7 @@ class RunsScreen(Screen[None]):
 
     def __init__(self) -> None:
         super().__init__()
-        self._folder: RunsFolder | None = None
+        self._folder = RunsFolder(runs_folder())
         self._runs: list[Recent] = []
         self._reading = False
         self._order = next(iter(ORDERS))
@@ -145,44 +142,40 @@ class RunsScreen(Screen[None]):
 
     @work(thread=True, group="runs")
     def _read(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
-        self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(PATIENCE)
-        call_if_open(self, self._show, runs)
 
-    def _show(self, runs: list[Recent]) -> None:
-        self._reading = False
-        self._runs = runs
-        self._list()
-        # The rest is read at once.
-        if any(not run.status and not run.trouble for run in runs):
-            self.set_timer(0.05, self._look)
+        def show() -> None:
+            self._reading, self._runs = False, runs
+            self._list()
+            # The rest is read at once.
+            if any(not run.status and not run.trouble for run in runs):
+                self.set_timer(0.05, self._look)
+
+        call_if_open(self, show)
 
     def _list(self) -> None:
         part = self.query_one("#filter", Input).value
-        shown = sorted(named(self._runs, part), key=ORDERS[self._order])
+        wanted = part.strip().casefold()
+        said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in self._runs)
+        found = (run for run, words in said if any(wanted in each.casefold() for each in words))
+        shown = sorted(found, key=ORDERS[self._order])
         table = self.query_one(RunTable)
         table.show(shown, self._order)
         table.display = bool(shown)
         empty = self.query_one("#empty", Static)
         empty.display = not shown
-        empty.update(Text(self._nothing(part)))
+        nothing = f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv run ditch"
+        if self._runs:
+            nothing = f"No run has '{plain(part)}' in its name, scenario, method or state; escape shows all."
+        empty.update(Text(nothing))
         works = sum(run.is_worked_on for run in self._runs)
         panel = self.query_one("#list")
         panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
-        said = [f"{count(works, 'engine')} running"] if works else []
+        now = [f"{count(works, 'engine')} running"] if works else []
         if self._marked is not None:
-            said.append(f"marked: {shortened(plain(self._marked.stem), 20)}")
-        panel.border_subtitle = Text(" · ".join(said))
+            now.append(f"marked: {shortened(plain(self._marked.stem), 20)}")
+        panel.border_subtitle = Text(" · ".join(now))
         self._show_title()
-
-    def _nothing(self, part: str) -> str:
-        from ddenv.runs.folder import runs_folder
-
-        if self._runs:
-            return f"No run has '{plain(part)}' in its name, scenario, method or state; escape shows all."
-        return f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv run ditch"
 
     @on(DataTable.RowHighlighted)
     def _show_title(self) -> None:
@@ -222,32 +215,22 @@ class RunsScreen(Screen[None]):
         elif run.is_worked_on:
             refuse(self, "its engine is running: open the run and stop it first")
         else:
-            self.app.run_worker(self._delete(run.path))
-
-    async def _delete(self, path: Path) -> None:
-        try:
-            await to_thread(delete_run, path)
-        except UserError as error:
-            refuse(self, str(error))
-            return
-        self.notify(f"{plain(path.stem)} is deleted; u brings it back, for a week", timeout=4, markup=False)
-        self._runs = [run for run in self._runs if run.path != path]
-        if is_open(self):
-            self._list()
+            said = "is deleted; u brings it back, for a week"
+            self.app.run_worker(self._change(delete_run, run.path, said))
 
     def action_undo(self) -> None:
-        self.app.run_worker(self._undo())
+        self.app.run_worker(self._change(bring_back, runs_folder(), "is back"))
 
-    async def _undo(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
+    async def _change(self, change: Callable[[Path], Path | None], path: Path, said: str) -> None:
         try:
-            path = await to_thread(bring_back, runs_folder())
+            run = await to_thread(change, path) or path
         except UserError as error:
             refuse(self, str(error))
             return
-        self.notify(f"{plain(path.stem)} is back", timeout=3, markup=False)
+        self.notify(f"{plain(run.stem)} {said}", timeout=4, markup=False)
+        self._runs = [each for each in self._runs if each.path != path]
         if is_open(self):
+            self._list()
             self._look()
 
     def action_sort(self) -> None:
@@ -275,9 +258,7 @@ class RunsScreen(Screen[None]):
             if run.path == marked.path:
                 refuse(self, "this is the marked run: go to another one")
             else:
-                from ddenv.workbench.runs.compare_runs import lines
-
-                self.app.push_screen(SideBySide("Two runs side by side", lines(marked, run)))
+                self.app.push_screen(SideBySide("Two runs side by side", compared(marked, run)))
 
     def action_path(self) -> None:
         self.add_class("-opening")
@@ -285,8 +266,6 @@ class RunsScreen(Screen[None]):
 
     @on(Input.Submitted, "#path")
     def _path_entered(self, event: Input.Submitted) -> None:
-        from ddenv.runs.folder import dropped_run, find_run
-
         words = event.value.strip()
         path = dropped_run(words) or find_run(words)
         if words and path.is_file():

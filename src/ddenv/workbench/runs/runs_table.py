@@ -1,10 +1,11 @@
-"""The list of recent runs, and the table of all runs with as many columns as fit."""
+"""The list of recent runs, the table of all runs with as many columns as fit, and what is said of one run and of two."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime
+from pathlib import PurePath
 from typing import Any, ClassVar
 
 from rich.text import Text
@@ -12,14 +13,21 @@ from textual import work
 from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
-from ddenv.text import count, first_of, plain, shortened
+from ddenv.runs.folder import runs_folder
+from ddenv.text import count, first_of, plain, shortened, truncated
 from ddenv.words.signs import brief
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
+from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import keys
 
-# The maximum number of models to name.
-MOST_NAMES = 40
+# The maximum number of models to name, of one run and of two side by side, and the width of a value there.
+MOST_NAMES, MOST_COMPARED, LONGEST = 40, 20, 60
+NONE = "none"
+# What the screen shows elsewhere, or what every run has its own of.
+ASIDE = ("name", "description")
+# Files are the same if their names are: a run holds its own copy, and its machine has other folders.
+FILES = ("world", "model")
 
 
 class RunList(OptionList):
@@ -28,16 +36,13 @@ class RunList(OptionList):
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)
         self._runs: dict[str, Recent] = {}
-        self._folder: RunsFolder | None = None
+        self._folder = RunsFolder(runs_folder())
 
     def run_of(self, option_id: str | None) -> Recent:
         return self._runs[option_id or ""]
 
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
-        from ddenv.runs.folder import runs_folder
-
-        self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(most=SHOWN)
         call_if_open(self, self._show, runs)
 
@@ -65,6 +70,52 @@ def about(run: Recent) -> Text:
     text.append(f"\n{brief(run.computed)} of simulations, {count(run.decisions, 'decision')} by hand", "not bold")
     left = first_of([plain(name) for name in run.kept], MOST_NAMES)
     return text.append(f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim")
+
+
+_FACTS: dict[str, Callable[[Recent], str]] = {
+    "state": lambda run: f"{run.sign} {run.state_words}",
+    "scenario": lambda run: plain(run.scenario),
+    "algorithm": lambda run: run.algorithm,
+    "pair": lambda run: run.pair,
+    "tests": lambda run: str(run.tests),
+    "computing": lambda run: brief(run.computed),
+    "decisions": lambda run: f"{run.decisions} by hand",
+    "models left": lambda run: f"{len(run.kept)} of {count(run.total, 'model')}",
+}
+
+
+def compared(first: Recent, second: Recent) -> Iterator[tuple[str, str, str]]:
+    """Two runs side by side: (name, value in the first, value in the second)."""
+    yield "run", plain(first.path.stem), plain(second.path.stem)
+    for name, say in _FACTS.items():
+        yield name, say(first), say(second)
+    both = _names(first, second, True)
+    yield "in both", both, both
+    yield "only in this one", _names(first, second, False), _names(second, first, False)
+    yield from differences(first.chosen, second.chosen)
+
+
+def differences(first: Mapping[str, Any], second: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str, str]]:
+    """The settings in which two scenarios differ, by their paths such as `reduction.iterations`."""
+    for key in dict.fromkeys((*first, *second)):
+        one, other = first.get(key), second.get(key)
+        if key in FILES:
+            one, other = (PurePath(each).name if isinstance(each, str) else each for each in (one, other))
+        if one == other or (not above and key in ASIDE):
+            continue
+        if isinstance(one, Mapping) and isinstance(other, Mapping):
+            yield from differences(one, other, f"{above}{key}.")
+        else:
+            yield f"{above}{plain(key)}", _value(one), _value(other)
+
+
+def _value(value: Any) -> str:
+    return NONE if value is None else truncated(plain(value), LONGEST)
+
+
+def _names(run: Recent, other: Recent, both: bool) -> str:
+    names = [plain(name) for name in run.kept if (name in other.kept) == both]
+    return f"{len(names)}: {first_of(names, MOST_COMPARED)}" if names else NONE
 
 
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
@@ -99,8 +150,6 @@ def moment(time: float) -> str:
     """A Unix time, s: the time of day if it is today, else the date."""
     if not time:
         return ""
-    from ddenv.workbench.shared import poll
-
     try:
         then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
     except (ValueError, OverflowError, OSError):
@@ -140,7 +189,17 @@ class RunTable(DataTable[Text]):
                         self.update_cell(str(run.path), column.key, cell)
             return
         self._wide, self._order = self.size.width, order
-        self._arrange()
+        self.clear(columns=True)
+        room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
+        self._shown = list(FIRST)
+        for more in MORE:
+            if room - more[1] - AROUND >= NARROWEST_NAME:
+                self._shown.append(more)
+                room -= more[1] + AROUND
+        self._shown.insert(0, ("name", max(NARROWEST_NAME, room), False, lambda run: plain(run.path.stem)))
+        for name, width, number, _ in self._shown:
+            title = f"▾{name}" if name == order else name
+            self.add_column(Text(title, justify="right" if number else "left"), width=width, key=name)
         for run in runs:
             self.add_row(*self._row(run), key=str(run.path))
         if chosen is not None and chosen.path in paths:
@@ -148,19 +207,6 @@ class RunTable(DataTable[Text]):
 
     def on_resize(self) -> None:
         self.show(self._runs, self._order)
-
-    def _arrange(self) -> None:
-        self.clear(columns=True)
-        room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
-        self._shown = list(FIRST)
-        for column in MORE:
-            if room - column[1] - AROUND >= NARROWEST_NAME:
-                self._shown.append(column)
-                room -= column[1] + AROUND
-        self._shown.insert(0, ("name", max(NARROWEST_NAME, room), False, lambda run: plain(run.path.stem)))
-        for name, width, number, _ in self._shown:
-            title = f"▾{name}" if name == self._order else name
-            self.add_column(Text(title, justify="right" if number else "left"), width=width, key=name)
 
     def _row(self, run: Recent) -> list[Text]:
         return [

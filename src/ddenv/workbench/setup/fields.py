@@ -18,46 +18,27 @@ from textual.widgets import Button, Input, Label, Select, Static
 from ddenv.errors import UserError
 from ddenv.runs import processor
 from ddenv.schemas import OURS, names, uses
-from ddenv.text import plain
+from ddenv.settings import JOBS, Setting
+from ddenv.text import as_sentence, plain
 from ddenv.words.methods import KINDS, chosen, note, paragraph
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.form import FIELDS, Field
+from ddenv.workbench.setup.form import FIELDS
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 MARK = "✗ "
-MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
+MORE = f"▸ more settings (f9): {', '.join(one.label for one in form.ADVANCED)}"
 
 
-def not_used(field: Field, algorithm: str) -> str:
-    only = field.setting.used_by if field.setting else ()
-    if only and algorithm in OURS["algorithm"] and algorithm not in only:
-        return f"Not used by {plain(algorithm)}."
-    return ""
-
-
-class Explained(VerticalScroll):
-    """The meaning of the focused field, in a few lines that scroll."""
-
-    title = ""
-
-    def compose(self) -> ComposeResult:
-        yield Static("", markup=False)
-
-    def show(self, title: str, words: str, warning: str = "") -> None:
-        """A `warning` comes first and stands out."""
-        self.title = title
-        text = Text(title, "bold").append("  ")
-        if warning:
-            text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
-        self.query_one(Static).update(text.append(words, "not bold"))
-        self.scroll_home(animate=False)
+def not_used(one: Setting, algorithm: str) -> str:
+    unused = one.used_by and algorithm in OURS["algorithm"] and algorithm not in one.used_by
+    return f"Not used by {plain(algorithm)}." if unused else ""
 
 
 class OptionsForm(Vertical):
-    """Fields by the ids of `ddenv.workbench.setup.form`, the method, the cost, the equivalent command, and Start."""
+    """The fields of `ddenv.workbench.setup.form`, whose ids are their names, the method, the cost, the command, and Start."""
 
     @dataclass
     class Edited(Message):
@@ -76,7 +57,7 @@ class OptionsForm(Vertical):
         self._problems: dict[str, str] = {}
         self._message = ""
         # The texts of the rarely used fields, while they are not opened: with these the screen would open 0.15 s later.
-        self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
+        self._unopened = {one.name: next(iter(form.choices(one)), "") for one in form.ADVANCED}
         self.border_title = "Settings"
 
     def compose(self) -> ComposeResult:
@@ -89,7 +70,7 @@ class OptionsForm(Vertical):
             yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
         yield Static("", id="wrong", markup=False)
-        yield Explained(id="explained")
+        yield VerticalScroll(Static("", markup=False), id="explained")
         with Horizontal(id="last"):
             yield from _widgets((form.NAME, form.ACCEPT))
             yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
@@ -114,6 +95,11 @@ class OptionsForm(Vertical):
         return f"{partitioning}/{prioritization}", algorithm
 
     @property
+    def jobs(self) -> int:
+        """Raises FieldError."""
+        return int(form.value(JOBS, self.texts["jobs"]) or 0)
+
+    @property
     def texts(self) -> dict[str, str]:
         return self._unopened | {id: str(field.value) for id, field in self._fields()}
 
@@ -124,13 +110,13 @@ class OptionsForm(Vertical):
 
     @property
     def own_name(self) -> str:
-        name = self.texts["name"].strip()
+        name = self.texts["run_name"].strip()
         return name if self._name_given and name != self._suggested else ""
 
-    def show_settings(self, scenario: Scenario, places: Mapping[str, str] | None = None) -> None:
-        """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
-        texts = form.texts_of(scenario) | dict(places or {})
-        if form.problem(form.JOBS_FIELD, self.texts["jobs"]):
+    def show_settings(self, scenario: Scenario, places: Mapping[str, str]) -> None:
+        """Fills in the scenario's settings, in place of all earlier texts, with the texts of `places` in place of its own."""
+        texts = form.texts_of(scenario) | dict(places)
+        if form.problem(JOBS, self.texts["jobs"]):
             texts["jobs"] = str(processor.usable_cores())
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
@@ -157,7 +143,7 @@ class OptionsForm(Vertical):
     def suggest_name(self, name: str) -> None:
         self._suggested = name
         if not self._name_given:
-            field = self.query_one("#name", Input)
+            field = self.query_one("#run_name", Input)
             with field.prevent(Input.Changed):
                 field.value = name
 
@@ -165,21 +151,27 @@ class OptionsForm(Vertical):
         self._explain(event.widget)
 
     def _explain(self, widget: Widget | None) -> None:
-        """The field that has the focus, or else the algorithm, which most depends on."""
+        """In a few lines that scroll, the field that has the focus, or else the algorithm, which most depends on."""
         # An open list of names is a widget inside its field.
         near = [] if widget is None else [each.id for each in (widget, widget.parent) if each is not None]
         id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
         pair, algorithm = self.method
         partitioning, _, prioritization = pair.partition("/")
-        panel = self.query_one(Explained)
+        panel = self.query_one("#explained")
+        if widget is panel:
+            return
+        kind = next((kind for kind in KINDS if kind == id), KINDS[0])
+        name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
+        title, words, warning = f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm)
         if id in FIELDS:
-            field = FIELDS[id]
-            words = f"{field.meaning} {field.setting.cost if field.setting else ''}".strip()
-            panel.show(field.label, words, not_used(field, algorithm))
-        elif widget is not panel:
-            kind = next((kind for kind in KINDS if kind == id), KINDS[0])
-            name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
-            panel.show(f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm))
+            one = FIELDS[id]
+            words = " ".join(filter(None, (as_sentence(one.summary), one.more, one.cost)))
+            title, warning = one.label, not_used(one, algorithm)
+        text = Text(title, "bold").append("  ")
+        if warning:
+            text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
+        panel.query_one(Static).update(text.append(words, "not bold"))
+        panel.scroll_home(animate=False)
 
     def _dim(self) -> None:
         """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
@@ -190,13 +182,11 @@ class OptionsForm(Vertical):
         for id, field in self._fields():
             field.set_class(bool(not_used(FIELDS[id], algorithm)), "-unused")
 
-    def show_cost(self, words: str) -> None:
-        self.query_one("#cost", Static).update(Text(words))
-
-    def tell_command(self, words: str, typed: bool = True) -> None:
-        line = Text("$ " if typed and words else "", "bold")
+    def show_outcome(self, cost: str, words: str, typed: bool) -> None:
+        """What the run will cost, and the command that does the same, or why there is none."""
+        self.query_one("#cost", Static).update(Text(cost))
         command = self.query_one("#command", Static)
-        command.update(line.append(plain(words), "not bold"))
+        command.update(Text("$ " if typed and words else "", "bold").append(plain(words), "not bold"))
         command.tooltip = plain(words) or None
 
     def complain(self, error: UserError) -> None:
@@ -207,11 +197,12 @@ class OptionsForm(Vertical):
         if any(FIELDS[id] in form.ADVANCED for id in error.wrong):
             self._show_more(True)
         self._message, self._problems = "", error.wrong | self._problems | error.wrong
-        self.call_after_refresh(self._point_at, next(iter(error.wrong)))
 
-    def _point_at(self, id: str) -> None:
-        self._show_problems()
-        self.query_one(f"#{id}").focus()
+        def point() -> None:
+            self._show_problems()
+            self.query_one(f"#{next(iter(error.wrong))}").focus()
+
+        self.call_after_refresh(point)
 
     def show_message(self, words: str) -> None:
         self._message = words
@@ -228,19 +219,9 @@ class OptionsForm(Vertical):
 
     def on_descendant_blur(self, event: events.DescendantBlur) -> None:
         """A field is checked when it is left; an empty one only at the start of a run."""
-        field = FIELDS.get(event.widget.id or "")
-        if field is not None and (text := self.texts[field.id]).strip() and (wrong := form.problem(field, text)):
-            self._problems[field.id] = wrong
-            self._show_problems()
-
-    def _check_again(self, id: str) -> None:
-        """An error goes away as soon as its field is right."""
-        if id in self._problems or self._message:
-            self._message = ""
-            if wrong := form.problem(FIELDS[id], self.texts[id]):
-                self._problems[id] = wrong
-            else:
-                self._problems.pop(id, None)
+        one = FIELDS.get(event.widget.id or "")
+        if one is not None and (text := self.texts[one.name]).strip() and (wrong := form.problem(one, text)):
+            self._problems[one.name] = wrong
             self._show_problems()
 
     @on(Button.Pressed, "#more")
@@ -258,7 +239,7 @@ class OptionsForm(Vertical):
     @on(Input.Changed)
     def _typed(self, event: Input.Changed) -> None:
         event.stop()
-        if event.input.id == "name":
+        if event.input.id == "run_name":
             self._name_given = bool(event.value.strip())
         self._edited(event.input)
 
@@ -271,16 +252,23 @@ class OptionsForm(Vertical):
         self._edited(event.select)
 
     def _edited(self, widget: Widget) -> None:
-        if widget.id in FIELDS:
-            self._check_again(widget.id)
-        self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
+        id = widget.id or ""
+        if id in FIELDS and (id in self._problems or self._message):
+            # An error goes away as soon as its field is right.
+            self._message = ""
+            if wrong := form.problem(FIELDS[id], self.texts[id]):
+                self._problems[id] = wrong
+            else:
+                self._problems.pop(id, None)
+            self._show_problems()
+        self.post_message(self.Edited(FIELDS.get(id) in form.PLACES))
 
 
-def _widgets(fields: tuple[Field, ...], texts: Mapping[str, str] = {}) -> Iterator[Widget]:
-    for field in fields:
-        yield Label(field.label, markup=False)
-        if field.choices:
-            choices, value = [(choice, choice) for choice in field.choices], texts.get(field.id, field.choices[0])
-            yield Select(choices, value=value, id=field.id, allow_blank=False, compact=True)
+def _widgets(fields: tuple[Setting, ...], texts: Mapping[str, str] = {}) -> Iterator[Widget]:
+    for one in fields:
+        yield Label(one.label, markup=False)
+        if names := form.choices(one):
+            value, choices = texts.get(one.name, names[0]), [(name, name) for name in names]
+            yield Select(choices, value=value, id=one.name, allow_blank=False, compact=True)
         else:
-            yield Entry(texts.get(field.id, ""), id=field.id, placeholder=field.empty)
+            yield Entry(texts.get(one.name, ""), id=one.name, placeholder=one.none)

@@ -1,26 +1,31 @@
-"""The files to choose from: the bundled scenarios, those that were opened before, and the dialog that opens others."""
+"""The files to choose from, bundled or opened before, and the dialogs that open others and save the settings as a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text, TextType
-from textual import on
+from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.message import Message
-from textual.screen import ModalScreen
+from textual.screen import ModalScreen, ScreenResultType
 from textual.widgets import DirectoryTree, Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from ddenv.errors import UserError
 from ddenv.runs.remembered import read_state, write_state
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import SDF_ENDINGS, is_world
+from ddenv.world.access import SDF_ENDINGS, is_file, is_folder, is_world, without_tilde, write_file
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
 
 # The maximum number of recent files: in a longer list files are hard to find.
 RECENT, KEPT = "recent.json", 12
@@ -29,8 +34,6 @@ SUFFIXES = (*SCENARIO, *SDF_ENDINGS)
 
 
 def recent_files() -> list[Path]:
-    from ddenv.world.access import is_file
-
     return [path for path in _listed() if is_file(path)]
 
 
@@ -82,7 +85,7 @@ class FileList(OptionList):
 
     def _fill(self) -> None:
         like = [] if self._like is None else [_option(self._like, f"as {self._like.stem}", "a run")]
-        recent = [_option(path, _name(path), path.parent.name) for path in self._recent]
+        recent = [_option(path, path.name if is_world(path) else path.stem, path.parent.name) for path in self._recent]
         line = [None] if recent else []
         self.set_options([*like, *(_option(path, path.stem, "") for path in self._bundled), *line, *recent])
 
@@ -93,10 +96,6 @@ class FileList(OptionList):
         if event.option_id is not None and event.option_id != self._looked:
             self._looked = event.option_id
             self.post_message(self.Looked(Path(event.option_id)))
-
-
-def _name(path: Path) -> str:
-    return path.name if is_world(path) else path.stem
 
 
 def _option(path: Path, name: str, where: str) -> Option:
@@ -112,22 +111,40 @@ class WorldTree(DirectoryTree):
     ICON_FILE = "  "
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
-        from ddenv.world.access import is_folder
-
-        return [path for path in paths if not path.name.startswith(".") and (is_folder(path) or _fits(path))]
+        return [
+            path
+            for path in paths
+            if not path.name.startswith(".") and (is_folder(path) or path.suffix.lower() in SUFFIXES)
+        ]
 
     def process_label(self, label: TextType) -> Text:
         return Text(plain(label))
 
 
-class OpenFile(ModalScreen[Path | None]):
+class Asks(ModalScreen[ScreenResultType]):
+    """A dialog with one line to type, which `take` takes; the UserError that it raises is shown in the dialog."""
+
+    def take(self, text: str) -> None:
+        raise NotImplementedError
+
+    @on(Input.Submitted)
+    def _typed(self, event: Input.Submitted) -> None:
+        self.answer(event.value)
+
+    def answer(self, text: str) -> None:
+        try:
+            self.take(text)
+        except UserError as error:
+            self.complain(str(error))
+
+    def complain(self, words: str) -> None:
+        self.query_one("#wrong", Static).update(Text(plain(words)))
+
+
+class OpenFile(Asks[Path | None]):
     """Asks for a scenario or world file."""
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="open.cancel", tooltip="choose no file")]
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__()
-        self._folder = folder
 
     def compose(self) -> ComposeResult:
         with Framed(
@@ -136,36 +153,96 @@ class OpenFile(ModalScreen[Path | None]):
         ):
             yield PathEntry(placeholder="path of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)
-            yield WorldTree(self._folder, id="tree")
+            yield WorldTree(Path.cwd(), id="tree")
 
     @on(DirectoryTree.FileSelected)
     def _chosen(self, event: DirectoryTree.FileSelected) -> None:
-        self._take(event.path)
+        self.answer(str(event.path))
 
-    @on(Input.Submitted)
-    def _typed(self, event: Input.Submitted) -> None:
-        from ddenv.world.access import without_tilde
-
-        self._take(without_tilde(event.value.strip()))
-
-    def _take(self, path: Path) -> None:
-        wrong = complain_about(path)
-        self.query_one("#wrong", Static).update(Text(plain(wrong)))
-        if not wrong:
-            self.dismiss(path)
+    def take(self, text: str) -> None:
+        self.dismiss(path_to_open(text))
 
 
-def _fits(path: Path) -> bool:
-    return path.suffix.lower() in SUFFIXES
-
-
-def complain_about(path: Path) -> str:
-    from ddenv.world.access import is_file, is_folder
-
+def path_to_open(text: str) -> Path:
+    """The path of a scenario or world file. Raises UserError."""
+    path = without_tilde(text.strip())
     if path == Path():
-        return "give the path of a file"
+        raise UserError("give the path of a file")
     if is_folder(path):
-        return f"{path}: is a folder; expected a file"
+        raise UserError(f"{path}: is a folder; expected a file")
     if not is_file(path):
-        return f"{path}: no such file"
-    return "" if _fits(path) else f"{path.name}: expected a name that ends in {', '.join(SUFFIXES)}"
+        raise UserError(f"{path}: no such file")
+    if path.suffix.lower() not in SUFFIXES:
+        raise UserError(f"{path.name}: expected a name that ends in {', '.join(SUFFIXES)}")
+    return path
+
+
+def scenario_path(text: str) -> Path:
+    """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid name."""
+    text = text.strip()
+    if not text.strip("./") or text.endswith("/") or "\0" in text:
+        raise UserError("give the name of a file, such as my-world.yaml")
+    path = without_tilde(text)
+    if path.parts[0].startswith("~"):
+        raise UserError(f"{text}: unknown user")
+    path = path if path.suffix.lower() in SCENARIO else path.with_name(f"{path.name}.yaml")
+    if is_folder(path):
+        raise UserError(f"{path}: is a folder; give the name of a file")
+    if not is_folder(path.parent):
+        raise UserError(f"{path}: there is no folder {path.parent}")
+    return path
+
+
+def save_scenario(scenario: Scenario, path: Path) -> None:
+    """Writes `scenario` as YAML, and replaces an existing file. Raises UserError, with nothing written.
+
+    Files in the folder of `path` are named relative to it, so that the folder can be moved.
+    """
+    from ddenv.runs.export import keys_in
+    from ddenv.runs.trust import scenario_text
+
+    for each in (scenario.world, scenario.robot.model):
+        if not each.is_file():
+            raise UserError(
+                f"{each}: no longer exists, so a scenario cannot refer to it; 'ddenv export' writes the world of a run"
+            )
+    write_file(path, scenario_text(keys_in(path.resolve().parent, scenario), scenario))
+
+
+class SaveScenario(Asks[Path | None]):
+    """Returns the file that was written, or None. An existing file is only replaced after a second enter."""
+
+    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="save.cancel", tooltip="write nothing")]
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        self._scenario = scenario
+        self._replace: Path | None = None
+
+    def compose(self) -> ComposeResult:
+        stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in self._scenario.name)
+        with Framed("Save as a scenario", "enter saves   escape cancels"):
+            yield Static("A YAML file with all of these settings, for 'ddenv run' and for this list.", markup=False)
+            yield PathEntry(f"{stem[:60]}.yaml", placeholder="name of a file", id="path")
+            yield Static("", id="wrong", classes="wrong", markup=False)
+
+    @on(Input.Changed)
+    def _changed(self) -> None:
+        self._replace = None
+        self.complain("")
+
+    def take(self, text: str) -> None:
+        path = scenario_path(text)
+        if is_file(path) and path != self._replace:
+            self._replace = path
+            raise UserError(f"{path} exists already: enter again replaces it, or type another name")
+        self._write(path)
+
+    @work(thread=True, group="save", exclusive=True)
+    def _write(self, path: Path) -> None:
+        try:
+            save_scenario(self._scenario, path)
+        except UserError as error:
+            call_if_open(self, self.complain, str(error))
+            return
+        call_if_open(self, self.dismiss, path)

@@ -18,16 +18,17 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.message import Message
-from textual.screen import ModalScreen
-from textual.widgets import Input, OptionList, Static
+from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.runs.remedies import remedy, remembered, with_remedies
 from ddenv.text import count, plain
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.setup.files import Asks
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
+from ddenv.world.access import MissingFiles
 
 if TYPE_CHECKING:
     from ddenv.world.model import Note, World
@@ -62,7 +63,6 @@ def read_with_remedies(
     `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
     """
     from ddenv.runs.subject import reading_of
-    from ddenv.world.access import MissingFiles
     from ddenv.world.sdf.read import read_world
     from ddenv.world.sdf.standin import AUTO
 
@@ -82,25 +82,15 @@ def read_with_remedies(
             guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), AUTO)}
             world = read_world(path, reading_of(reading, **guessing))
             break
-    return (
-        world,
-        chosen,
-        tuple(Missing(uri, text, _words(uri, text, vain.get(uri, ""), world)) for uri, text in found.items()),
-    )
-
-
-def _words(uri: str, text: str, vain: str, world: World) -> str:
-    if text.startswith("/"):
-        return f"in {text}"
-    if text:
-        return _on_the_map(uri, world)
-    return f"{f'not in {vain}; ' if vain else ''}guess {_on_the_map(uri, world)}"
-
-
-def _on_the_map(uri: str, world: World) -> str:
-    begin = f"'{uri}' by "
-    by = next((note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)), "left out")
-    return by.removeprefix("a guess, ").removeprefix("the stand-in ")
+    missing = []
+    for uri, text in found.items():
+        begin = f"'{uri}' by "
+        by = next((note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)), "left out")
+        words = f"in {text}" if text.startswith("/") else by.removeprefix("a guess, ").removeprefix("the stand-in ")
+        if not text:
+            words = f"{f'not in {vain[uri]}; ' if uri in vain else ''}guess {words}"
+        missing.append(Missing(uri, text, words))
+    return world, chosen, tuple(missing)
 
 
 class MissingList(OptionList):
@@ -129,19 +119,21 @@ class MissingList(OptionList):
         same = [row.uri for row in rows] == [row.uri for row in self._rows]
         place, self._rows = self.highlighted if same else None, rows
         of_files = tuple(note for note in notes if not any(f"'{row.uri}'" in note.why for row in rows))
-        alike = Counter((note.what, note.kind, note.why) for note in of_files)
-        self.set_options(
-            [
-                *(Option(self._line(row), id=row.uri) for row in rows),
-                *(Option(_note_line(number, *note)) for note, number in alike.items()),
-            ]
-        )
+        self.set_options([Option(self._line(row), id=row.uri) for row in rows])
+        for (what, kind, why), number in Counter((note.what, note.kind, note.why) for note in of_files).items():
+            parts = f"{plain(what)} × {number}" if number > 1 else plain(what)
+            text = Text(no_wrap=True, overflow="ellipsis").append(f"  {kind} {parts}  ").append(plain(why), "dim")
+            self.add_option(Option(text))
         undecided = [index for index, row in enumerate(rows) if not row.remedy]
         first = next(iter(undecided), 0) if place is None else place
         self.highlighted = first if self.option_count else None
         self.display = self.option_count > 0
         self.set_class(not undecided, "-folded")
-        self.border_title = _title(len(rows), len(undecided), len(of_files))
+        said = [f"{count(len(rows), 'missing file')} replaced"] if rows else []
+        said += [f"{count(len(of_files), 'part')} replaced or ignored"] if of_files else []
+        self.border_title = f"{', '.join(said)} (m)"
+        if undecided:
+            self.border_title = f"{count(len(rows), 'file')} missing (m), {len(undecided)} without a remedy"
 
     def _line(self, row: Missing) -> Text:
         color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
@@ -179,20 +171,7 @@ class MissingList(OptionList):
         return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
 
 
-def _title(missing: int, undecided: int, notes: int) -> str:
-    if undecided:
-        return f"{count(missing, 'file')} missing (m), {undecided} without a remedy"
-    files = f"{count(missing, 'missing file')} replaced" if missing else ""
-    parts = f"{count(notes, 'part')} replaced or ignored" if notes else ""
-    return f"{', '.join(filter(None, (files, parts)))} (m)"
-
-
-def _note_line(number: int, what: str, kind: str, why: str) -> Text:
-    parts = f"{plain(what)} × {number}" if number > 1 else plain(what)
-    return Text(no_wrap=True, overflow="ellipsis").append(f"  {kind} {parts}  ").append(plain(why), "dim")
-
-
-class AskRemedy(ModalScreen[str | None]):
+class AskRemedy(Asks[str | None]):
     """Asks for the remedy of one missing file."""
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="remedy.cancel", tooltip="change nothing")]
@@ -209,11 +188,7 @@ class AskRemedy(ModalScreen[str | None]):
             yield Static("", id="wrong", classes="wrong", markup=False)
             yield Static(Text(HOW, "dim"), markup=False)
 
-    @on(Input.Submitted)
-    def _typed(self, event: Input.Submitted) -> None:
-        try:
-            if not event.value.strip() and not self._row.remedy:
-                raise UserError("type one of these, or press escape to change nothing")
-            self.dismiss(remedy(event.value))
-        except UserError as error:
-            self.query_one("#wrong", Static).update(Text(str(error).removeprefix("remedy: ")))
+    def take(self, text: str) -> None:
+        if not text.strip() and not self._row.remedy:
+            raise UserError("type one of these, or press escape to change nothing")
+        self.dismiss(remedy(text))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
@@ -18,17 +19,18 @@ from textual.widgets import Static
 from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
+from ddenv.runs.folder import free_run_path, runs_folder
 from ddenv.runs.remedies import remember_remedies
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, Point, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.choice import Choice, read_choice, spawn_height
-from ddenv.workbench.setup.costs import Past, past_of
+from ddenv.workbench.setup.choice import Choice, read_choice
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.missing_files import MissingList
+from ddenv.workbench.setup.start_run import Past, past_of
 from ddenv.workbench.shared.background import call_if_open
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
@@ -47,28 +49,20 @@ ASKS = {
 
 
 class Preview(Vertical):
-    """The panel with the world. `choice` is the last one read, None while reading or after an error.
+    """The panel with the world. `choice` is the last one read, None while reading (`awaited`) or after an error.
 
-    `picked_next` is "start", "heading" or "goal", what is picked on the map next, or "" for nothing. The numbers are in the form.
+    `picked_next` is "start", "heading" or "goal", what is picked on the map next, or "" for nothing. The settings and the places
+    are in the form, which it fills in. `past` is what earlier runs of the choice say of its cost.
     """
 
     @dataclass
     class Read(Message):
-        """The choice was read; `free_name` is the name that its next run gets. `again`: only its remedies changed.
+        """The choice was read; or it cannot be read, and the map says why. `opened`: the user opened its file just now."""
 
-        Without a choice, it cannot be read: the map says why.
-        """
+        opened: bool = False
 
-        choice: Choice | None
-        free_name: str = ""
-        again: bool = False
-
-    @dataclass
     class PastRead(Message):
-        """The cost of earlier runs of the choice was read, too."""
-
-        choice: Choice
-        past: Past
+        """`past` was read, too."""
 
     def __init__(self, form: OptionsForm, reading: Mapping[str, Any], *, id: str) -> None:
         """`reading` holds the command line's options for reading worlds."""
@@ -77,7 +71,11 @@ class Preview(Vertical):
         self.map = WorldMap(id="map")
         self.missing = MissingList(id="missing")
         self.choice: Choice | None = None
+        self.awaited = True
+        self.past = Past()
         self.picked_next = ""
+        # Whether the places in the form are of no scenario: another bare world keeps them.
+        self._keeps_places = False
         # Where the robot has room, m, if it stands inside a model.
         self._free: Point | None = None
         # The spawn's z as the ground gave it: it follows x and y until the user types another one.
@@ -99,6 +97,8 @@ class Preview(Vertical):
 
     def read(self, path: Path, *, opened: bool) -> None:
         """Reads a scenario, a world or a run in a thread. A file that the user `opened` is remembered."""
+        self._keeps_places = self.choice is not None and self.choice.bare
+        self.awaited, self.past = True, Past()
         self.show_nothing("reading the world ...")
         self._title(path.name)
         self._read(path, opened)
@@ -117,36 +117,55 @@ class Preview(Vertical):
 
     @work(thread=True, group="world", exclusive=True)
     def _read(self, path: Path, opened: bool, again: bool = False) -> None:
-        from ddenv.runs.folder import runs_folder
-
         worker = get_current_worker()
+
+        def tell(callback: Callable[..., object], *words: object) -> None:
+            if not worker.is_cancelled:
+                call_if_open(self, callback, *words)
+
         try:
             choice = read_choice(path, self._reading)
-            place, name = place_of(choice.world, choice.scenario), _free_name(choice.settings.name)
+            place = place_of(choice.world, None if choice.bare else choice.settings)
         except UserError as error:
-            if not worker.is_cancelled:
-                call_if_open(self, self._fail, str(error))
+            tell(self._fail, str(error))
             return
-        if worker.is_cancelled:
-            return
-        call_if_open(self, self._show, choice, place, name, again)
-        if opened:
+        name = "run"
+        with suppress(OSError):
+            name = free_run_path(choice.settings.name).stem
+        tell(self._show, choice, place, name, opened, again)
+        if opened and not worker.is_cancelled:
             remember(path)
-        past = past_of(choice.settings, runs_folder())
-        if not worker.is_cancelled:
-            call_if_open(self, self.post_message, self.PastRead(choice, past))
+        tell(self._show_past, past_of(choice.settings, runs_folder()))
 
     def _fail(self, why: str) -> None:
+        self.awaited = False
         self.show_nothing(why)
-        self.post_message(self.Read(None))
+        self._form.suggest_name("")
+        self._form.set_texts({one.name: "" for one in form.PLACES})
+        self.post_message(self.Read())
 
-    def _show(self, choice: Choice, place: Place, name: str, again: bool) -> None:
-        self.choice = choice
+    def _show(self, choice: Choice, place: Place, name: str, opened: bool, again: bool) -> None:
+        """Shows what was read; `again` if only its remedies changed."""
+        self.choice, self.awaited = choice, False
         self._title(choice.name)
         self.map.set_place(place)
         self.missing.show(choice.missing, choice.world.notes)
         self._show_about()
-        self.post_message(self.Read(choice, name, again))
+        self._form.suggest_name(name)
+        if again:
+            self.show_places()
+            if self.picked_next and self.missing.has_focus and all(row.remedy for row in choice.missing):
+                # A place is picked next.
+                self.map.focus()
+        else:
+            texts = self._form.texts if self._keeps_places else {}
+            places = {one.name: texts.get(one.name, "") for one in form.PLACES} if choice.bare else {}
+            self._form.show_settings(choice.settings, places)
+        self.post_message(self.Read(opened and not again))
+
+    def _show_past(self, past: Past) -> None:
+        self.past = past
+        self.post_message(self.PastRead())
 
     @on(MissingList.Chosen)
     def _remedies_chosen(self, event: MissingList.Chosen) -> None:
@@ -168,25 +187,21 @@ class Preview(Vertical):
 
     @property
     def asks(self) -> bool:
-        return self.choice is not None and self.choice.scenario is None and self.spawn is None
+        return self.choice is not None and self.choice.bare and self.spawn is None
 
     def show_places(self) -> None:
-        if self.choice is not None:
-            self._fill_z(self.choice)
-            spawn, goal = self.spawn, self.goal
-            start = (spawn[0], spawn[1], spawn[3]) if spawn else None
-            self.map.set_marks(start, (goal[0], goal[1]) if goal else None)
-            self._show_picking()
-            self._look_at_start(self.choice, spawn, goal)
-
-    def _fill_z(self, choice: Choice) -> None:
+        if (choice := self.choice) is None:
+            return
         texts = self._form.texts
         at = form.numbers(form.SPAWN[:2], texts)
-        if choice.scenario is not None or at is None or texts["spawn_z"] not in ("", self._ground_z):
-            return
-        z = spawn_height(choice.world, choice.clearance, *at)
-        self._ground_z = "" if z is None else _metres(z)
-        self._form.set_texts({"spawn_z": self._ground_z, "spawn_yaw": texts["spawn_yaw"] or "0"})
+        if choice.bare and at is not None and texts["spawn_z"] in ("", self._ground_z):
+            z = choice.spawn_height(*at)
+            self._ground_z = "" if z is None else _metres(z)
+            self._form.set_texts({"spawn_z": self._ground_z, "yaw": texts["yaw"] or "0"})
+        spawn, goal = self.spawn, self.goal
+        self.map.set_marks((spawn[0], spawn[1], spawn[3]) if spawn else None, (goal[0], goal[1]) if goal else None)
+        self._show_picking()
+        self._look_at_start(choice, spawn, goal)
 
     def pick(self, what: str) -> None:
         """Starts picking "start", "heading" or "goal" on the map; "" ends it."""
@@ -201,40 +216,25 @@ class Preview(Vertical):
             footer.say("map.pick", "set here" if what else "")
         self._show_picking()
 
-    def ask_again(self) -> None:
-        """Back to the map, where a place is picked next, once each missing file has its remedy."""
-        missing = () if self.choice is None else self.choice.missing
-        if self.picked_next and self.missing.has_focus and all(row.remedy for row in missing):
-            self.map.focus()
-
     @on(WorldMap.PlacePicked)
     def _place_picked(self, event: WorldMap.PlacePicked) -> None:
+        x, y, spawn, then = event.x, event.y, self.spawn, ""
         if self.choice is None or not self.picked_next:
             return
         if self.picked_next == "start":
-            texts, then = self._start(self.choice, event.x, event.y), "heading"
-        elif self.picked_next == "heading":
-            texts, then = self._heading(event.x, event.y), "goal" if self.goal is None else ""
+            yaw, z = self._form.texts["yaw"].strip() or "0", self.choice.spawn_height(x, y)
+            texts = {"spawn_x": _metres(x), "spawn_y": _metres(y), "yaw": yaw}
+            texts |= {} if z is None else {"spawn_z": _metres(z)}
+            then = "heading"
+        elif self.picked_next == "goal":
+            texts = {"goal_x": _metres(x), "goal_y": _metres(y)}
+        elif spawn is None or math.hypot(x - spawn[0], y - spawn[1]) < 0.01:
+            return
         else:
-            texts, then = {"goal_x": _metres(event.x), "goal_y": _metres(event.y)}, ""
-        if texts:
-            self._form.set_texts(texts)
-            self.pick(then)
-
-    def _start(self, choice: Choice, x: float, y: float) -> dict[str, str]:
-        z = spawn_height(choice.world, choice.clearance, x, y)
-        texts = {"spawn_x": _metres(x), "spawn_y": _metres(y)}
-        if z is not None:
-            texts["spawn_z"] = _metres(z)
-        if not self._form.texts["spawn_yaw"].strip():
-            texts["spawn_yaw"] = "0"
-        return texts
-
-    def _heading(self, x: float, y: float) -> dict[str, str]:
-        spawn = self.spawn
-        if spawn is None or math.hypot(x - spawn[0], y - spawn[1]) < 0.01:
-            return {}
-        return {"spawn_yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
+            texts = {"yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
+            then = "goal" if self.goal is None else ""
+        self._form.set_texts(texts)
+        self.pick(then)
 
     def _show_picking(self) -> None:
         from ddenv.map.raster import arrow
@@ -248,7 +248,7 @@ class Preview(Vertical):
         spawn, goal = self.spawn, self.goal
         if self.choice is None:
             line.update("")
-        elif spawn is None and goal is None and self.choice.scenario is None:
+        elif spawn is None and goal is None and self.choice.bare:
             line.update(text.append("no start and goal yet: ").append("s", "bold").append(" sets them on the map"))
         else:
             heading = f"{arrow(spawn[3])} {math.degrees(spawn[3]):.0f}°" if spawn else "?"
@@ -258,8 +258,20 @@ class Preview(Vertical):
 
     @work(thread=True, group="notes", exclusive=True)
     def _look_at_start(self, choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None) -> None:
-        found, free = notes(choice, spawn, goal)
-        if not get_current_worker().is_cancelled:
+        """Shows what is wrong with the start, as the run would note it, and where it had better be."""
+        from ddenv.world.placement import note_inside, notes_on_start, stands_inside
+        from ddenv.world.scenario import Spawn
+
+        worker, free, found = get_current_worker(), None, tuple(note_inside(choice.world))
+        # Start then reports the error of a robot's file.
+        with suppress(UserError):
+            if spawn is not None and (robot := choice.robot):
+                start = Spawn(x=spawn[0], y=spawn[1], z=spawn[2], yaw=spawn[3])
+                found = tuple(notes_on_start(choice.world, robot, start, (goal[0], goal[1]) if goal else None))
+                if (inside := stands_inside(choice.world, robot, start)) is not None:
+                    why, place = inside
+                    found, free = (("start", why), *found), None if place is None else (place.x, place.y)
+        if not worker.is_cancelled:
             call_if_open(self, self._show_notes, found, free)
 
     def _show_notes(self, found: tuple[tuple[str, str], ...], free: Point | None) -> None:
@@ -282,29 +294,6 @@ class Preview(Vertical):
         line.tooltip = words or None
 
 
-def notes(
-    choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None
-) -> tuple[tuple[tuple[str, str], ...], Point | None]:
-    """What is wrong with the start, as the run would note it: a word and a sentence for each; and where it had better be, m."""
-    from ddenv.world.placement import note_inside, notes_on_start, stands_inside
-    from ddenv.world.scenario import Spawn
-
-    try:
-        robot = choice.robot
-    except UserError:
-        # Start then reports the file's error.
-        robot = None
-    if robot is None or spawn is None:
-        return tuple(note_inside(choice.world)), None
-    x, y, z, yaw = spawn
-    start = Spawn(x=x, y=y, z=z, yaw=yaw)
-    others = tuple(notes_on_start(choice.world, robot, start, (goal[0], goal[1]) if goal else None))
-    if (inside := stands_inside(choice.world, robot, start)) is None:
-        return others, None
-    why, place = inside
-    return (("start", why), *others), None if place is None else (place.x, place.y)
-
-
 def _places(where: Mapping[str, str], named: Collection[str], gap: str = "   ") -> Text:
     """The keys that pick a place, with where it is; the `named` ones with what it is."""
     text = Text(no_wrap=True, overflow="ellipsis")
@@ -320,12 +309,3 @@ def _metres(value: float) -> str:
 
 def _point(place: tuple[float, ...] | None) -> str:
     return f"({place[0]:.2f}, {place[1]:.2f}) m" if place else "not set"
-
-
-def _free_name(scenario_name: str) -> str:
-    from ddenv.runs.folder import free_run_path
-
-    try:
-        return free_run_path(scenario_name).stem
-    except OSError:
-        return "run"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -19,17 +18,16 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
-from ddenv.text import plain
+from ddenv.text import count, plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
-from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import OptionsForm
-from ddenv.workbench.setup.files import FileList, recent_files
+from ddenv.workbench.setup.files import FileList, OpenFile, SaveScenario, recent_files
 from ddenv.workbench.setup.preview import Preview
-from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file
+from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file, whole_cost
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.messages import ShowRun
@@ -37,7 +35,6 @@ from ddenv.workbench.widgets.panes import Panes
 from ddenv.workbench.widgets.question import once_trusted
 
 if TYPE_CHECKING:
-    from ddenv.workbench.shared.processes import Engine
     from ddenv.world.scenario import Scenario
 
 SMALLEST = (64, 18)
@@ -71,7 +68,7 @@ class SetupScreen(Screen[None]):
     BINDINGS: ClassVar = keys(
         "setup",
         ("start", "ctrl+s,f5", "start", "start", "start the reduction", "^s"),
-        ("baseline", "f6,ctrl+b", "baseline", "baseline", BASELINE, "f6"),
+        ("baseline", "f6,ctrl+b", "start(True)", "baseline", BASELINE, "f6"),
         ("save", "f7,ctrl+g", "save", "save", "save as a scenario file", "f7"),
         ("copy", "f8,ctrl+y", "copy", "copy", "copy the ddenv run command that does the same", "f8"),
         ("more", "f9", "more", "more", "show or hide the rarely used settings"),
@@ -109,11 +106,7 @@ class SetupScreen(Screen[None]):
         self._like, self._file = like, file
         self.form = OptionsForm(id="options")
         self.preview = Preview(self.form, self._reading, id="preview")
-        # Whether the choice is still being read, as is the first file when the screen opens.
-        self._awaited = True
-        self._past = Past()
         self._opened_now: Path | None = None
-        self._keep_places = False
         self._busy = False
         self._pane = "choose"
 
@@ -151,16 +144,17 @@ class SetupScreen(Screen[None]):
     def _list_files(self) -> None:
         from ddenv.world.load import SCENARIOS, bundled_names
 
-        bundled = [SCENARIOS / f"{name}.yaml" for name in bundled_names()]
-        call_if_open(self, self._offer, bundled, recent_files())
+        bundled, recent = [SCENARIOS / f"{name}.yaml" for name in bundled_names()], recent_files()
 
-    def _offer(self, bundled: list[Path], recent: list[Path]) -> None:
-        files = self.query_one(FileList)
-        files.offer(bundled, recent, self._like)
-        if self._file is not None:
-            self._opened(self._file)
-        elif not files.option_count:
-            self.preview.show_nothing("there are no bundled scenarios; ctrl+o opens a file")
+        def offer() -> None:
+            files = self.query_one(FileList)
+            files.offer(bundled, recent, self._like)
+            if self._file is not None:
+                self._opened(self._file)
+            elif not files.option_count:
+                self.preview.show_nothing("there are no bundled scenarios; ctrl+o opens a file")
+
+        call_if_open(self, offer)
 
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
@@ -174,9 +168,7 @@ class SetupScreen(Screen[None]):
         self.post_message(ShowRun(self.query_one(RunList).run_of(event.option_id).path))
 
     def action_open(self) -> None:
-        from ddenv.workbench.setup.files import OpenFile
-
-        self.app.push_screen(OpenFile(Path.cwd()), self._opened)
+        self.app.push_screen(OpenFile(), self._opened)
 
     def _opened(self, path: Path | None) -> None:
         if path is not None:
@@ -186,41 +178,17 @@ class SetupScreen(Screen[None]):
 
     @on(FileList.Looked)
     def _choose(self, event: FileList.Looked) -> None:
-        self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
-        self._past, self._awaited = Past(), True
         self.form.show_message("")
         self.preview.read(event.path, opened=event.path == self._opened_now)
         self._show_outcome()
 
     @on(Preview.Read)
     def _was_read(self, event: Preview.Read) -> None:
-        choice = event.choice
-        if choice is not self.preview.choice:
-            return
-        self._awaited = False
         # An error about a key pressed too early is out of date.
         self.form.show_message("")
-        self.form.suggest_name(event.free_name)
-        if choice is None:
-            self.form.set_texts({field.id: "" for field in form.PLACES})
-            self._show_outcome()
-            return
-        if event.again:
-            self.preview.show_places()
-            self.preview.ask_again()
-            self._show_outcome()
-            return
-        texts = self.form.texts
-        places = {field.id: texts[field.id] if self._keep_places else "" for field in form.PLACES}
-        self.form.show_settings(choice.settings, None if choice.scenario else places)
-        if self.preview.asks and choice.path == self._opened_now:
+        self._show_outcome()
+        if event.opened and self.preview.asks:
             self.action_pick("start")
-
-    @on(Preview.PastRead)
-    def _past_was_read(self, event: Preview.PastRead) -> None:
-        if event.choice is self.preview.choice:
-            self._past = event.past
-            self._show_outcome()
 
     def action_pick(self, what: str) -> None:
         if self.preview.choice is None:
@@ -239,44 +207,36 @@ class SetupScreen(Screen[None]):
             self.preview.show_places()
         self._show_outcome()
 
+    @on(Preview.PastRead)
     def _show_outcome(self) -> None:
         cost, words, typed = "", "", True
-        if self.preview.choice is not None or not self._awaited:
+        if self.preview.choice is not None or not self.preview.awaited:
             try:
-                scenario, command = self._scenario(), self._command()
+                choice, scenario = self._asked()
+                command = self._command(choice, scenario)
                 words, typed = shlex.join(command) or NO_COMMAND, bool(command)
-                cost = whole_cost(scenario, self._chosen().models, form.jobs(self.form.texts["jobs"]), self._past)
+                cost = whole_cost(scenario, choice.models, self.form.jobs, self.preview.past)
             except UserError as error:
                 cost = f"not ready: {error}"
-        self.form.show_cost(cost)
-        self.form.tell_command(words, typed)
+        self.form.show_outcome(cost, words, typed)
 
-    def _scenario(self) -> Scenario:
-        choice, (pair, algorithm) = self._chosen(), self.form.method
-        choice.check_remedies()
-        return form.asked_of(choice.settings, self.form.texts, pair, algorithm)
+    def _asked(self) -> tuple[Choice, Scenario]:
+        """The choice, and its scenario with the form's settings. Raises UserError while there is none."""
+        choice, (pair, algorithm) = self.preview.choice, self.form.method
+        if choice is None:
+            awaited = "the world is still being read: try again in a moment"
+            raise UserError(awaited if self.preview.awaited else "choose a scenario or a world that can be read")
+        # A guess is shown, but only run with if the user takes it.
+        if undecided := sum(not each.remedy for each in choice.missing):
+            raise UserError(f"{count(undecided, 'missing file')} without a remedy: press m")
+        return choice, form.asked_of(choice.settings, self.form.texts, pair, algorithm)
 
-    def _chosen(self) -> Choice:
-        """The choice. Raises UserError while there is none."""
-        if self.preview.choice is not None:
-            return self.preview.choice
-        if self._awaited:
-            raise UserError("the world is still being read: try again in a moment")
-        raise UserError("choose a scenario or a world that can be read")
-
-    def _command(self) -> list[str]:
-        """The words of the command that does the same, empty if there is none. Raises UserError."""
-        choice, jobs = self._chosen(), form.jobs(self.form.texts["jobs"])
-        if choice.run:
-            return []
-        own, bare, name = choice.settings, choice.scenario is None, self.form.own_name
-        return command_words(
-            choice.path, own, self._scenario(), bare=bare, jobs=jobs, reading=choice.options, name=name
-        )
+    def _command(self, choice: Choice, scenario: Scenario) -> list[str]:
+        return [] if choice.run else command_words(choice, scenario, self.form.jobs, self.form.own_name)
 
     def action_copy(self) -> None:
         try:
-            words = self._command()
+            words = self._command(*self._asked())
         except UserError as error:
             self._complain(error)
             return
@@ -288,32 +248,26 @@ class SetupScreen(Screen[None]):
 
     @on(Button.Pressed, "#start")
     @on(Input.Submitted)
-    def action_start(self) -> None:
-        self._begin(only_baseline=False)
+    def _start_pressed(self) -> None:
+        self.action_start()
 
-    def action_baseline(self) -> None:
-        self._begin(only_baseline=True)
-
-    def _begin(self, only_baseline: bool) -> None:
+    def action_start(self, only_baseline: bool = False) -> None:
         from ddenv.runs.trust import trust_own
 
         if self._busy:
             return
         texts = self.form.texts
         try:
-            choice, scenario = self._chosen(), self._scenario()
-            path = run_file(scenario.name, str(form.value(form.NAME, texts["name"])))
-            jobs, mode = form.jobs(texts["jobs"]), texts["accept"]
+            choice, scenario = self._asked()
+            path = run_file(scenario.name, str(form.value(form.NAME, texts[form.NAME.name])))
+            jobs, mode = self.form.jobs, texts["accept"]
         except UserError as error:
             self._complain(error)
             return
 
         def answered(trusts: bool) -> None:
             if trusts:
-                start = partial(
-                    create, choice, scenario, path, jobs=jobs, accept_mode=mode, only_baseline=only_baseline
-                )
-                self._create(path, start)
+                self._create(choice, scenario, path, jobs, mode, only_baseline)
             else:
                 self._complain(UserError("not started: it needs a program that you do not trust"))
 
@@ -325,9 +279,11 @@ class SetupScreen(Screen[None]):
         once_trusted(self.app, scenario, choice.path, answered)
 
     @work(thread=True, group="start", exclusive=True)
-    def _create(self, path: Path, start: Callable[[], Engine]) -> None:
+    def _create(
+        self, choice: Choice, scenario: Scenario, path: Path, jobs: int, mode: str, only_baseline: bool
+    ) -> None:
         try:
-            engine = start()
+            engine = create(choice, scenario, path, jobs, mode, only_baseline)
         except UserError as error:
             call_if_open(self, self._complain, error)
             return
@@ -335,24 +291,23 @@ class SetupScreen(Screen[None]):
 
     def _complain(self, error: UserError) -> None:
         self._busy = False
-        if isinstance(error, form.FieldError) and form.NAME.id not in error.wrong:
+        if isinstance(error, form.FieldError) and form.NAME.name not in error.wrong:
             self._show_pane("settings")
         self.form.complain(error)
 
     def action_save(self) -> None:
-        from ddenv.workbench.setup.save_scenario import SaveScenario
-
         try:
-            scenario = self._scenario()
+            _, scenario = self._asked()
         except UserError as error:
             self._complain(error)
             return
-        self.app.push_screen(SaveScenario(scenario), self._written)
 
-    def _written(self, path: Path | None) -> None:
-        if path is not None:
-            self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
-            self._opened(path)
+        def written(path: Path | None) -> None:
+            if path is not None:
+                self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
+                self._opened(path)
+
+        self.app.push_screen(SaveScenario(scenario), written)
 
     def _show_pane(self, pane: str) -> None:
         self._pane = pane

@@ -7,9 +7,9 @@ from textual.binding import Binding, BindingType
 HELP = ("help", "question_mark,f1", "app.help", "help", "show every key", "?")
 # Of every screen with a map.
 MAP_KEYS = (
-    ("closer", "plus,equals_sign", "app.zoom(1.25)", "closer", "map: closer", "+"),
-    ("farther", "minus", "app.zoom(0.8)", "farther", "map: farther away", "-"),
-    ("fit", "0", "app.fit", "fit", "map: show all that matters"),
+    ("closer", "plus,equals_sign", "app.map('zoom', 1.25)", "closer", "map: closer", "+"),
+    ("farther", "minus", "app.map('zoom', 0.8)", "farther", "map: farther away", "-"),
+    ("fit", "0", "app.map('fit')", "fit", "map: show all that matters"),
 )
 
 

@@ -30,27 +30,6 @@ class ShowSetup(Message):
 
 
 @dataclass
-class ShowLessons(Message):
-    """The list of lessons; the lesson in the file `opens` is opened above it."""
-
-    opens: Path | None = None
-
-
-@dataclass
-class ShowLesson(Message):
-    """A run step by step, as in a lesson."""
-
-    run: Path
-
-
-@dataclass
-class ShowRace(Message):
-    """The searches of two to four runs of one world side by side."""
-
-    runs: tuple[Path, ...]
-
-
-@dataclass
 class Attention(Message):
     """The user should look at `run`: `why`."""
 

@@ -86,11 +86,9 @@ class Observed(RunFile):
     def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         try:
             return self._db.execute(query, values).fetchall()
-        except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode & 0xFF in _BUSY:
-                raise Busy(f"{self.path}: another program is writing") from None
-            raise UserError(f"{self.path}: damaged run file: {error}") from None
         except (sqlite3.Error, OverflowError) as error:
+            if isinstance(error, sqlite3.OperationalError) and error.sqlite_errorcode & 0xFF in _BUSY:
+                raise Busy(f"{self.path}: another program is writing") from None
             raise UserError(f"{self.path}: damaged run file: {error}") from None
 
 

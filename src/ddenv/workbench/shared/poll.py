@@ -84,12 +84,12 @@ class Poll:
             snapshot = self._read()
         except Busy:
             return None
-        except Gone as error:
-            self._behind = True
-            snapshot = self._left(str(error))
         except UserError as error:
             self._behind = True
-            snapshot = replace(self._snapshot or Snapshot(), error=str(error))
+            snapshot = replace(self.snapshot, error=str(error))
+            if isinstance(error, Gone):
+                why = f"{error}; the screen shows what was read last"
+                snapshot = replace(snapshot, engine="absent", live=(), error=why, gone=True)
         if snapshot == self._snapshot:
             return None
         self._snapshot = snapshot
@@ -99,16 +99,17 @@ class Poll:
         """Reads as much as makes sense of a damaged file, with what is wrong. Raises Busy."""
         engine, last = self._engine(), self._snapshot
         if last is not None and not self._behind:
-            spent = self._spent(last.state, engine)
-            if (engine, spent) == (last.engine, last.spent):
-                return last
-            return replace(last, engine=engine, spent=spent)
+            # The time goes on.
+            spent = self._spent(engine)
+            return last if (engine, spent) == (last.engine, last.spent) else replace(last, engine=engine, spent=spent)
         error, more = self._follow()
-        state = self._state
-        spent = self._spent(state, engine)
+        state, spent = self._state, self._spent(engine)
         try:
             live, due = self._poses(state) if engine == "alive" else ((), True)
-            evidence, original = self._ways(state)
+            # The robot's paths on the last similar run and in f, each read once.
+            ways, known = (state.evidence_test, None if state.f_test is None else state.f_test.id), self._motions
+            self._motions = {test: known[test] if test in known else self.file.motion(test) for test in ways if test}
+            evidence, original = (self._motions.get(test or 0) for test in ways)
             snapshot = Snapshot(state, live, engine, evidence, spent, error, original)
         except Busy:
             raise
@@ -117,10 +118,6 @@ class Poll:
         self._behind = more or not due
         self._catching_up = more
         return replace(snapshot, behind=more, version=__version__)
-
-    def _left(self, why: str) -> Snapshot:
-        error = f"{why}; the screen shows what was read last"
-        return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 
     def _follow(self) -> tuple[str, bool]:
         """Reads new events up to the first invalid one; what is wrong with that, and whether there are more. Raises Busy."""
@@ -154,30 +151,18 @@ class Poll:
         return "starting" if self._starting() else "absent"
 
     def _poses(self, state: RunState) -> tuple[tuple[Live, ...], bool]:
-        """Where the robots are, and whether that was read just now."""
+        """Where the robots are, and whether that was read just now. Valid rows name a test and have a whole, finite pose."""
         moment = time.monotonic()
         if self._snapshot is not None and moment - self._posed < LIVE_PERIOD:
             running = {test.id for test in state.running_tests}
             return tuple(row for row in self._snapshot.live if row.test in running), False
         self._posed = moment
-        return self._live(state), True
-
-    def _live(self, state: RunState) -> tuple[Live, ...]:
-        """Only valid rows: they name a test and have a whole, finite pose."""
         try:
             rows = self.file.live()
             known = (row for row in rows if 0 < row.test <= len(state.tests) and len(row.pose) == COLUMNS - 1)
-            return tuple(row for row in known if all(map(math.isfinite, (row.time, *row.pose))))
+            return tuple(row for row in known if all(map(math.isfinite, (row.time, *row.pose)))), True
         except (TypeError, ValueError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
-    def _ways(self, state: RunState) -> tuple[array[float] | None, array[float] | None]:
-        """The robot's paths on the last similar run and in f, each read once."""
-        tests = state.evidence_test, None if state.f_test is None else state.f_test.id
-        known = self._motions
-        self._motions = {test: known[test] if test in known else self.file.motion(test) for test in tests if test}
-        evidence, original = (self._motions.get(test or 0) for test in tests)
-        return evidence, original
-
-    def _spent(self, state: RunState, engine: EngineIs) -> int:
-        return int(spent(state, now() if engine == "alive" else state.updated_at))
+    def _spent(self, engine: EngineIs) -> int:
+        return int(spent(self._state, now() if engine == "alive" else self._state.updated_at))

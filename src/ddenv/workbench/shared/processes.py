@@ -23,9 +23,9 @@ GOOD_ENDS = (0, 1)
 class Engine:
     """The engine of one run, if this workbench started it. It goes on when the screen closes."""
 
-    def __init__(self, run: Path, process: subprocess.Popen[bytes] | None = None) -> None:
+    def __init__(self, run: Path) -> None:
         self.run = run
-        self._process = process
+        self._process: subprocess.Popen[bytes] | None = None
         self._worked = False
         self._last_words = ""
 
@@ -117,18 +117,15 @@ class Scene:
         # The screen waits no longer.
         with suppress(subprocess.TimeoutExpired):
             process.wait(A_MOMENT)
-        Thread(target=_end, args=(process,), name="scene").start()
 
+        def end() -> None:
+            with process:
+                try:
+                    process.wait(timeout=2.0)
+                except subprocess.TimeoutExpired:
+                    process.kill()
 
-def _end(process: subprocess.Popen[str]) -> None:
-    try:
-        process.wait(timeout=2.0)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            pipe.close()
+        Thread(target=end, name="scene").start()
 
 
 def last_line(log: Path) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.page.html import of_scripts, policy
+from ddenv.runs.folder import find_run
 from ddenv.runs.programs import how_to_install
 
 HOST = "127.0.0.1"
@@ -38,11 +39,16 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
         raise UserError(f"serving needs another package: {how_to_install('serve')}") from None
     words = [sys.executable, "-m", "ddenv"]
     if run is not None:
-        from ddenv.runs.folder import find_run
+        from ddenv.workbench.shared.observed import Observed
 
-        words += ["open", str(_existing(find_run(run)))]
-    _check_free(port)
-
+        Observed(path := find_run(run)).close()
+        words += ["open", str(path.resolve())]
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError as error:
+            raise UserError(f"--port {port}: {error.strerror}; give another --port") from None
     token = secrets.token_urlsafe(TOKEN_BYTES)
 
     class Guarded(Server):
@@ -56,23 +62,20 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
             return app
 
         async def on_startup(self, app: Any) -> None:
-            print("\n".join(address_lines(port, token, font_size)), flush=True)
+            size, user = "" if font_size == FONT_SIZE else f"?fontsize={font_size}", getpass.getuser()
+            lines = (
+                f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
+                f"Anyone with that address acts as {user} on this machine: the workbench can read, write and start "
+                "programs in your name.",
+                "Other machines cannot reach it. From yours, type there first:",
+                f"  ssh -L {port}:{HOST}:{port} {user}@{socket.gethostname()}",
+            )
+            print("\n".join(lines), flush=True)
 
         def initialize_logging(self) -> None:
             """Requests are not logged."""
 
     Guarded(shlex.join(words), host=HOST, port=port, title="ddenv", templates_path=PAGE).serve()
-
-
-def address_lines(port: int, token: str, font_size: int = FONT_SIZE) -> list[str]:
-    size = "" if font_size == FONT_SIZE else f"?fontsize={font_size}"
-    return [
-        f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
-        f"Anyone with that address acts as {getpass.getuser()} on this machine: the workbench can read, write and start "
-        "programs in your name.",
-        "Other machines cannot reach it. From yours, type there first:",
-        f"  ssh -L {port}:{HOST}:{port} {getpass.getuser()}@{socket.gethostname()}",
-    ]
 
 
 def guard(port: int, token: str) -> Any:
@@ -97,39 +100,18 @@ def guard(port: int, token: str) -> Any:
             # Other pages must not show it in a frame to catch clicks.
             response.headers["X-Frame-Options"] = "DENY"
             response.headers["Referrer-Policy"] = "no-referrer"
-            response.headers["Content-Security-Policy"] = _policy(response, sources)
+            text = response.text if response.content_type == "text/html" and hasattr(response, "text") else ""
+            # What a page may load and run: the terminal of textual-serve, and the connection to the workbench.
+            rules = {
+                "script-src": f"'self' {of_scripts(text or '')}".strip(),
+                # The terminal writes the style of each cell.
+                "style-src": "'self' 'unsafe-inline'",
+                "font-src": "'self'",
+                "img-src": "'self' data:",
+                "connect-src": f"'self' {sources}",
+                "frame-ancestors": "'none'",
+            }
+            response.headers["Content-Security-Policy"] = policy(rules)
         return response
 
     return only_own
-
-
-def _policy(response: Any, sources: str) -> str:
-    """What a page may load and run: the terminal of textual-serve, and the connection to the workbench."""
-    text = response.text if response.content_type == "text/html" and hasattr(response, "text") else ""
-    return policy(
-        {
-            "script-src": f"'self' {of_scripts(text or '')}".strip(),
-            # The terminal writes the style of each cell.
-            "style-src": "'self' 'unsafe-inline'",
-            "font-src": "'self'",
-            "img-src": "'self' data:",
-            "connect-src": f"'self' {sources}",
-            "frame-ancestors": "'none'",
-        }
-    )
-
-
-def _existing(run: Path) -> Path:
-    from ddenv.workbench.shared.observed import Observed
-
-    Observed(run).close()
-    return run.resolve()
-
-
-def _check_free(port: int) -> None:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except OSError as error:
-            raise UserError(f"--port {port}: {error.strerror}; give another --port") from None

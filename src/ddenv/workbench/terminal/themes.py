@@ -73,23 +73,18 @@ def fitting(color_system: str | None) -> str:
 
 def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
     """A theme's variables, with Rich's names for the terminal's own colours: not ansi_red 50% but red."""
-    return {key: _for_rich(value) for key, value in variables.items()}
-
-
-def _for_rich(value: str) -> str:
-    if value == "transparent":
-        return "default"
-    return value.split()[0].removeprefix("ansi_") if value.startswith("ansi_") else value
+    ansi = {
+        key: value.split()[0].removeprefix("ansi_") for key, value in variables.items() if value.startswith("ansi_")
+    }
+    return {**variables, **ansi, **{key: "default" for key, value in variables.items() if value == "transparent"}}
 
 
 def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style:
     """The theme's colour `name` as the colour of text; without colour if the theme leaves it to the terminal."""
     try:
-        return Style(color=_color(variables[name]), bold=bold or None)
+        value = variables[name]
+        # In Textual `blue` is the web's colour, not the terminal's.
+        color = RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color
     except (KeyError, ColorParseError):
-        return Style(bold=bold or None)
-
-
-def _color(value: str) -> RichColor:
-    # In Textual `blue` is the web's colour, not the terminal's.
-    return RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color
+        color = None
+    return Style(color=color, bold=bold or None)

@@ -42,18 +42,18 @@ class Written:
 
     def sequence(self, update: ChopsUpdate | LayoutUpdate, console: Console) -> str:
         """The codes to write, which then count as written."""
-        strips = _of_layout(update) if isinstance(update, LayoutUpdate) else _of_chops(update)
-        return "".join(part for x, y, strip in strips for part in self._changes(x, y, strip, console))
-
-    def _changes(self, x: int, y: int, strip: Strip, console: Console) -> Iterator[str]:
-        width, row = strip.cell_length, self._rows.setdefault(y, [])
-        row += [None] * (x + width - len(row))
-        cells: list[Cell] = [(char, style) for text, style, _ in strip for char in text]
-        # Terminals do not agree on which characters are wide: a piece with these is always written as a whole.
-        plain = len(cells) == width and strip.text.isprintable() and all(map(_is_single, set(strip.text)))
-        before, row[x : x + width] = row[x : x + width], cells if plain else [None] * width
-        for first, last in _differing(before, cells) if plain else [(0, width)]:
-            yield f"\x1b[{y + 1};{x + first + 1}H{strip.crop(first, last).render(console)}"
+        found = []
+        for x, y, strip in _pieces(update):
+            width, row = strip.cell_length, self._rows.setdefault(y, [])
+            row += [None] * (x + width - len(row))
+            cells: list[Cell] = [(char, style) for text, style, _ in strip for char in text]
+            # Terminals do not agree on which characters are wide: a piece with these is always written as a whole.
+            single = all(char.isascii() or cell_len(char) == 1 for char in set(strip.text))
+            plain = len(cells) == width and strip.text.isprintable() and single
+            before, row[x : x + width] = row[x : x + width], cells if plain else [None] * width
+            for first, last in _differing(before, cells) if plain else [(0, width)]:
+                found.append(f"\x1b[{y + 1};{x + first + 1}H{strip.crop(first, last).render(console)}")
+        return "".join(found)
 
 
 class _Fewer(CompositorUpdate):
@@ -73,25 +73,19 @@ class _Fewer(CompositorUpdate):
         yield self._update
 
 
-def _is_single(char: str) -> bool:
-    return char.isascii() or cell_len(char) == 1
-
-
-def _of_layout(update: LayoutUpdate) -> Iterator[tuple[int, int, Strip]]:
-    """Column, row and cells of all pieces."""
-    for y, line in enumerate(update.strips, update.region.y):
-        x = update.region.x
-        for strip in line:
-            yield x, y, strip
-            x += strip.cell_length
-
-
-def _of_chops(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
-    """Column, row and cells of the pieces that lie in the spans to update."""
+def _pieces(update: ChopsUpdate | LayoutUpdate) -> Iterator[tuple[int, int, Strip]]:
+    """Column, row and cells of all pieces, or of those that lie in the spans to update."""
+    if isinstance(update, LayoutUpdate):
+        for y, line in enumerate(update.strips, update.region.y):
+            x = update.region.x
+            for strip in line:
+                yield x, y, strip
+                x += strip.cell_length
+        return
     for y, left, right in update.spans:
-        for end, (x, strip) in zip(update.chop_ends[y], update.chops[y].items(), strict=False):
-            if strip is not None and x <= right and end > left:
-                yield x, y, strip if end <= right else strip.crop(0, right - x)
+        for end, (x, piece) in zip(update.chop_ends[y], update.chops[y].items(), strict=False):
+            if piece is not None and x <= right and end > left:
+                yield x, y, piece if end <= right else piece.crop(0, right - x)
 
 
 def _differing(before: list[Cell], now: list[Cell]) -> list[tuple[int, int]]:
