@@ -59,8 +59,8 @@ def test_a_small_memory_changes_no_bit(world_of, add, husky, scenario_of, monkey
     large = Template(world, husky, scenario_of(**SECTIONS))
     expected = [bits(run(large, *part)) for part in parts]
     rehearsed = []
-    simulate = Rehearsals._simulate
-    monkeypatch.setattr(Rehearsals, "_simulate", lambda self, pile: rehearsed.append(pile) or simulate(self, pile))
+    simulate = Rehearsals._rows
+    monkeypatch.setattr(Rehearsals, "_rows", lambda self, *pile: rehearsed.append(pile) or simulate(self, *pile))
     monkeypatch.setattr(rehearsal, "MEMORY", memory)
     small = Template(world, husky, scenario_of(**SECTIONS))
     assert [bits(run(small, *part)) for part in parts] == expected

@@ -73,13 +73,13 @@ def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_
 @pytest.mark.rates
 def test_what_a_pile_does_is_worked_out_once_for_all_plants(cubes, husky, scenario, built, monkeypatch):
     rehearsed = []
-    simulate = Rehearsals._simulate
+    simulate = Rehearsals._rows
 
-    def tell(self: Rehearsals, pile: tuple) -> object:
+    def tell(self: Rehearsals, pile: tuple, sleep: object) -> object:
         rehearsed.append([body.name for body in pile])
-        return simulate(self, pile)
+        return simulate(self, pile, sleep)
 
-    monkeypatch.setattr(Rehearsals, "_simulate", tell)
+    monkeypatch.setattr(Rehearsals, "_rows", tell)
     smaller = Variants(cubes, husky, scenario)
     results = [smaller.run(keep, 1) for keep in (ALL - {"d"}, ALL - {"a"}, ALL, ALL - {"c"})]
     assert len(built) == 3

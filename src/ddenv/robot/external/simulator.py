@@ -87,12 +87,11 @@ class ExternalSimulator:
         values = {"world": str(world), "scenario": str(whole), "seed": str(seed), "log": str(file or "/dev/stdout")}
         words, environment = filled(self._words, values), self._environment(values)
 
-        def take(piece: bytes) -> None:
-            if file is None:
-                log.add(piece)
-
         def too_much() -> str:
-            size = log.size if file is None else _size(file)
+            size = log.size
+            if file is not None:
+                with contextlib.suppress(OSError):
+                    size = file.stat().st_size
             return TOO_LARGE if size > MOST_BYTES else ""
 
         try:
@@ -100,10 +99,12 @@ class ExternalSimulator:
                 scenario = scenario_in(self._scenario, self._whole, world)
                 write_files(folder, {world: without(self._world, self._removable - keep), whole: scenario})
                 command.say(BEGIN)
-                ended = watch(command, self.limit, take, too_much)
+                ended = watch(command, self.limit, log.add if file is None else lambda _: None, too_much)
                 # Reading a log that is too large would take longer than writing it did.
-                if file is not None and ended.reason != TOO_LARGE:
-                    _read(file, log)
+                if file is not None and ended.reason != TOO_LARGE and file.is_file():
+                    with contextlib.suppress(OSError), file.open("rb") as content:
+                        while log.size <= MOST_BYTES and (piece := content.read(1_000_000)):
+                            log.add(piece)
         except OSError as error:
             ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")
         return ended, log
@@ -183,23 +184,6 @@ def write_files(folder: Path, files: dict[Path, bytes]) -> None:
 def _no_room(error: OSError) -> UserError:
     why = f"{error.strerror}: {error.filename}" if error.filename else error.strerror
     return UserError(f"no temporary file can be written ({why}); set TMPDIR to a folder with room")
-
-
-def _read(file: Path, log: PoseLog) -> None:
-    """Reads the file that the command had to write; a missing file, or one that is no plain file, has no rows."""
-    with contextlib.suppress(OSError):
-        if not file.is_file():
-            return
-        with file.open("rb") as content:
-            while log.size <= MOST_BYTES and (piece := content.read(1_000_000)):
-                log.add(piece)
-
-
-def _size(file: Path) -> int:
-    try:
-        return file.stat().st_size
-    except OSError:
-        return 0
 
 
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -284,26 +268,15 @@ class PoseLog:
         if not text or text.startswith("#"):
             return
         fields = [field.strip() for field in text.split(",")]
-        header = not self._began and not any(map(_is_number, fields))
-        self._began = True
-        if header:
-            self._header(text, fields)
-        else:
-            self._row(text, fields)
-
-    def _header(self, text: str, fields: list[str]) -> None:
-        """Checks a header: it may name eight columns as it likes, but must not name the quaternion's in another order."""
-        turned = [field.lower() for field in fields[4:]]
-        known = list(COLUMNS[4:])
-        if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
-            raise self._wrong(text)
-
-    def _row(self, text: str, fields: list[str]) -> None:
-        try:
-            numbers = [float(field) for field in fields]
-        except ValueError:
-            raise self._wrong(text) from None
-        if len(numbers) != len(COLUMNS) or not all(map(math.isfinite, numbers)):
+        numbers = [number for field in fields if (number := _number(field)) is not None]
+        began, self._began = self._began, True
+        if not began and not numbers:
+            # A header may name eight columns as it likes, but must not name the quaternion's in another order.
+            turned, known = [field.lower() for field in fields[4:]], list(COLUMNS[4:])
+            if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
+                raise self._wrong(text)
+            return
+        if not len(fields) == len(numbers) == len(COLUMNS) or not all(map(math.isfinite, numbers)):
             raise self._wrong(text)
         kept = self.take(numbers, f"the pose log, line {self._number}")
         if kept is not None and self._progress is not None:
@@ -333,9 +306,8 @@ class PoseLog:
         return BadLog(f"the pose log, line {self._number}: {EXPECTED}, found '{shown}'")
 
 
-def _is_number(field: str) -> bool:
+def _number(field: str) -> float | None:
     try:
-        float(field)
+        return float(field)
     except ValueError:
-        return False
-    return True
+        return None

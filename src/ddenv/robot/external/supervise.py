@@ -61,22 +61,18 @@ def run(words: list[str], worker: socket.socket) -> str:
     while process.poll() is None:
         ready, _, _ = select.select(sources, [], [])
         if worker in ready:
-            end(process)
+            # Some commands have something to clean up, such as a container.
+            signal_group(process.pid, signal.SIGTERM)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(GRACE)
+            signal_group(process.pid, signal.SIGKILL)
+            process.wait()
         else:
             os.read(woken, 64)
     signal_group(process.pid, signal.SIGKILL)
     kill_children()
     code = process.returncode
     return f"exit {code}" if code >= 0 else f"signal {-code}"
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    """Asks the command to end before it kills it: some have something to clean up, such as a container."""
-    signal_group(process.pid, signal.SIGTERM)
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(GRACE)
-    signal_group(process.pid, signal.SIGKILL)
-    process.wait()
 
 
 def kill_children() -> None:

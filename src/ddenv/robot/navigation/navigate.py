@@ -8,7 +8,7 @@ import numpy as np
 
 from ddenv.robot.navigation.costmap import Costmap
 from ddenv.robot.navigation.footprint import Footprint
-from ddenv.robot.navigation.pursuit import BACK_SPEED, Follower, may_back_up, may_turn
+from ddenv.robot.navigation.pursuit import BACK_SPEED, BACK_UP, TURN_LEFT, Follower, room
 from ddenv.robot.navigation.route import Path, Planner
 from ddenv.robot.protocol import STOP, Estimate, Imu, Reading, Setup, Twist
 from ddenv.world.pose import wrap
@@ -46,16 +46,19 @@ class Recovery:
 
     def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
         """The command, from the time of `begin` on; None once the behaviour is over."""
+        body = self._body
         match (self.made - 1) % 4:
             case 1:
                 gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
                 going = gone < BACK and time < self._since + LONGEST_BACK
-                return Twist(-self._speed, 0.0) if going and may_back_up(self._body, map_.spots, estimate) else None
+                may = going and room(body, map_.spots, estimate, BACK_UP) is not None
+                return Twist(-self._speed, 0.0) if may else None
             case 2:
                 self._turned += wrap(estimate.heading - self._heading)
                 self._heading = estimate.heading
                 turning = self._turned < math.tau and time < self._since + LONGEST_TURN
-                return Twist(0.0, self._rate) if turning and may_turn(self._body, map_.spots, estimate, 1.0) else None
+                may = turning and room(body, map_.spots, estimate, TURN_LEFT) is not None
+                return Twist(0.0, self._rate) if may else None
             case kind:
                 if time == self._since:
                     # What is near is kept where the lidar does not look.
@@ -102,17 +105,13 @@ ON_THE_SPOT = 4
 
 
 class Progress:
-    """Watches whether the robot still makes progress: since when it has neither moved nor turned."""
+    """Watches whether the robot still makes progress: since when, from its first look on, it has neither moved nor turned."""
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
         self._from: Estimate | None = None
         self._heading = 0.0
         self._moved = self._turned = 0.0
-
-    def begin(self) -> None:
-        """Forgets the past: from now on the robot has to make progress again."""
-        self._from = None
 
     def is_stalled(self, time: float, estimate: Estimate) -> bool:
         """Whether the robot at `estimate` has made no progress for too long at `time` (s)."""
@@ -282,5 +281,5 @@ class Navigator:
         self._found = reading.time
         self._planned = -math.inf
         self._recovered = (reading.estimate.x, reading.estimate.y)
-        self._progress.begin()
+        self._progress = Progress(self._setup.settings.planner.patience)
         return STOP

@@ -38,6 +38,12 @@ CALM_FOR = 0.1
 PLACES = np.linspace(0.0, 1.0, 7)
 # The minimum curvature of an arc, rad: too little to matter.
 BENT = 1e-6
+# Small turns on the spot, and a little way back, as poses for `room`.
+TURN_LEFT, TURN_RIGHT = (
+    np.stack([seen_from(Estimate(0.0, 0.0, side * angle))[:2] for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+    for side in (1.0, -1.0)
+)
+BACK_UP = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)
 
 
 class Follower:
@@ -79,11 +85,12 @@ class Follower:
         for part in PARTS:
             if part != PARTS[0]:
                 distance, bearing = self._aim(path, estimate, part)
-            room = self._room_on_arc(distance, bearing, estimate, points)
-            if room is not None:
-                self._room = room
-                self._left = self._calm if part == PARTS[0] and room >= CALM else 0
-                return self._drive(path, distance, bearing, room)
+            arc = None if abs(bearing) > ASIDE else _arc(distance, bearing)
+            free = None if arc is None else room(self._body, points, estimate, arc)
+            if free is not None:
+                self._room = free
+                self._left = self._calm if part == PARTS[0] and free >= CALM else 0
+                return self._drive(path, distance, bearing, free)
         return self._turn(bearing, estimate, points)
 
     def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
@@ -92,14 +99,6 @@ class Follower:
         x, y = path.ahead(part * share * self._look_ahead)
         dx, dy = x - estimate.x, y - estimate.y
         return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
-
-    def _room_on_arc(self, distance: float, bearing: float, estimate: Estimate, points: Floats) -> float | None:
-        """The distance (m) that the robot keeps from all `points` on its arc to the aim; None if it touches one."""
-        if abs(bearing) > ASIDE:
-            return None
-        if not points.shape[1]:
-            return ROOM
-        return room(self._body, points, estimate, _arc(distance, bearing))
 
     def _drive(self, path: Path, distance: float, bearing: float, room: float) -> Twist:
         bend = 2 * math.sin(bearing) / max(distance, 1e-6)
@@ -120,12 +119,14 @@ class Follower:
             self.stuck = True
             return STOP
         rate = min(max(self._gain * abs(bearing), LEAST_TURN), self._setup.turn_rate)
-        sides = (1.0, -1.0) if bearing > 0 else (-1.0, 1.0)
+        sides = [(1.0, TURN_LEFT), (-1.0, TURN_RIGHT)]
+        if bearing <= 0:
+            sides.reverse()
         # For a small bearing the robot does not turn the long way round.
-        for side in sides if abs(bearing) > math.pi / 2 else sides[:1]:
-            if may_turn(self._body, points, estimate, side):
+        for side, places in sides if abs(bearing) > math.pi / 2 else sides[:1]:
+            if room(self._body, points, estimate, places) is not None:
                 return Twist(0.0, side * rate)
-        if abs(bearing) > math.pi / 2 and may_back_up(self._body, points, estimate):
+        if abs(bearing) > math.pi / 2 and room(self._body, points, estimate, BACK_UP) is not None:
             return Twist(-min(BACK_SPEED, self._setup.speed), 0.0)
         self.stuck = True
         return STOP
@@ -137,6 +138,8 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     `places` are relative to the robot at `estimate`; the first one is where it is now. A point within the margin may come a little
     nearer, so that the robot can turn away from it, but must not be touched, or touched harder.
     """
+    if not points.shape[1]:
+        return ROOM
     apart = body.apart(points, places @ seen_from(estimate))
     least = float(apart.min())
     if least >= 0:
@@ -144,20 +147,6 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     now, nearest = apart[0], apart[1:].min(axis=0)
     may = np.minimum(now, np.maximum(np.minimum(now, 0.0) - GIVE, -body.margin))
     return None if (nearest < may).any() else 0.0
-
-
-def may_turn(body: Footprint, points: Floats, estimate: Estimate, side: float) -> bool:
-    """Whether the robot can turn on the spot a little without touching `points` (3, N); `side` is 1 for left, -1 for right."""
-    return not points.shape[1] or room(body, points, estimate, LEFT if side > 0 else RIGHT) is not None
-
-
-def may_back_up(body: Footprint, points: Floats, estimate: Estimate) -> bool:
-    """Whether the robot can back up a little without touching `points` (3, N)."""
-    return not points.shape[1] or room(body, points, estimate, BACK) is not None
-
-
-def _turned(angle: float) -> Floats:
-    return seen_from(Estimate(0.0, 0.0, angle))[:2]
 
 
 def _arc(distance: float, bearing: float) -> Floats:
@@ -173,9 +162,3 @@ def _arc(distance: float, bearing: float) -> Floats:
     along[:, 2] = -radius * sines
     across[:, 2] = radius - radius * cosines
     return places
-
-
-# Small turns on the spot, and a little way back.
-LEFT = np.stack([_turned(angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
-RIGHT = np.stack([_turned(-angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
-BACK = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

@@ -40,7 +40,12 @@ class Path:
         self.final = final
         self.back, self.on = back, on
         self.off = 0.0
-        self._legs = [_leg(*pair) for pair in pairwise(corners)]
+        self._legs = []
+        for (x, y), end in pairwise(corners):
+            dx, dy = end[0] - x, end[1] - y
+            length = math.hypot(dx, dy)
+            cosine, sine = (dx / length, dy / length) if length else (1.0, 0.0)
+            self._legs.append(Leg(x, y, cosine, sine, length))
         # The length of the path from the start of each leg.
         self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
         self._number = 0
@@ -79,14 +84,6 @@ class Path:
     def rest(self) -> Floats:
         """The corners (K, 2) m of what is left of the path, beginning with the robot's projection onto it."""
         return np.array([self.ahead(0.0), *self.corners[self._number + 1 :]])
-
-
-def _leg(start: Place, end: Place) -> Leg:
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    length = math.hypot(dx, dy)
-    if not length:
-        return Leg(*start, 1.0, 0.0, 0.0)
-    return Leg(*start, dx / length, dy / length, length)
 
 
 # Steps from a cell, counterclockwise from the x axis; step k runs along axis k % 4.
@@ -189,28 +186,7 @@ class Planner:
         free, near = legs_beside(points, ends[:1], ends[1:], 0.0, self._body.ahead, self._side)
         if free[0] and near[0] >= self._inflation:
             return straight
-        return self._search(points, (x, y))
-
-    def room(self, path: Path, points: Floats) -> float | None:
-        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if one blocks it."""
-        rest = path.rest()
-        inflation: float = self._inflation
-        if not len(points) or len(rest) < 2:
-            return inflation
-        back = np.full(len(rest) - 1, path.back)
-        # What is beside the robot now does not block its path.
-        back[0] = -min(self._body.ahead, path.left)
-        free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
-        return min(float(near.min()), inflation) if free.all() else None
-
-    def is_best(self, path: Path, points: Floats) -> bool:
-        """Whether no path can be much better than what is left of `path`: it is free, with room, and nearly straight."""
-        room = self.room(path, points)
-        if room is None or room < self._inflation:
-            return False
-        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
-
-    def _search(self, points: Floats, start: Place) -> Path | None:
+        start = (x, y)
         corner = (np.rint(np.array(start) / self._step) - self._grid.count // 2) * self._step
         factors, near = self._costs(points - corner)
         factors[:, self._close] = np.minimum(factors[:, self._close], HEAVY)
@@ -234,6 +210,25 @@ class Planner:
         on_map = bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
         final = left <= self._tolerance and on_map
         return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
+
+    def room(self, path: Path, points: Floats) -> float | None:
+        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if one blocks it."""
+        rest = path.rest()
+        inflation: float = self._inflation
+        if not len(points) or len(rest) < 2:
+            return inflation
+        back = np.full(len(rest) - 1, path.back)
+        # What is beside the robot now does not block its path.
+        back[0] = -min(self._body.ahead, path.left)
+        free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
+        return min(float(near.min()), inflation) if free.all() else None
+
+    def is_best(self, path: Path, points: Floats) -> bool:
+        """Whether no path can be much better than what is left of `path`: it is free, with room, and nearly straight."""
+        room = self.room(path, points)
+        if room is None or room < self._inflation:
+            return False
+        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
 
     def _target(self, lengths: Floats, corner: Floats, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""

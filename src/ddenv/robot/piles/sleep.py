@@ -186,7 +186,7 @@ class Sleep:
         before, now = self._motion.of(links), self._links.observe(self._plant, self._context, links)
         self._motion.put(links, now)
         if seconds:
-            self._pace[links] = self._links.pace(links, before, now, seconds)
+            self._pace[links] = self._links.ways(links, before, now) / seconds
 
     def _decide(self, seconds: float) -> None:
         """Wakes models and lays others to sleep, `seconds` after the last time."""
@@ -255,8 +255,7 @@ class Sleep:
         if not wanted.any():
             return np.zeros_like(self._awake)
         tight = tight_gaps(self._links, self._motion, self._links, self._motion, wanted)
-        struck: Booleans = np.asarray((tight < reach).any(axis=1))
-        return struck
+        return np.asarray((tight < reach).any(axis=1))
 
     def _wake(self, models: Booleans) -> None:
         """Lets the simulator move `models` (M,), starting from where they are now."""
@@ -352,8 +351,7 @@ class Loads:
         before, now = self._at_rest @ self._up, self._mean @ self._up
         lost = self._known & (before > CARRIES * self._weights[:, None]) & (now < LOST * before)
         self._change = np.linalg.norm(change, axis=1)
-        woken: Booleans = (self._change > self._bears) | lost.any(axis=1)
-        return woken
+        return (self._change > self._bears) | lost.any(axis=1)
 
     def woke(self, models: Booleans, pressed: Booleans) -> None:
         """Takes in that `models` (M,) woke, those of them that are `pressed` (M,) by a change of their load."""

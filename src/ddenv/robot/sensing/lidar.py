@@ -78,7 +78,11 @@ class Lidar:
         turn = Turn(self._turns, now, place, self._shapes.take(rows), self._owners[rows])
         self._turns += 1
         if self._unseen[turn.models].any():
-            self._notice(turn, now)
+            met = np.isfinite(self._measured(turn)[turn.beams]) & self._unseen[turn.owners]
+            # In the order of the beams, and for one beam in that of the models.
+            for _, owner in sorted(zip(turn.beams[met].tolist(), turn.owners[met].tolist(), strict=True)):
+                self._unseen[owner] = False
+                self.first_seen.setdefault(self._names[owner], now)
         return LazyScan(now, self._fan.angles, partial(self._ranges, turn), self._mount.position)
 
     def _ranges(self, turn: Turn, limits: Floats | None = None) -> Floats:
@@ -90,8 +94,7 @@ class Lidar:
         # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
         near: Booleans = turn.measured <= limits
         self._note(turn, turn.owners[near[turn.beams]])
-        limited: Floats = np.where(near, ranges, np.inf)
-        return limited
+        return np.where(near, ranges, np.inf)
 
     def _note(self, turn: Turn, read: Integers) -> None:
         self._read[read] = np.minimum(self._read[read], turn.time)
@@ -102,17 +105,15 @@ class Lidar:
             origin, axes = np.array(turn.place.position), turn.place.rotation().T
             distances, turn.beams, shapes = cast(self._fan, turn.shapes, origin, axes)
             turn.owners = turn.models[shapes]
-            turn.measured = self._noise(turn.number) + distances
+            # The errors of the ranges are the same whatever the beams hit, and whichever scans are computed.
+            bits: Any = self._random.bit_generator
+            bits.state = self._state
+            bits.advance(turn.number * DRAWS)
+            noise = self._settings.noise * self._random.standard_normal(len(self._fan.angles))
+            turn.measured = noise + distances
             beyond = (turn.measured < self._settings.nearest) | (turn.measured > self._settings.range)
             turn.ranges = np.where(beyond, np.inf, turn.measured)
         return turn.ranges
-
-    def _noise(self, number: int) -> Floats:
-        """The errors of the ranges of a scan, (B,) m: the same whatever its beams hit, and whichever scans are computed."""
-        bits: Any = self._random.bit_generator
-        bits.state = self._state
-        bits.advance(number * DRAWS)
-        return self._settings.noise * self._random.standard_normal(len(self._fan.angles))
 
     def _move(self, places: Floats, turns: Floats) -> None:
         """Moves the shapes to where their links are."""
@@ -125,15 +126,6 @@ class Lidar:
         a, b, c = self._frames
         frames = first[:, None] * a + second[:, None] * b + third[:, None] * c
         self._shapes.frames[:, :, self._movers] = frames
-
-    def _notice(self, turn: Turn, now: float) -> None:
-        """Notes the models on which a beam ended for the first time, with a measured range."""
-        met = np.isfinite(self._measured(turn)[turn.beams]) & self._unseen[turn.owners]
-        # In the order of the beams, and for one beam in that of the models.
-        for _, owner in sorted(zip(turn.beams[met].tolist(), turn.owners[met].tolist(), strict=True)):
-            if self._unseen[owner]:
-                self._unseen[owner] = False
-                self.first_seen[self._names[owner]] = now
 
 
 @dataclass(slots=True, eq=False)
@@ -196,5 +188,4 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
     # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
     extents = np.sqrt(np.maximum((frames * frames).sum(axis=0) - up * up, 0.0))
     met: Booleans = cut & (np.abs(local) - 1.0 <= extents * (fan.range * (1.0 + SPARE)) + SPARE).all(axis=0)
-    in_way: Integers = numbers[met]
-    return in_way
+    return numbers[met]

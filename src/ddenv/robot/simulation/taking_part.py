@@ -18,7 +18,7 @@ from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow
 from ddenv.world.extent import Bounds, bounds, shape_bounds, stacked
 from ddenv.world.model import Joint, Model, World, held_with, still_links
-from ddenv.world.pose import Pose, Vector, angle_between
+from ddenv.world.pose import Pose, angle_between
 
 # What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
 SLACK = 0.05
@@ -71,29 +71,26 @@ class Reached:
         if not len(self._owners):
             return
         margin = SLACK + speed * self._period
-        if self._place is None or _moved(self._place, pose, self._hull.reach) + margin >= self._free:
-            self._look_around_robot(pose, margin)
-        self._look_around_models()
-
-    def _look_around_robot(self, pose: PoseRow, margin: float) -> None:
-        low, high = self._hull.bounds(Pose(pose[:3], pose[3:]))
-        apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
-        near = apart <= margin
-        self._place = pose
-        self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
-        self._find(near)
-
-    def _look_around_models(self) -> None:
-        low, high, speed = self._sleep.awake_links()
-        if not len(low):
-            return
-        margin = (SLACK + speed * self._period)[:, None]
-        low, high = low - margin, high + margin
-        lowest, highest = low.min(axis=0), high.max(axis=0)
-        near: Booleans = (self._low <= highest).all(axis=1) & (self._high >= lowest).all(axis=1)
-        meets = (low[:, None] <= self._high[near]) & (self._low[near] <= high[:, None])
-        near[near] = meets.all(axis=2).any(axis=0)
-        self._find(near)
+        place, reach = self._place, self._hull.reach
+        if (
+            place is None
+            or math.dist(place[:3], pose[:3]) + angle_between(place[3:], pose[3:]) * reach + margin >= self._free
+        ):
+            low, high = self._hull.bounds(Pose(pose[:3], pose[3:]))
+            apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
+            near = apart <= margin
+            self._place = pose
+            self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
+            self._find(near)
+        low, high, speeds = self._sleep.awake_links()
+        if len(low):
+            margins = (SLACK + speeds * self._period)[:, None]
+            low, high = low - margins, high + margins
+            lowest, highest = low.min(axis=0), high.max(axis=0)
+            near = (self._low <= highest).all(axis=1) & (self._high >= lowest).all(axis=1)
+            meets = (low[:, None] <= self._high[near]) & (self._low[near] <= high[:, None])
+            near[near] = meets.all(axis=2).any(axis=0)
+            self._find(near)
 
     def _find(self, near: Booleans) -> None:
         """Notes the models of the shapes `near`, and looks at their shapes no more."""
@@ -102,11 +99,6 @@ class Reached:
         self._found[self._owners[near]] = True
         others = ~self._found[self._owners]
         self._owners, self._low, self._high = self._owners[others], self._low[others], self._high[others]
-
-
-def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
-    """How far any point within `reach` (m) of the origin can have moved between two poses of it, m."""
-    return math.dist(one[:3], other[:3]) + angle_between(one[3:], other[3:]) * reach
 
 
 ENDLESS = 1e9  # m; half of a box that holds the world
@@ -141,7 +133,16 @@ class Hull:
 def _boxes(robot: Model) -> Iterator[Bounds]:
     """The box around each link, wherever its joints take it."""
     frame, first = robot.links[0].pose.inverse(), robot.links[0].pose.position
-    rigid, reached = held_with(robot, robot.links[0].name), _chains(robot)
+    # For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m.
+    chains = {robot.links[0].name: (first, 0.0)}
+    # A file may name its joints in any order.
+    for _ in robot.joints:
+        for joint in robot.joints:
+            if joint.parent in chains and joint.child not in chains:
+                start, length = chains[joint.parent]
+                place = joint.pose.position
+                chains[joint.child] = place, length + math.dist(start, place) + _slide(joint)
+    rigid = held_with(robot, robot.links[0].name)
     joint_of = {joint.child: joint for joint in robot.joints}
     for link in robot.links:
         box = bounds(link.collisions, frame if link.name in rigid else link.pose.inverse())
@@ -150,32 +151,17 @@ def _boxes(robot: Model) -> Iterator[Bounds]:
         if link.name in rigid:
             yield box
             continue
-        joint = joint_of.get(link.name)
-        if joint is not None and joint.parent in rigid:
-            center, far = joint.pose.position, _slide(joint)
+        held = joint_of.get(link.name)
+        if held is not None and held.parent in rigid:
+            center, far = held.pose.position, _slide(held)
         else:
             # Several joints in a row: a ball around the first link.
-            center, far = first, reached[link.name][1] if link.name in reached else math.inf
-        start = joint.pose.position if joint is not None else link.pose.position
+            center, far = first, chains[link.name][1] if link.name in chains else math.inf
+        start = held.pose.position if held is not None else link.pose.position
         corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
         far = min(ENDLESS, far + math.dist(start, link.pose.position) + corner)
         middle = np.array((frame @ Pose(center)).position)
         yield middle - far, middle + far
-
-
-def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
-    """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
-    chains = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
-    # A file may name its joints in any order.
-    for _ in robot.joints:
-        for joint in robot.joints:
-            if joint.parent in chains and joint.child not in chains:
-                start, length = chains[joint.parent]
-                chains[joint.child] = (
-                    joint.pose.position,
-                    length + math.dist(start, joint.pose.position) + _slide(joint),
-                )
-    return chains
 
 
 def _slide(joint: Joint) -> float:
