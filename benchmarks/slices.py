@@ -20,7 +20,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from small_worlds import KINDS, small_scenario, small_world
 
 from ddenv.environment import Environment
@@ -29,7 +28,7 @@ from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.simulation.taking_part import ENDLESS, Hull
+from ddenv.robot.simulation.taking_part import Reached
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
@@ -38,8 +37,8 @@ from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import read_model
 
 FORGOTTEN = {
-    "robot": lambda: setattr(Hull, "bounds", lambda *_: (np.full((1, 3), ENDLESS),) * 2),
-    "models": lambda: setattr(Sleep, "awake_links", lambda _: (np.empty((0, 3)), np.empty((0, 3)), np.empty(0))),
+    "robot": lambda: setattr(Reached, "_look_around_robot", lambda *_: None),
+    "models": lambda: setattr(Reached, "_look_around_models", lambda *_: None),
     "awake": lambda: setattr(Sleep, "took_part", frozenset()),
     "lidar": lambda: setattr(Lidar, "took_part", {}),
     "unusual": lambda: setattr(Repertoire, "unusual", lambda *_: frozenset()),

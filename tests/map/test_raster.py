@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from ddenv.map.footprints import footprints
-from ddenv.map.raster import EMPTY, View, arrow, braille, fit, masks, owners
-from ddenv.world.extent import convex_hull
+from ddenv.map.raster import View, arrow, braille, fit, masks, owners
 from ddenv.world.pose import heading
 from tests.map.worlds import GROUND, box, world_of
 
@@ -20,17 +19,6 @@ def grid_of(*models: str, view: View = VIEW):
     return owners(masks(prints_of(*models), view), view)
 
 
-def test_a_box_fills_the_pixels_it_covers():
-    grid = grid_of(box("a", 0, 0, size=(2, 1, 1)))
-    rows, columns = np.nonzero(grid == 0)
-    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (7, 8, 8, 11)
-
-
-def test_a_turned_box_covers_the_same_area():
-    grid = grid_of(box("a", 0, 0, yaw=math.pi / 4, size=(4, 4, 1)))
-    assert (grid == 0).sum() * VIEW.scale**2 == pytest.approx(16, rel=0.15)
-
-
 def test_up_is_the_greater_y_and_right_the_greater_x():
     assert VIEW.cell(4.9, 3.9) == (0, 19)
     assert VIEW.cell(-4.9, -3.9) == (7, 0)
@@ -43,36 +31,9 @@ def test_small_models_lie_on_top_of_large_ones():
     assert grid[3, 5] == 0
 
 
-def test_only_what_is_drawn_owns_a_pixel():
-    filled = masks(prints_of(box("a", 0, 0)), VIEW)
-    assert (owners(filled, VIEW, []) == EMPTY).all()
-
-
-def test_a_model_smaller_than_a_pixel_still_shows():
-    grid = grid_of(box("pebble", 0.3, 0.3, size=(0.02, 0.02, 0.02)))
-    assert (grid == 0).sum() == 1
-
-
 def test_the_ground_is_not_drawn():
     names = [each.name for each in prints_of(GROUND, box("crate", 0, 0), box("floor", 0, 0, size=(15, 8, 0.02)))]
     assert names == ["floor", "crate"]
-
-
-@pytest.mark.parametrize(
-    "shape", ["<sphere><radius>1</radius></sphere>", "<cylinder><radius>1</radius><length>3</length></cylinder>"]
-)
-def test_round_shapes_are_round(shape):
-    model = box("a", 0, 0).replace("<box><size>1.2 0.8 0.3</size></box>", shape)
-    (each,) = prints_of(model)
-    assert each.low == pytest.approx((-1, -1), abs=1e-6)
-    assert len(each.polygons[0]) == 12
-
-
-def test_the_hull_is_anticlockwise_and_leaves_out_what_is_inside():
-    hull = convex_hull(np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1], [1, 0]]))
-    assert len(hull) == 4
-    x, y = hull[:, 0], hull[:, 1]
-    assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0
 
 
 def test_a_path_has_no_gaps():

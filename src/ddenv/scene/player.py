@@ -179,7 +179,12 @@ class Player:
         if any(row.test == following.test for row in self._live):
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
-            self._show_evidence()
+            self._evidence = self._state.evidence_test
+            samples = None if self._evidence is None else self._run.motion(self._evidence)
+            self._scenery.evidence(None if samples is None else table(samples))
+            if self._state.f_position is not None:
+                place, size = self._state.f_position, self._scenery.scale
+                mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
         self._show_parts()
         if following != self._shot:
             self._cut(following)
@@ -231,14 +236,6 @@ class Player:
         self._letters = self._scenery.parts(groups)
         if self._shot is not None:
             self._caption(self._shot, "")
-
-    def _show_evidence(self) -> None:
-        self._evidence = self._state.evidence_test
-        samples = None if self._evidence is None else self._run.motion(self._evidence)
-        self._scenery.evidence(None if samples is None else table(samples))
-        if self._state.f_position is not None:
-            place, size = self._state.f_position, self._scenery.scale
-            mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
 
 
 def _numbers(one: Parting) -> str:

@@ -26,10 +26,13 @@ def hung(kind: str, offset=(0.5, 0.0, 0.0), **changes: object) -> Model:
 
 @pytest.fixture
 def motion(world_of, add, husky, scenario_of):
-    """Where a model is (N, 3) from its joint, and its rows (N, 8), in 2 s beside the robot's way."""
+    """Where a model is (N, 3) from its joint, and its rows (N, 8), in 2 s beside the robot's way.
+
+    Another model in its place, which has the same names inside, is removed.
+    """
 
     def run(model: Model) -> tuple[np.ndarray, np.ndarray]:
-        template = Template(add(world_of(), model), husky, scenario_of(**NOWHERE))
+        template = Template(add(world_of(), model, replace(model, name="twin")), husky, scenario_of(**NOWHERE))
         rows = template.run(frozenset({model.name}), seed=1).motions[model.name]
         return rows[:, 1:4] - HINGE, rows
 

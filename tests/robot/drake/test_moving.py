@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -52,13 +50,6 @@ def test_a_removed_board_is_passed_through_and_carries_nothing(boards):
     assert abs(result.trajectory[1:, 3] - 0.1323).max() < 0.01
 
 
-def test_switching_off_a_moving_model_is_as_building_without_it(boards, boards_world, husky, scenario_of):
-    kept = tuple(model for model in boards_world.models if model.name != "in_the_way")
-    smaller = Template(replace(boards_world, models=kept), husky, scenario_of(**SECTIONS))
-    keep = ALL - {"in_the_way"}
-    assert smaller.run(keep, seed=1).trajectory.tobytes() == boards.run(keep, seed=1).trajectory.tobytes()
-
-
 def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box):
     inertia = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
     side = "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
@@ -72,22 +63,3 @@ def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box
     assert rows[0, 1:4] == pytest.approx([0, 3, 1])
     assert rows[-1, 3] == pytest.approx(0.1, abs=0.005)
     assert "pair" not in template.run(frozenset(), seed=1).motions
-
-
-def test_models_may_have_the_same_names_inside_and_hang_on_the_world(world_of, husky, scenario_of):
-    inertia = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
-    side = "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
-    doors = [
-        f"<model name='{name}'><pose>0 {y} 1 0 0 0</pose><link name='a'>{inertia}<pose>0.3 0 0 0 0 0</pose>{side}</link>"
-        "<joint name='hinge' type='revolute'><pose>-0.3 0 0 0 0 0</pose><parent>world</parent><child>a</child>"
-        "<axis><xyz>0 1 0</xyz></axis></joint></model>"
-        for name, y in (("one", 3), ("two", -3))
-    ]
-    template = Template(world_of(*doors), husky, scenario_of(failure={"timeout": 1.0}))
-    result = template.run(frozenset({"one"}), seed=1)
-    assert set(result.motions) == {"one"}
-    swing = result.motions["one"][:, 1:4] - (0, 3, 1)
-    # It swings about its hinge, 0.3 m away, in its plane.
-    assert np.hypot(swing[:, 0], swing[:, 2]) == pytest.approx(np.full(len(swing), 0.3), abs=1e-6)
-    assert abs(swing[:, 1]).max() < 1e-6
-    assert swing[:, 2].min() < -0.25

@@ -79,23 +79,6 @@ def test_corner_spheres_lie_just_inside(shape):
     assert corners.max(axis=0) + CORNER_RADIUS == pytest.approx(high, abs=0.007)
 
 
-def test_a_mesh_of_many_corners_gets_32_spread_over_it():
-    turns = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    rim = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
-    vertices = np.vstack([rim, rim + np.array([0, 0, 1])])
-    number = np.arange(100)
-    after = (number + 1) % 100
-    sides = [np.column_stack(three) for three in ((number, after, after + 100), (number, after + 100, number + 100))]
-    caps = [np.column_stack([np.full(98, 0), number[2:], number[1:-1]])]
-    caps += [np.column_stack([np.full(98, 100), number[1:-1] + 100, number[2:] + 100])]
-    corners = np.array(corners_of(Mesh("drum", vertices, np.vstack([*sides, *caps]))))
-    assert len(corners) == 32
-    assert np.linalg.norm(corners[:, :2], axis=1) == pytest.approx(np.ones(32), abs=0.01)
-    for end in (corners[corners[:, 2] < 0.5], corners[corners[:, 2] > 0.5]):
-        angles = np.sort(np.arctan2(end[:, 1], end[:, 0]))
-        assert np.diff([*angles, angles[0] + 2 * np.pi]).max() < 1.0
-
-
 def test_the_floor_is_below_the_lowest_surface_of_the_world(world_of, add, scenario_of):
     pit = model_of("pit", link_of("link", wedge(1.0, 1.0, 1.0), Pose((0.0, 0.0, -4.0)), mass=None))
     assert whole_of(add(world_of(), pit), scenario_of()).floor == pytest.approx(-6.5)
@@ -106,11 +89,6 @@ def tile(across: int) -> list[Collision]:
     """A tile of `across` times `across` boxes, 0.5 m apart, with every other one a step higher."""
     places = [(0.5 * i, 0.5 * j, 0.1 * ((i + j) % 2)) for i in range(across) for j in range(across)]
     return [Collision("box", Box((0.5, 0.5, 0.2)), Pose(place), 0.5) for place in places]
-
-
-def test_a_link_of_few_shapes_rests_on_all_of_their_corners():
-    collisions = tile(2)
-    assert resting_corners(collisions) == [corners_of(each.shape) for each in collisions]
 
 
 def test_a_link_of_many_shapes_rests_on_the_outermost_corners():

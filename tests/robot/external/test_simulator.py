@@ -176,7 +176,6 @@ def test_an_exception_is_no_failure_of_the_robot(simulator_of, code, outcome):
 @pytest.mark.programs
 def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkeypatch):
     monkeypatch.setattr(simulator, "MOST_BYTES", 3_000_000)
-    monkeypatch.setattr("ddenv.robot.external.simulator.MOST_BYTES", 3_000_000)
     flood = """
         import os, sys
         print("0,1,2,3,0,0,0,1", flush=True)

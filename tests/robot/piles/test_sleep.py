@@ -226,19 +226,6 @@ def test_what_falls_out_of_the_world_is_left_alone(add, world_of, husky, scenari
 
 
 @pytest.mark.rates
-def test_a_run_leaves_no_trace_in_the_next(template):
-    tower = [cube(f"storey_{number}", 2.0, 0.0, 0.15 + 0.3 * number) for number in range(2)]
-    models = (*tower, cube("far", 3.0, 3.0, 0.5), flap("flap", 1.0, -3.0))
-    names = [model.name for model in models]
-    used = template(*models)
-    first = run(used, *names)
-    for keep in ((), names[:1], names[1:], names[::2]):
-        run(used, *keep, seed=2)
-    assert bits(run(used, *names)) == bits(first)
-    assert bits(run(template(*models), *names)) == bits(first)
-
-
-@pytest.mark.rates
 def test_what_moves_longer_than_it_could_be_rehearsed_goes_on_moving(template, monkeypatch):
     swing = flap("flap", 1.0, -3.0, lower=-np.inf, damping=0.0)
     whole = run(template(swing), "flap").motions["flap"]

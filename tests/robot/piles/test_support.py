@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from ddenv.robot.piles import rehearsal
 from ddenv.robot.simulation.template import Variants
 from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
-from tests.conftest import ROOT
-from tests.robot.conftest import bits, box_model, cube, link_of, model_of, run, wedge
+from tests.robot.conftest import box_model, cube, link_of, model_of, wedge
 from tests.robot.piles.test_sleep import SECTIONS
 
 SHELF = box_model("shelf", "1 3 0.4 0 0 0", "1 1 0.8")
-REAL = ROOT.parent / "shared" / "worlds" / "rough_terrain_gap.world"
 
 
 def ball(name: str, x: float, y: float, z: float) -> Model:
@@ -74,28 +70,9 @@ def test_what_rolls_onto_another_pile_rests_on_it(simulator, world_of, add):
     assert ("ball", "bottom") in pairs(simulator, world)
 
 
-@pytest.mark.rates
-def test_finding_it_leaves_no_trace_in_the_next_run(simulator, world_of, add):
-    world = add(world_of(SHELF), cube("cup", 1.0, 3.0, 1.2), cube("near", 1.2, 0.0, 0.15), cube("over", 1.2, 0.0, 0.5))
-    names = world.elements()
-    fresh, used = simulator(world), simulator(world)
-    for keep in (names, names[1:]):
-        expected = bits(run(fresh, *keep))
-        assert used.supports(frozenset(names)) == [("cup", "shelf"), ("over", "near")]
-        assert bits(run(used, *keep)) == expected
-
-
 def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(simulator, world_of, add, monkeypatch):
     def broken(*_: object) -> None:
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(rehearsal.Simulator, "AdvanceTo", broken)
     assert pairs(simulator, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [("cup", "shelf")]
-
-
-@pytest.mark.rates
-@pytest.mark.skipif(not REAL.exists(), reason="the real worlds are not here")
-def test_a_block_of_a_real_world_lies_on_its_asphalt(simulator):
-    from ddenv.world.sdf.read import read_world
-
-    assert pairs(simulator, read_world(Path(REAL))) == [("cinder_block", "asphalt_plane_clone")]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,8 +12,7 @@ from ddenv.world import scenario
 from ddenv.world.files.meshes import convex_hull
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
 from ddenv.world.pose import Pose
-from tests.robot.conftest import wedge
-from tests.robot.sensing.conftest import lidar_of, loose, plain, scan, still
+from tests.robot.sensing.conftest import lidar_of, loose, scan, still
 from tests.robot.sensing.slow import first_met
 from tests.tiers import examples
 
@@ -127,48 +125,3 @@ def test_each_range_has_the_same_bits_among_many_shapes_as_alone():
     alone = [scan(lidar_of(*models, present={model.name}), robot).ranges for model in models]
     assert np.isfinite(together).sum() > 300
     assert together.tobytes() == np.min(alone, axis=0).tobytes()
-
-
-@pytest.mark.parametrize(
-    ("shape", "pose", "expected"),
-    [
-        (Box((1.0, 1.0, 1.0)), Pose((3.0, 0.0, 0.0)), 2.5),
-        (Cylinder(0.3, 1.0), Pose((3.0, 0.0, 0.2)), 2.7),
-        (Cylinder(0.3, 1.0), Pose.from_rpy(3.0, 0.0, 0.0, 0.0, math.pi / 2, 0.0), 2.5),
-        (Sphere(0.5), Pose((3.0, 0.0, 0.3)), 2.6),
-        (Capsule(0.3, 1.0), Pose.from_rpy(3.0, 0.0, 0.0, 0.0, math.pi / 2, 0.0), 2.2),
-        (Ellipsoid((0.5, 1.0, 1.0)), Pose((3.0, 0.0, 0.0)), 2.5),
-        (Plane((1.0, 1.0)), Pose.from_rpy(3.0, 0.0, 0.0, 0.0, -math.pi / 2, 0.0), 3.0),
-        (wedge(1.0, 1.0, 1.0), Pose((3.0, 0.0, 0.0)), 3.0),
-        (Box((1.0, 1.0, 1.0)), Pose((3.0, 0.0, 0.51)), math.inf),
-        (Box((8.0, 8.0, 8.0)), Pose((3.0, 0.0, 0.0)), math.inf),
-    ],
-    ids=["box", "cylinder", "lying", "sphere", "capsule", "ellipsoid", "plane", "mesh", "above", "around"],
-)
-def test_the_beam_straight_ahead(shape, pose, expected):
-    assert scan(lidar_of(still("it", shape, pose))).ranges[270] == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("pitch", "expected"),
-    [(0.0, math.inf), (0.04, 0.5 / math.sin(0.04)), (0.08, 5.9 / math.cos(0.08)), (0.2, 0.5 / math.sin(0.2))],
-    ids=["level", "over it", "at it", "before it"],
-)
-def test_a_tilted_robot_looks_at_the_ground_or_over_what_is_low(pitch, expected):
-    models = still("floor", Plane((1.0, 1.0)), Pose()), still("low", Box((0.2, 40.0, 0.2)), Pose((6.0, 0.0, 0.1)))
-    ranges = scan(lidar_of(*models), Pose.from_rpy(0.0, 0.0, 0.5, 0.0, pitch, 0.0)).ranges
-    assert ranges[270] == pytest.approx(expected)
-
-
-def test_all_beams_towards_a_wall_end_on_it_and_no_other():
-    taken = scan(lidar_of(still("wall", Box((0.02, 2.0, 1.0)), Pose((3.01, 0.0, 0.0)))))
-    assert (np.isfinite(taken.ranges) == (np.abs(taken.angles) <= math.atan2(1.0, 3.0))).all()
-
-
-def test_beams_go_round_behind_the_robot():
-    behind = still("behind", Cylinder(0.5, 1.0), Pose((-3.0, 0.0, 0.0)))
-    ranges = scan(lidar_of(behind, settings=plain(beams=361, angle=math.tau))).ranges
-    met = np.flatnonzero(np.isfinite(ranges))
-    assert met.tolist() == [*range(10), *range(351, 361)]
-    assert ranges[0] == pytest.approx(2.5)
-    assert not np.isfinite(scan(lidar_of(behind)).ranges).any()

@@ -51,8 +51,3 @@ def test_a_sensor_does_not_change_the_noise_of_another():
         among.odometry(TRUTH.wheels)
         among.lidar.standard_normal(541)
     assert among.compass(TRUTH) == alone.compass(TRUTH)
-
-
-def test_wheels_that_stand_still_measure_no_turn():
-    sensors = SensorSuite(Sensors(odometry=0.1, odometry_bias=0.1), 0)
-    assert sensors.odometry((0.0, 0.0)) == (0.0, 0.0)

@@ -52,17 +52,6 @@ def test_what_is_touched_at_the_start_and_at_the_end_counts(world_of, husky, sce
     assert run(short, "wall").simulated_seconds == end
 
 
-@pytest.mark.rates
-def test_the_tiles_of_the_ditch_are_touched_in_driving_order(ditch, ditch_world):
-    result = ditch.run(frozenset(ditch_world.elements()), seed=0)
-    names = ["asphalt_near", "rough_tile_10", "rough_tile_11", "rough_tile_20", "asphalt_far"]
-    assert list(result.first_touched) == names
-    times = list(result.first_touched.values())
-    assert times == sorted(set(times))
-    # It is blind, and high above the ground plane.
-    assert result.first_sensed == result.first_touched
-
-
 def test_what_is_within_range_is_sensed_before_it_is_touched(world_of, husky, scenario_of):
     scenario = scenario_of(sensors={"view_range": 1.0})
     high = box_model("lamp", "1.0 0 1.5 0 0 0", "0.2 0.2 0.2")
@@ -179,16 +168,6 @@ def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husk
 
 
 @pytest.mark.rates
-def test_noticing_changes_no_bit_of_a_run_in_the_ditch(ditch, ditch_world, monkeypatch):
-    keep = frozenset(ditch_world.elements())
-    for seed in (0, 3):
-        result = ditch.run(keep, seed)
-        bare = without_noticing(monkeypatch, lambda seed=seed: ditch.run(keep, seed))
-        assert result.first_touched
-        assert bits(bare) == bits(result)
-
-
-@pytest.mark.rates
 def test_a_used_template_notices_the_same_as_a_fresh_one(world_of, add, husky, scenario_of):
     crate = model_of("crate", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.0, 0.2, 0.15))))
     world = add(world_of(WALL, box_model("post", "0 -2 0.5 0 0 0", "0.2 0.2 1")), crate)
@@ -219,61 +198,26 @@ def test_contacts_that_cannot_be_worked_out_are_the_next_steps_to_report(world_o
     assert noticed(run(template, "wall")) == noticed(before)
 
 
-def boxes(*places: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes from x0, y0, x1, y1 and, if it is not on the eye's height, z0, z1."""
-    rows = np.array([place if len(place) == 6 else (*place, -0.5, 0.5) for place in places])
-    return rows[:, [0, 1, 4]], rows[:, [2, 3, 5]]
-
-
-@pytest.mark.parametrize(
-    ("box", "view_range", "degrees", "seen"),
-    [
-        ((2, -1, 3, 1), 2.0, 90, True),
-        ((2, -1, 3, 1), 1.9, 90, False),
-        ((-3, -1, -2, 1), 5.0, 90, False),
-        ((-3, -1, -2, 1), 5.0, 360, True),
-        # It lies across an edge of the view, with no corner in it.
-        ((1, 0.5, 1.5, 9), 5.0, 90, True),
-        ((-9, 2, 9, 3), 5.0, 90, True),
-        ((-9, 2, 9, 3), 2.5, 90, False),
-        # All around the eye, above it, too high above it.
-        ((-1, -1, 1, 1), 0.1, 1, True),
-        ((-1, -1, 1, 1, 1, 2), 1.0, 1, True),
-        ((-1, -1, 1, 1, 1, 2), 0.9, 1, False),
-        # Along the edge behind, where directions jump by a whole turn.
-        ((-3, 0.1, -2, 0.2), 5.0, 359, True),
-        ((-3, -0.001, -2, 0.001), 5.0, 350, False),
-        ((-3, -1, -2, 1), 5.0, 350, True),
-    ],
-)
-def test_a_box_is_in_view_if_some_part_of_it_is_near_enough_and_within_the_field_of_view(
-    box, view_range, degrees, seen
-):
-    low, high = boxes(box)
-    for turns in (-1, 0, 1):
-        heading = np.array([turns * math.tau])
-        assert in_view(low, high, np.zeros(3), heading, view_range, math.radians(degrees)).tolist() == [seen]
-
-
 def test_in_view_agrees_with_looking_at_many_points_of_each_box():
     random = np.random.default_rng(3)
     low = random.uniform(-4, 4, (300, 3)) * (1, 1, 0.3)
     high = low + random.uniform(0.2, 4, (300, 3))
-    heading, view_range, view_angle = 2.5, 2.5, math.radians(100)
+    view_range = 2.5
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 41)] * 2, [0.0, 0.5, 1.0]), axis=-1).reshape(-1, 3)
 
-    def some(view_range: float, view_angle: float) -> np.ndarray:
+    def some(heading: float, view_range: float, view_angle: float) -> np.ndarray:
         points = low[:, None] + grid * (high - low)[:, None]
         points[:, :, 2] = np.clip(0.0, low[:, None, 2], high[:, None, 2])
         offset = np.arctan2(points[..., 1], points[..., 0]) - heading
         ahead = np.abs(np.remainder(offset + math.pi, math.tau) - math.pi) <= view_angle / 2
         return (ahead & (np.linalg.norm(points, axis=2) <= view_range)).any(axis=1)
 
-    seen = in_view(low, high, np.zeros(3), np.array([heading]), view_range, view_angle)
-    # All that some point is in view of, and nothing that is out of a slightly wider view.
-    assert 30 < seen.sum() < 270
-    assert (seen | ~some(view_range, view_angle)).all()
-    assert (~seen | some(view_range + 0.15, view_angle + 0.1)).all()
+    for heading, view_angle in ((2.5, 1.7), (math.pi, 0.3), (math.tau - 2.5, 5.9), (0.0, math.tau)):
+        seen = in_view(low, high, np.zeros(3), np.array([heading]), view_range, view_angle)
+        # All that some point is in view of, and nothing that is out of a slightly wider view.
+        assert 30 < seen.sum() < 290
+        assert (seen | ~some(heading, view_range, view_angle)).all()
+        assert (~seen | some(heading, view_range + 0.15, view_angle + 0.1)).all()
 
 
 def reach_of(robot):

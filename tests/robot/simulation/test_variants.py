@@ -153,8 +153,3 @@ def test_the_floor_is_that_of_the_whole_world(world_of, husky, scenario_of, box)
     assert all_bits(Variants(world, husky, scenario).run(table, 1)) == all_bits(
         Template(world, husky, scenario).run(table, 1)
     )
-
-
-def test_unknown_models_are_refused(cubes, husky, scenario):
-    with pytest.raises(ValueError, match="no such model: e"):
-        Variants(cubes, husky, scenario).run(frozenset({"e"}), 1)

@@ -71,26 +71,29 @@ class Reached:
         if not len(self._owners):
             return
         margin = SLACK + speed * self._period
-        place, reach = self._place, self._hull.reach
-        if (
-            place is None
-            or math.dist(place[:3], pose[:3]) + angle_between(place[3:], pose[3:]) * reach + margin >= self._free
-        ):
-            low, high = self._hull.bounds(Pose(pose[:3], pose[3:]))
-            apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
-            near = apart <= margin
-            self._place = pose
-            self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
-            self._find(near)
-        low, high, speeds = self._sleep.awake_links()
-        if len(low):
-            margins = (SLACK + speeds * self._period)[:, None]
-            low, high = low - margins, high + margins
-            lowest, highest = low.min(axis=0), high.max(axis=0)
-            near = (self._low <= highest).all(axis=1) & (self._high >= lowest).all(axis=1)
-            meets = (low[:, None] <= self._high[near]) & (self._low[near] <= high[:, None])
-            near[near] = meets.all(axis=2).any(axis=0)
-            self._find(near)
+        if self._place is None or _moved(self._place, pose, self._hull.reach) + margin >= self._free:
+            self._look_around_robot(pose, margin)
+        self._look_around_models()
+
+    def _look_around_robot(self, pose: PoseRow, margin: float) -> None:
+        low, high = self._hull.bounds(Pose(pose[:3], pose[3:]))
+        apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
+        near = apart <= margin
+        self._place = pose
+        self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
+        self._find(near)
+
+    def _look_around_models(self) -> None:
+        low, high, speed = self._sleep.awake_links()
+        if not len(low):
+            return
+        margin = (SLACK + speed * self._period)[:, None]
+        low, high = low - margin, high + margin
+        lowest, highest = low.min(axis=0), high.max(axis=0)
+        near: Booleans = (self._low <= highest).all(axis=1) & (self._high >= lowest).all(axis=1)
+        meets = (low[:, None] <= self._high[near]) & (self._low[near] <= high[:, None])
+        near[near] = meets.all(axis=2).any(axis=0)
+        self._find(near)
 
     def _find(self, near: Booleans) -> None:
         """Notes the models of the shapes `near`, and looks at their shapes no more."""
@@ -99,6 +102,11 @@ class Reached:
         self._found[self._owners[near]] = True
         others = ~self._found[self._owners]
         self._owners, self._low, self._high = self._owners[others], self._low[others], self._high[others]
+
+
+def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
+    """How far any point within `reach` (m) of the origin can have moved between two poses of it, m."""
+    return math.dist(one[:3], other[:3]) + angle_between(one[3:], other[3:]) * reach
 
 
 ENDLESS = 1e9  # m; half of a box that holds the world
