@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-import ddenv
 from ddenv.errors import UserError
-from ddenv.robot.controllers import BadCode, Guarded, controllers, load
+from ddenv.robot.controllers import BadCode, controllers, load
 from ddenv.robot.protocol import Estimate, Reading, Setup, Twist, WheelSpeeds
 from ddenv.world.scenario import Controller
 
@@ -224,11 +223,3 @@ def test_what_cannot_be_loaded_is_refused(tmp_path, use, complaint):
         (tmp_path / f"{name}.py").write_text(text)
     with pytest.raises(UserError, match=f"^controller.use: {complaint}"):
         load(use, tmp_path)
-
-
-def test_built_in_controllers_are_not_guarded(tmp_path):
-    settings = Controller(speed=0.5)
-    setup = Setup(*(getattr(SETUP, name) for name in SETUP.__slots__[:12]), settings=settings)
-    controller = controllers(settings, tmp_path)(setup)
-    assert not isinstance(controller, Guarded)
-    assert isinstance(controller.step(READING), ddenv.Twist)

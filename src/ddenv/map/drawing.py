@@ -29,10 +29,8 @@ WIDTH, HEIGHT = 0.58, 1.15
 GAP = 3.0
 LONGEST_LABEL = 26  # columns
 MARK = 14.0  # half the size of a mark, with some space, pixels
-# Maximum fraction of a name that may cover other models.
-MOST_COVERED = 0.3
-# A model at least this many times larger than a name may carry the name of another model.
-LARGE = 10.0
+MOST_COVERED = 0.3  # maximum fraction of a name that may cover other models
+LARGE = 10.0  # a model at least this many times larger than a name may carry the name of another model
 Point = tuple[float, float]
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from ddenv.map.colors import BLACK, RGB, WHITE, luminance, packed, readable
 
-# Minimum difference in brightness between a dot and its background, of 255.
-LEAST_APART = 70
+LEAST_APART = 70  # minimum difference in brightness between a dot and its background, of 255
 # Blocks that fill their cells: text over them takes their colour as background.
 FILLED = tuple(map(ord, "█▉▇"))
 

@@ -17,8 +17,7 @@ import numpy as np
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
-# Tolerance of the fill test at the edges of outlines, pixels.
-SLACK = 1e-9
+SLACK = 1e-9  # tolerance of the fill test at the edges of outlines, pixels
 # A polygon thinner than a pixel and longer than this many of them is widened to one: it would have gaps, or vanish.
 SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model

@@ -30,8 +30,7 @@ from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
 from ddenv.world.sdf.numbers import changed
 
-# Digits after the point: a hundredth of a millimetre.
-DIGITS = 5
+DIGITS = 5  # digits after the point: a hundredth of a millimetre
 
 
 class Player:

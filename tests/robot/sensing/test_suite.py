@@ -39,11 +39,6 @@ def test_a_bias_is_drawn_once_in_a_run():
     assert np.std(first, axis=0) == pytest.approx([0.1, 0.2, 0, 0, 0.05, 0.1], rel=0.15)
 
 
-def test_the_same_seed_gives_the_same_noise():
-    assert (readings(Sensors(), 5, 50) == readings(Sensors(), 5, 50)).all()
-    assert (readings(Sensors(), 5, 50) != readings(Sensors(), 6, 50)).any()
-
-
 def test_a_sensor_does_not_change_the_noise_of_another():
     alone, among = SensorSuite(Sensors(), 7), SensorSuite(Sensors(), 7)
     for _ in range(3):

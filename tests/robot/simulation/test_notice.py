@@ -13,7 +13,7 @@ from ddenv.robot.simulation.taking_part import ENDLESS, Hull
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
-from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, noticed, run
+from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, run
 from tests.tiers import slow
 
 WALL = box_model("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")
@@ -167,37 +167,6 @@ def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husk
     assert bits(bare) == bits(result)
 
 
-@pytest.mark.rates
-def test_a_used_template_notices_the_same_as_a_fresh_one(world_of, add, husky, scenario_of):
-    crate = model_of("crate", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.0, 0.2, 0.15))))
-    world = add(world_of(WALL, box_model("post", "0 -2 0.5 0 0 0", "0.2 0.2 1")), crate)
-    scenario = scenario_of(sensors={"view_range": 1.5, "view_angle": 2.0}, failure={"timeout": 3.0})
-    used = Template(world, husky, scenario)
-    first = run(used, "wall", "crate", "post")
-    assert set(first.first_touched) == {"ground", "crate"}
-    assert set(first.first_sensed) == {"ground", "crate", "wall"}
-    run(used, "post", seed=2)
-    run(used, "crate", seed=3)
-    assert noticed(run(used, "wall", "crate", "post")) == noticed(first)
-    assert noticed(run(Template(world, husky, scenario), "wall", "crate", "post")) == noticed(first)
-
-
-@pytest.mark.rates
-def test_contacts_that_cannot_be_worked_out_are_the_next_steps_to_report(world_of, husky, scenario_of):
-    template = Template(world_of(WALL), husky, scenario_of())
-    before = run(template, "wall")
-
-    def poison(_time: float, pose: tuple[float, ...], _models: object) -> None:
-        state = template.context.plant_context.get_mutable_discrete_state_vector()
-        if pose[0] > 0.75:
-            state.SetFromVector(np.full(state.size(), np.nan))
-
-    broken = template.run(frozenset({"wall"}), 1, poison)
-    assert (broken.outcome, broken.failure) == ("error", "not-finite")
-    assert broken.first_touched == {"ground": before.first_touched["ground"]}
-    assert noticed(run(template, "wall")) == noticed(before)
-
-
 def test_in_view_agrees_with_looking_at_many_points_of_each_box():
     random = np.random.default_rng(3)
     low = random.uniform(-4, 4, (300, 3)) * (1, 1, 0.3)
@@ -212,7 +181,7 @@ def test_in_view_agrees_with_looking_at_many_points_of_each_box():
         ahead = np.abs(np.remainder(offset + math.pi, math.tau) - math.pi) <= view_angle / 2
         return (ahead & (np.linalg.norm(points, axis=2) <= view_range)).any(axis=1)
 
-    for heading, view_angle in ((2.5, 1.7), (math.pi, 0.3), (math.tau - 2.5, 5.9), (0.0, math.tau)):
+    for heading, view_angle in ((2.5, 1.7), (math.pi, 1.6), (-2.5, 5.0), (0.0, math.tau)):
         seen = in_view(low, high, np.zeros(3), np.array([heading]), view_range, view_angle)
         # All that some point is in view of, and nothing that is out of a slightly wider view.
         assert 30 < seen.sum() < 290

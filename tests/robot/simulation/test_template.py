@@ -50,15 +50,6 @@ def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
     assert start[1:] == pytest.approx([1.5, -2.0, 0.14, np.cos(0.5), 0, 0, np.sin(0.5)])
 
 
-def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_of, husky, scenario_of, box):
-    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
-    blocked = template.run(frozenset({"wall"}), seed=1)
-    assert (blocked.outcome, blocked.failure) == ("failed", "stuck")
-    assert blocked.simulated_seconds == pytest.approx(10.0)
-    assert blocked.end_pose[0] < 1.1
-    assert template.run(NOTHING, seed=1).outcome == "pass"
-
-
 def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(world_of, husky, scenario_of):
     at = Pose.from_rpy(1.0, 2.0, 3.0, 0.0, 0.0, 0.5)
     links = tuple(replace(link, pose=at @ link.pose) for link in husky.links)

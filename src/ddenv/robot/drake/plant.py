@@ -52,10 +52,7 @@ from ddenv.world.scenario import Simulation
 # Where the twins of models wait that are not at rest: this deep, and this far from each other, m. Shapes in one place would make
 # Drake's search for contacts slow.
 DEEP, DEEPER, APART = -1e5, -2e5, 1e3
-
-
-# A model with more shapes than this has a twin with bodies of its own, see `Twin`.
-MANY = 8
+MANY = 8  # a model with more shapes than this has a twin with bodies of its own, see `Twin`
 
 
 @dataclass(frozen=True)
@@ -73,24 +70,17 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Place:
-    """The frame that a link's twin is welded to. While the twin is not needed the frame waits at `away` in the world."""
-
-    frame: FixedOffsetFrame
-    away: RigidTransform
-
-
-@dataclass(frozen=True)
 class Twin:
-    """What stands for a model where it lies at rest: `parts`, or where it has many shapes `places` with a body for each link.
+    """What stands for a model where it lies at rest: `parts`, or where it has many shapes a body for each link.
 
-    `geometry` are its shapes. To move a shape of the world takes Drake longer the more shapes the plant has: half a millisecond in
-    a world of boards, 12 ms among 3,200. To move a frame takes it microseconds, but each body costs 14 us in every step.
+    `geometry` are its shapes, `places` the frames that such bodies are welded to, each with where it waits in the world while it is
+    not needed. To move a shape of the world takes Drake longer the more shapes the plant has: half a millisecond in a world of
+    boards, 12 ms among 3,200. To move a frame takes it microseconds, but each body costs 14 us in every step.
     """
 
     geometry: tuple[GeometryId, ...]
     parts: tuple[Part, ...] = ()
-    places: tuple[Place, ...] = ()
+    places: tuple[tuple[FixedOffsetFrame, RigidTransform], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -205,7 +195,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
     shapes: list[GeometryId] = []
-    places: list[Place] = []
+    places: list[tuple[FixedOffsetFrame, RigidTransform]] = []
     for link in model.links:
         away = RigidTransform(to_drake(np.array([APART * plant.num_bodies(), 0.0, DEEPER])))
         loose = FixedOffsetFrame(f"at/{link.name}", plant.world_frame(), away, instance)
@@ -213,7 +203,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         body = plant.AddRigidBody(link.name, instance, SpatialInertia.Zero())
         plant.AddJoint(WeldJoint(f"weld/{link.name}", frame, body.body_frame(), RigidTransform()))
         shapes += _register(plant, body, link.pose.inverse(), [link], wheels, corners=False)
-        places.append(Place(frame, away))
+        places.append((frame, away))
     return Twin(tuple(shapes), places=tuple(places))
 
 

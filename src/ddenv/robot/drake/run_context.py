@@ -223,8 +223,8 @@ class Twins:
         # Drake adds such a shape anew. Where it then touched one on a body that is welded to the world, Drake would crash.
         moved = GeometrySet([part.geometry for part in twin.parts])
         self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(moved, self._welded))
-        for number, place in enumerate(twin.places):
-            place.frame.SetPoseInParentFrame(self._plant_context, place.away if links is None else links[number])
+        for number, (frame, away) in enumerate(twin.places):
+            frame.SetPoseInParentFrame(self._plant_context, away if links is None else links[number])
 
 
 class RunContext:

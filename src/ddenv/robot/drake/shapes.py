@@ -62,8 +62,7 @@ def surface(mu: float) -> drake.ProximityProperties:
 
 
 CORNER_RADIUS = 0.002  # m
-# A link with more corners rests on the outermost ones alone.
-MOST_CORNERS = 64
+MOST_CORNERS = 64  # a link with more corners rests on the outermost ones alone
 # Around a cylinder's rim, and on a convex mesh at most.
 RIM_CORNERS = 8
 MESH_CORNERS = 32

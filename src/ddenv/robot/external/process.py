@@ -20,14 +20,12 @@ from ddenv.text import printable
 SUPERVISOR = Path(__file__).with_name("supervise.py")
 BEGIN, END = b"+", b"."
 PIECE = 65536
-# How often a silent command is checked, s.
-TICK = 0.2
+TICK = 0.2  # how often a silent command is checked, s
 # The maximum time between two checks that counts, s: it is longer where we were stopped ourselves.
 LONGEST_LOOK = 1.0
 # How long the supervisor may take to end a command, s: longer than the grace that it gives the command.
 STOP_WAIT = 10.0
-# The maximum that can be left in a pipe when the command has ended, bytes.
-MOST_LEFT = 16 * PIECE
+MOST_LEFT = 16 * PIECE  # the maximum that can be left in a pipe when the command has ended, bytes
 # How much of the end of stderr is kept, in bytes, and how much of its last line is reported, in characters.
 KEPT = 16384
 SHOWN = 200

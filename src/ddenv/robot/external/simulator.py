@@ -33,8 +33,7 @@ from ddenv.world.scenario import Scenario, Whole
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
-# The meaning of the command's exit codes; all others are errors.
-OUTCOMES = {0: "pass", 1: "failed"}
+OUTCOMES = {0: "pass", 1: "failed"}  # the meaning of the command's exit codes; all others are errors
 
 
 class ExternalSimulator:
@@ -195,8 +194,7 @@ LONGEST_LINE = 1000
 GREATEST = 1e9
 SHORTEST_QUATERNION = 1e-6
 SHORTEST_GAP = 0.001  # s
-# How many characters of a wrong line are reported.
-SHOWN = 60
+SHOWN = 60  # how many characters of a wrong line are reported
 
 # t (s), x, y, z (m), qw, qx, qy, qz.
 Row = tuple[float, float, float, float, float, float, float, float]

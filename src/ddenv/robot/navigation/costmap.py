@@ -10,12 +10,10 @@ from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.navigation.footprint import Footprint, seen_from
 from ddenv.robot.protocol import Estimate, Imu, Scan, Setup
 
-# A beam clears a cell if it goes farther than the cell by this many cells.
-PASSED = 1.5
+PASSED = 1.5  # a beam clears a cell if it goes farther than the cell by this many cells
 # When the robot tilts more than this (rad), its beams pass above or below what they would clear.
 LEVEL = 0.12
-# What rounding changes is less, m.
-SPARE = 1e-6
+SPARE = 1e-6  # what rounding changes is less, m
 
 
 class Costmap:

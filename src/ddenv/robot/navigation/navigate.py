@@ -13,8 +13,7 @@ from ddenv.robot.navigation.route import Path, Planner
 from ddenv.robot.protocol import STOP, Estimate, Imu, Reading, Setup, Twist
 from ddenv.world.pose import wrap
 
-# Clearing the costmap keeps what is within this distance of the robot, m.
-NEAR = 1.5
+NEAR = 1.5  # clearing the costmap keeps what is within this distance of the robot, m
 # After clearing, the lidar gets this time to see obstacles again, s.
 LOOK = 0.5
 BACK = 0.4  # m
@@ -100,8 +99,7 @@ class Straight:
 # The robot made progress when it moved this far (m), or turned by this angle (rad).
 MOVED = 0.1
 TURNED = 0.3
-# Turning alone counts as progress for no longer than this many times the patience.
-ON_THE_SPOT = 4
+ON_THE_SPOT = 4  # turning alone counts as progress for no longer than this many times the patience
 
 
 class Progress:
@@ -131,19 +129,15 @@ THINK_EVERY = 0.5
 THINK = 1.0
 # If the robot cannot follow its plan, it makes no new one within this distance (m) of where it made the last.
 ELSEWHERE = 0.1
-# A plan that ends at the map's border is renewed when less than this (m) is left of it.
-TOO_SHORT = 2.0
-# A robot this far (m) off its plan makes a new one.
-BESIDE = 0.5
+TOO_SHORT = 2.0  # a plan that ends at the map's border is renewed when less than this (m) is left of it
+BESIDE = 0.5  # a robot this far (m) off its plan makes a new one
 # The robot keeps its plan if a new one is less than this many times shorter and has no more than this additional room (m), unless
 # the robot is this far (m) off its plan.
 LONGER = 1.1
 CLOSER = 0.03
 SWAY = 0.2
-# This far (m) from its last recovery the robot starts to count its recovery attempts anew.
-BETTER = 0.5
-# Clocks that add up periods deviate by less than this, s.
-TICK = 1e-6
+BETTER = 0.5  # this far (m) from its last recovery the robot starts to count its recovery attempts anew
+TICK = 1e-6  # clocks that add up periods deviate by less than this, s
 
 
 class Navigator:

@@ -14,30 +14,25 @@ from ddenv.world.pose import wrap
 
 # Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)
-# The deceleration that the robot can rely on, m/s^2.
-BRAKE = 1.0
+BRAKE = 1.0  # the deceleration that the robot can rely on, m/s^2
 # At a standstill it aims at this part of the lookahead distance: the slower it is, the closer it keeps to its path.
 NEAREST = 0.4
 # It turns on the spot when the path leads farther aside than the first angle, until it is within the second, rad.
 ASIDE = 0.9
 ALONG = 0.25
-# When it is aligned with its path within this angle (rad) and still not free, it stops.
-ALIGNED = 0.04
+ALIGNED = 0.04  # when it is aligned with its path within this angle (rad) and still not free, it stops
 # Slower turns than this (rad/s) are lost between the wheels and the ground.
 LEAST_TURN = 0.2
 BACK_SPEED = 0.25  # m/s
-# A point within the margin may come nearer by this in a step, m.
-GIVE = 0.001
+GIVE = 0.001  # a point within the margin may come nearer by this in a step, m
 # With this much room (m) around it the robot drives at full speed, with no room at this part of it.
 ROOM = 0.35
 SLOWEST = 0.25
 # With this much room (m) it need not test its arc again for this time, s.
 CALM = 0.1
 CALM_FOR = 0.1
-# The parts of an arc at which the footprint is tested.
-PLACES = np.linspace(0.0, 1.0, 7)
-# The minimum curvature of an arc, rad: too little to matter.
-BENT = 1e-6
+PLACES = np.linspace(0.0, 1.0, 7)  # the parts of an arc at which the footprint is tested
+BENT = 1e-6  # the minimum curvature of an arc, rad: too little to matter
 # Small turns on the spot, and a little way back, as poses for `room`.
 TURN_LEFT, TURN_RIGHT = (
     np.stack([seen_from(Estimate(0.0, 0.0, side * angle))[:2] for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)

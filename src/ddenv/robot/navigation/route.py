@@ -89,8 +89,7 @@ class Path:
 # Steps from a cell, counterclockwise from the x axis; step k runs along axis k % 4.
 STEPS = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
 AXES = np.arange(8) % 4
-# Longer than any path: only what cannot be passed is longer.
-LONGEST = 1e9
+LONGEST = 1e9  # longer than any path: only what cannot be passed is longer
 
 
 class Grid:
@@ -139,14 +138,10 @@ WEIGHT = 4.0
 FALL = 5.0
 # The factor for a direction in which only a shorter robot would fit: the straightened path may fit this one.
 TIGHT = 1.5
-# The factor for blocked cells where the robot already is: it has to get out of there.
-HEAVY = 50.0
-# A path can be cut short at corners that are at most this many cells apart.
-APART = 3
-# A shortcut may come nearer to an obstacle by this, m.
-NEARER = 0.015
-# A path at most this many times longer than the straight line is not searched again.
-STRAIGHT = 1.03
+HEAVY = 50.0  # the factor for blocked cells where the robot already is: it has to get out of there
+APART = 3  # a path can be cut short at corners that are at most this many cells apart
+NEARER = 0.015  # a shortcut may come nearer to an obstacle by this, m
+STRAIGHT = 1.03  # a path at most this many times longer than the straight line is not searched again
 # Before and after a narrow place the path goes straight on for the first of these distances (m) that is free.
 STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
 # The sharpest turn there, as the cosine of its angle.

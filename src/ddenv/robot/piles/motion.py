@@ -16,8 +16,7 @@ from ddenv.robot.drake.plant import Body
 from ddenv.world.extent import Bounds
 
 NEAR = 0.1  # m; models this near to something that moves are simulated with it
-# Half the size of a box around nothing: no other box is ever near it, m.
-NOTHING = -1e6
+NOTHING = -1e6  # half the size of a box around nothing: no other box is ever near it, m
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,7 @@ from ddenv.world.pose import Pose, vector
 # The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
 BUDGET = 200.0
 LEAST = 1.0
-# What the scripts of a world may take in a worker's memory, bytes.
-MEMORY = 200e6
+MEMORY = 200e6  # what the scripts of a world may take in a worker's memory, bytes
 
 
 @dataclass(frozen=True, eq=False)

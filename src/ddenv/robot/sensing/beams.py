@@ -29,10 +29,8 @@ BOUNDS = np.arange(len(KINDS) + 1)
 # A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
 # larger than rounding errors.
 SPARE = 1e-6
-# A plane is the top of a cube of this size, m: what lies below it is inside.
-PLANE = 2e4
-# The minimum half thickness of a shape, m.
-THINNEST = 1e-9
+PLANE = 2e4  # a plane is the top of a cube of this size, m: what lies below it is inside
+THINNEST = 1e-9  # the minimum half thickness of a shape, m
 
 
 @dataclass(frozen=True)
@@ -129,8 +127,7 @@ def _extent(shape: Shape) -> tuple[Vector, Vector]:
 
 # Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
 NEVER = 1e-200
-# The minimum half length of a capsule's straight part, as a part of its radius.
-SHORTEST = 1e-9
+SHORTEST = 1e-9  # the minimum half length of a capsule's straight part, as a part of its radius
 
 Interval = tuple[Floats, Floats]
 
@@ -220,8 +217,7 @@ class Facets:
         return enter, np.where(rise > 0, crossing, np.inf).min(axis=0)
 
 
-# Directions that differ by a full turn are the same.
-TURNS = np.array([[-math.tau], [0.0], [math.tau]])
+TURNS = np.array([[-math.tau], [0.0], [math.tau]])  # directions that differ by a full turn are the same
 
 
 @dataclass(frozen=True)

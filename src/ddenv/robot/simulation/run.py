@@ -26,8 +26,7 @@ from ddenv.world.drive import Drive
 from ddenv.world.pose import Pose, angle_between
 from ddenv.world.scenario import Controller, Scenario
 
-# The maximum real time between two recorded poses that counts as time of the run, s.
-LONGEST_LOOK = 10.0
+LONGEST_LOOK = 10.0  # the maximum real time between two recorded poses that counts as time of the run, s
 # The outcome, the failure, and whether the run was cut short.
 End = tuple[str, str, bool]
 

@@ -31,8 +31,7 @@ from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
 from ddenv.world.whole import whole_of
 
-# A margin for surfaces that sink into each other, and joints that exceed their limits, m.
-YIELD = 0.1
+YIELD = 0.1  # a margin for surfaces that sink into each other, and joints that exceed their limits, m
 
 
 class Template:
@@ -185,15 +184,13 @@ class Template:
 
 
 Result = TypeVar("Result")
-# What a moving model that is switched off costs in each step of a run, s.
-HELD = 5e-6
+HELD = 5e-6  # what a moving model that is switched off costs in each step of a run, s
 # The minimum time to build a plant, and the time for each pair of shapes, s. A pair also takes 0.15 kB.
 BUILD = 0.05
 PAIR = 1e-6
 # A plant with more shapes than this gets no smaller ones beside it: each would take more than 150 MB.
 LARGEST = 1000
-# The maximum number of smaller plants at a time.
-MOST = 4
+MOST = 4  # the maximum number of smaller plants at a time
 
 
 class Variants:
