@@ -77,15 +77,6 @@ def test_noise_is_as_large_as_it_is_set():
     assert errors.std() == pytest.approx(0.02, rel=0.03)
 
 
-def test_the_same_seed_gives_the_same_noise_and_another_seed_other_noise():
-    def ranges(seed: int) -> list[bytes]:
-        lidar = lidar_of(WALL, settings=plain(noise=0.01), seed=seed)
-        return [scan(lidar).ranges.tobytes() for _ in range(3)]
-
-    assert ranges(1) == ranges(1)
-    assert len({*ranges(1), *ranges(2)}) == 6
-
-
 def test_the_noise_of_a_beam_does_not_depend_on_what_others_meet():
     near = still("near", Box((0.2, 0.2, 0.2)), Pose((1.0, 0.0, 0.0)))
     settings = plain(noise=0.01)
