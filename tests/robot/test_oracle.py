@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from ddenv.robot.oracle import Failure, judge, kind_of, trajectory_distance
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.run import ANGLE, RADIUS, SECONDS, Stuck
+from ddenv.world.scenario import Controller
 
 
 def path(*points) -> np.ndarray:
@@ -178,7 +179,7 @@ def test_a_run_that_was_cut_is_stuck(start, x, degrees, rate):
         lambda t: (min(t, start) + x * math.sin(rate * t), 0, 0),
         lambda t: rolled(degrees * math.sin(rate * t)),
     )
-    stuck = Stuck()
+    stuck = Stuck(Controller())
     cut = next(row for row, values in enumerate(trajectory) if stuck.update(values[0], tuple(values[1:])))
     assert start - 0.3 <= trajectory[cut, 0] - SECONDS <= start + period + 0.3
     assert kind(trajectory[: cut + 1]) == "stuck"
@@ -195,5 +196,5 @@ def test_a_run_that_was_cut_is_stuck(start, x, degrees, rate):
     ids=["creeping", "turning", "trying again"],
 )
 def test_who_still_moves_is_not_stuck_yet(place, turn):
-    stuck = Stuck()
+    stuck = Stuck(Controller())
     assert not any(stuck.update(values[0], tuple(values[1:])) for values in way(60, place, turn))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import cast
 
 import numpy as np
@@ -57,31 +57,28 @@ class Presence:
 
     def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
         """Lets `bodies` touch themselves, each other, `others`, what is kept and never moves, and with `robot` also the robot."""
-        declaration = CollisionFilterDeclaration()
-        for body, rest in self._pairs(bodies, others, robot):
-            declaration.AllowBetween(body, rest)
-        self._filters.Apply(declaration)
+        self._apply(CollisionFilterDeclaration.AllowBetween, bodies, others, robot)
 
     def part(self, bodies: Sequence[Body], others: Sequence[Body]) -> None:
         """Undoes `join`. `others` are the moving models that `bodies` could touch besides each other."""
-        declaration = CollisionFilterDeclaration()
-        for body, rest in self._pairs(bodies, others, True):
-            declaration.ExcludeBetween(body, rest)
-        self._filters.Apply(declaration)
+        self._apply(CollisionFilterDeclaration.ExcludeBetween, bodies, others, True)
 
-    def _pairs(
-        self, bodies: Sequence[Body], others: Sequence[Body], robot: bool
-    ) -> Iterator[tuple[GeometrySet, GeometrySet]]:
+    def _apply(
+        self, between: Callable[..., object], bodies: Sequence[Body], others: Sequence[Body], robot: bool
+    ) -> None:
+        declaration = CollisionFilterDeclaration()
         bodies = [body for body in bodies if body.name not in self._built.twins]
         for number, body in enumerate(bodies):
             mine = GeometrySet(list(body.geometry))
-            yield mine, _set([*self._free, *(other.geometry for other in (*bodies[number + 1 :], *others))])
+            other_bodies = [other.geometry for other in (*bodies[number + 1 :], *others)]
+            between(declaration, mine, _set([*self._free, *other_bodies]))
             if robot:
-                yield mine, self._robot
+                between(declaration, mine, self._robot)
             # A model does not touch its own links that never move: a door its frame.
-            yield mine, _set(geometry for name, geometry in self._kept.items() if name != body.name)
+            between(declaration, mine, _set(geometry for name, geometry in self._kept.items() if name != body.name))
             for one, other in self._built.own_pairs[body.name]:
-                yield GeometrySet(one), GeometrySet(other)
+                between(declaration, GeometrySet(one), GeometrySet(other))
+        self._filters.Apply(declaration)
 
 
 def _set(groups: Iterable[tuple[GeometryId, ...]]) -> GeometrySet:

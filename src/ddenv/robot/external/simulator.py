@@ -122,7 +122,6 @@ class ExternalSimulator:
         return {**os.environ, **known}
 
     def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, Floats]:
-        """The outcome, the failure and the trajectory (N, 8) of a run that ended like this."""
         said = f": {ended.complaint}" if ended.complaint else ""
         if ended.code is None or ended.code not in OUTCOMES:
             why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"

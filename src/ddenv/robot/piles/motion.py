@@ -43,6 +43,9 @@ class Motion:
         """The motion of the links `numbers` alone."""
         return Motion(*(part[numbers] for part in vars(self).values()))
 
+    def copy(self) -> Motion:
+        return Motion(*(part.copy() for part in vars(self).values()))
+
     def put(self, numbers: Sequence[int], other: Motion) -> None:
         """Overwrites the motion of the links `numbers` with `other`."""
         for mine, others in zip(vars(self).values(), vars(other).values(), strict=True):

@@ -263,7 +263,6 @@ class Rehearsals:
         return near
 
     def _known(self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]) -> list[Known]:
-        """What is known of `piles`, rehearsed where nothing is known yet."""
         return [self._repertoire.find(_names(pile), present) or self._rehearse(pile, present) for pile in piles]
 
     def _piles(self, numbers: Sequence[int], joined: Booleans, left: Booleans) -> list[tuple[Body, ...]]:
@@ -297,7 +296,6 @@ class Rehearsals:
         return self._repertoire.add(_names(pile), present, script, margin)
 
     def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> Script:
-        """Records the pile at each tick."""
         built, plant_context = self._context.built, self._context.plant_context
         entries = self._context.hold.entries(pile)
         motors = self._plant.get_desired_state_input_port(built.robot.instance)
@@ -310,10 +308,9 @@ class Rehearsals:
             if not np.isfinite(self._context.hold.state()).all():
                 raise ValueError("not finite")
             sleep.tick(tick.step)
-            motion, pace = sleep.motion()
             states.append(sleep.state()[entries])
-            motions.append(motion)
-            paces.append(pace)
+            motions.append(sleep.motion.copy())
+            paces.append(sleep.pace.copy())
             if sleep.at_rest.all() or tick.time >= self._longest:
                 break
         return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), sleep.at_rest)

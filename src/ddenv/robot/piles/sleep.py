@@ -75,8 +75,9 @@ class Sleep:
             self._played[members] = number
         # Models whose script has ended although they still move.
         self._due: Booleans = np.zeros(count, dtype=bool)
-        self._motion = Motion.still(len(self._links.bodies))
-        self._pace = np.zeros(len(self._links.bodies))
+        # Of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s.
+        self.motion = Motion.still(len(self._links.bodies))
+        self.pace = np.zeros(len(self._links.bodies))
         self._took_part: Booleans = np.zeros(count, dtype=bool)
         self._stillness = Stillness(self._links)
         # Where models were when they woke last.
@@ -102,7 +103,7 @@ class Sleep:
             self._play()
             self._look(np.flatnonzero(self._awake), seconds)
             # What has fallen out of the world is not worth simulating.
-            self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
+            self._gone |= np.logical_and.reduceat(self.motion.below(self._floor), self._links.first)
             self._lay(self._awake & self._gone)
             self._decide(seconds)
         # Also when no moving model is kept: removed ones are held, too.
@@ -112,7 +113,7 @@ class Sleep:
 
     def boxes(self) -> Bounds:
         """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at the last tick."""
-        low, high = self._motion.low, self._motion.high
+        low, high = self.motion.low, self.motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
 
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
@@ -120,24 +121,16 @@ class Sleep:
         their speeds (K,), m/s.
         """
         links = self._links.of_models(np.flatnonzero(self._awake))
-        return self._motion.low[links], self._motion.high[links], self._motion.speed[links]
+        return self.motion.low[links], self.motion.high[links], self.motion.speed[links]
 
     @property
     def took_part(self) -> frozenset[str]:
         """The kept models that were simulated, or were perhaps touched by the robot or by what was."""
         return frozenset(body.name for body in self._bodies(self._took_part))
 
-    def poses(self) -> tuple[Floats, Floats]:
-        """The poses of all L links of the kept models at the last tick: places (L, 3) m and rotations (L, 3, 3)."""
-        return self._motion.places, self._motion.turns
-
     def state(self) -> Floats:
         """The plant's positions and velocities (P + V,), with everything where it really is."""
         return np.where(self._away, self._real, self._hold.state())
-
-    def motion(self) -> tuple[Motion, Floats]:
-        """The motion of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s."""
-        return self._motion.of(range(len(self._links.bodies))), self._pace.copy()
 
     @property
     def at_rest(self) -> Booleans:
@@ -157,8 +150,8 @@ class Sleep:
             row = min(self._tick, len(script.motions) - 1)
             links = self._links.of_models(members)
             self._real[self._entries_of[number]] = script.states[row]
-            self._motion.put(links, script.motions[row])
-            self._pace[links] = script.paces[row]
+            self.motion.put(links, script.motions[row])
+            self.pace[links] = script.paces[row]
             self._hold_still(member for member in members if not self._has_twin[member])
             if row == len(script.motions) - 1:
                 self._played[members] = -1
@@ -170,7 +163,7 @@ class Sleep:
         for number in models:
             if self._has_twin[number] and not self._gone[number]:
                 links = self._links.of_models([number])
-                self._twins.lay(self._kept[number], self._motion.places[links], self._motion.turns[links])
+                self._twins.lay(self._kept[number], self.motion.places[links], self.motion.turns[links])
 
     def _hold_still(self, models: Iterable[int]) -> None:
         """Holds the bodies of `models`: away from everything, or where they are if they have no twin."""
@@ -183,21 +176,21 @@ class Sleep:
         links = self._links.of_models(models)
         if not links:
             return
-        before, now = self._motion.of(links), self._links.observe(self._plant, self._context, links)
-        self._motion.put(links, now)
+        before, now = self.motion.of(links), self._links.observe(self._plant, self._context, links)
+        self.motion.put(links, now)
         if seconds:
-            self._pace[links] = self._links.ways(links, before, now) / seconds
+            self.pace[links] = self._links.ways(links, before, now) / seconds
 
     def _decide(self, seconds: float) -> None:
         """Wakes models and lays others to sleep, `seconds` after the last time."""
-        slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
-        speed = np.maximum.reduceat(self._motion.speed, self._links.first)
+        slow = np.maximum.reduceat(self.pace, self._links.first) < SLOW
+        speed = np.maximum.reduceat(self.motion.speed, self._links.first)
         near, close = self._near(speed)
         played = self._played >= 0
         moving = self._awake | played
         if not (near | close | moving | self._due).any():
             return
-        apart = gaps(self._links, self._motion, self._links, self._motion)
+        apart = gaps(self._links, self.motion, self._links, self.motion)
         apart[self._gone] = apart[:, self._gone] = np.inf
         np.fill_diagonal(apart, np.inf)
         # Pairs (M, M): moved by the same script; near enough to carry each other; near, and one of them is not slow.
@@ -211,7 +204,7 @@ class Sleep:
         # Something that is simulated may touch it before the tick after next.
         beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
         self._took_part |= near | beside.any(axis=1)
-        self._stillness.look(self._motion, seconds)
+        self._stillness.look(self.motion, seconds)
         within = self._settled & (near | touching[:, self._awake].any(axis=1))
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
         start: Booleans = ~self._awake & (close | met | self._due | (pressed & self._settled))
@@ -237,8 +230,8 @@ class Sleep:
         robot = self._robot.observe(self._plant, self._context, range(len(self._robot.bodies)))
         # Its wheels turn, but do not come nearer by that.
         margin = (speed + robot.speed[0]) * self._period
-        wanted = gaps(self._robot, robot, self._links, self._motion) < NEAR + margin
-        apart = tight_gaps(self._robot, robot, self._links, self._motion, wanted)[0]
+        wanted = gaps(self._robot, robot, self._links, self.motion) < NEAR + margin
+        apart = tight_gaps(self._robot, robot, self._links, self.motion, wanted)[0]
         place = np.concatenate([robot.places[0], (robot.turns[0] * self._robot.reach[0] / np.sqrt(2.0)).ravel()])
         passing = np.linalg.norm(self._robot_was - place, axis=1) > PASSED
         lies = self._settled
@@ -249,12 +242,12 @@ class Sleep:
 
     def _struck(self, apart: Floats) -> Booleans:
         """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""
-        pace = np.maximum.reduceat(self._pace, self._links.first)
+        pace = np.maximum.reduceat(self.pace, self._links.first)
         reach = CLOSE + pace * self._period
         wanted = self._settled[:, None] & (self._awake & (pace > FAST)) & (apart < reach)
         if not wanted.any():
             return np.zeros_like(self._awake)
-        tight = tight_gaps(self._links, self._motion, self._links, self._motion, wanted)
+        tight = tight_gaps(self._links, self.motion, self._links, self.motion, wanted)
         return np.asarray((tight < reach).any(axis=1))
 
     def _wake(self, models: Booleans) -> None:
@@ -273,14 +266,14 @@ class Sleep:
         self._awake |= models
         self._took_part |= models
         self._due &= ~models
-        self._stillness.restart(models, self._motion)
-        self._when_woken.restart(models, self._motion)
+        self._stillness.restart(models, self.motion)
+        self._when_woken.restart(models, self.motion)
 
     def _lay(self, models: Booleans) -> None:
         """Holds `models` (M,), which are awake, where they are now."""
         if not models.any():
             return
-        self._loads.bore(models & ~self._when_woken.moved(self._motion))
+        self._loads.bore(models & ~self._when_woken.moved(self.motion))
         numbers = np.flatnonzero(models)
         entries = np.concatenate([self._entries[number] for number in numbers])
         self._real[entries] = self._hold.state()[entries]
@@ -291,7 +284,7 @@ class Sleep:
         self._settle(numbers)
         self._presence.part(self._bodies(models), self._bodies(self._awake))
         links = self._links.of_models(numbers)
-        self._motion.speed[links] = self._pace[links] = 0.0
+        self.motion.speed[links] = self.pace[links] = 0.0
 
     def _bodies(self, models: Booleans) -> list[Body]:
         return [body for body, chosen in zip(self._kept, models, strict=True) if chosen]

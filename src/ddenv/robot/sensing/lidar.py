@@ -110,7 +110,6 @@ class Lidar:
         return np.where(beyond, np.inf, measured), measured, beams, models[hit]
 
     def _move(self, places: Floats, turns: Floats) -> None:
-        """Moves the shapes to where their links are."""
         if not len(self._movers):
             return
         turn = turns[self._links].transpose(1, 2, 0)

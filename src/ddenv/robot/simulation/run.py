@@ -131,7 +131,8 @@ class Run:
                 progress(tick.time, pose, models)
                 notice.look(tick.time, pose[:3], truth.heading)
             if end is None:
-                scan = lidar.scan(tick.time, pose, *sleep.poses()) if tick.lidar and lidar else None
+                links = sleep.motion.places, sleep.motion.turns
+                scan = lidar.scan(tick.time, pose, *links) if tick.lidar and lidar else None
                 self.autonomy.sense(tick, truth, scan)
                 end = self._command(tick) if tick.command else None
             if end is not None or tick.record:
@@ -226,9 +227,10 @@ class Stuck:
     It is a guess: a robot may still come free later. So runs that were not cut short confirm what a reduction leaves.
     """
 
-    def __init__(self, seconds: float = SECONDS) -> None:
-        """`seconds` is how long the robot must not have moved."""
-        self._seconds = seconds
+    def __init__(self, controller: Controller) -> None:
+        # How long a robot with this controller must not have moved, s.
+        patience = PATIENCES * controller.planner.patience if controller.use == "costmap" else 0.0
+        self._seconds = max(SECONDS, patience)
         self._since = 0.0
         self._place: PoseRow | None = None
 
@@ -239,8 +241,3 @@ class Stuck:
             self._since, self._place = now, pose
         # Times are sums of steps: 8 s may come out 1e-15 s short.
         return now - self._since >= self._seconds - 1e-6
-
-
-def seconds_for(controller: Controller) -> float:
-    """How long a robot with this controller must not move to be stuck for good, s."""
-    return max(SECONDS, PATIENCES * controller.planner.patience) if controller.use == "costmap" else SECONDS

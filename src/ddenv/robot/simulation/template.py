@@ -22,7 +22,7 @@ from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.notice import Notice, still_boxes
-from ddenv.robot.simulation.run import Run, Stuck, seconds_for
+from ddenv.robot.simulation.run import Run, Stuck
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
@@ -167,7 +167,7 @@ class Template:
                 autonomy=Autonomy(scenario, suite, self._drive, self._clock, controller, listener),
                 lidar=lidar,
                 reach=self._reach,
-                stuck=None if full else Stuck(seconds_for(scenario.controller)),
+                stuck=None if full else Stuck(scenario.controller),
                 reached=reached,
                 unusual=unusual,
                 kept=kept,
