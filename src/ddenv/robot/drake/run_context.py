@@ -101,9 +101,7 @@ class Hold:
     """
 
     def __init__(self, built: Built, plant_context: Context, start: Floats) -> None:
-        self._plant = built.plant
-        self._context = plant_context
-        self.start = start
+        self._plant, self._context, self.start = built.plant, plant_context, start
         self._bodies = tuple(built.moving.values())
         self._count = built.plant.num_positions()
         self._held: Booleans = np.zeros(len(start), dtype=bool)

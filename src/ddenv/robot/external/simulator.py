@@ -41,8 +41,7 @@ class ExternalSimulator:
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError if the command cannot be started."""
-        self._world = world
-        self._scenario = scenario
+        self._world, self._scenario = world, scenario
         self._whole = whole_of(world, scenario)
         self._words = command_words(scenario)
         self._names = frozenset(model.name for model in world.models)
@@ -212,13 +211,11 @@ class PoseLog:
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
-        self._rest = b""
-        self._number = 0
-        self._began = False
+        self._rest, self._problem = b"", ""
+        self._number, self._began = 0, False
         self._rows: list[Row] = []
         self._last: Row | None = None
         self.size = 0
-        self._problem = ""
 
     def add(self, piece: bytes) -> None:
         """Reads the next bytes. After a mistake, which `finish` reports, nothing more is read."""

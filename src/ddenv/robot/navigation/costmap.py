@@ -29,8 +29,7 @@ class Costmap:
         planner = setup.settings.planner
         self.resolution = planner.resolution
         self.count = max(round(planner.size / planner.resolution), 4)
-        self.spots = np.empty((3, 0))
-        self.version = 0
+        self.spots, self.version = np.empty((3, 0)), 0
         body = Footprint.of(setup)
         # One cell of the rim is kept: a robot that turns may still hit what is there.
         self._middle = (body.ahead - body.behind) / 2
@@ -41,10 +40,9 @@ class Costmap:
         self._slots: Integers = np.empty(0, dtype=int)
         # The occupied slots at the last change of the version, and those that are occupied or next to one, (count^2,).
         self._known = self._slots
-        self._around: Booleans = np.zeros(self.count**2, dtype=bool)
+        self._around, self._hit = np.zeros((2, self.count**2), dtype=bool)
         beside = (-1, 0, 1)
         self._beside = np.array([[dx * self.count + dy] for dx in beside for dy in beside])
-        self._hit: Booleans = np.zeros(self.count**2, dtype=bool)
         self._places = np.ones((3, self.count**2))
         self._angles: Floats | None = None
         self._beams = np.empty((2, 0))

@@ -155,20 +155,16 @@ class Navigator:
         self._follower = Follower(setup)
         self._progress = Progress(planner.patience)
         self._recovery = Recovery(setup)
-        self._recovers = False
         self._path: Path | None = None
         self._imu: Imu | None = None
         self._near = self._map.spots
+        # When (s) it looked, planned and found a path last; where, and on which version of the map, it planned.
         self._looked = self._planned = -math.inf
-        self._planned_at = setup.start[:2]
-        self._found = 0.0
-        self._planned_on = -1
-        self._blocked = False
+        self._found, self._planned_at, self._planned_on = 0.0, setup.start[:2], -1
         self._recovered: tuple[float, float] | None = None
         self._speed = 0.0
-        self._waits = False
-        self.arrived = False
-        self.gave_up = False
+        self._recovers = self._blocked = self._waits = False
+        self.arrived = self.gave_up = False
 
     def step(self, reading: Reading) -> Twist:
         """The command for the next period."""

@@ -51,15 +51,13 @@ class Follower:
         self._body = Footprint.of(setup)
         # Faster, the robot could not stop within the space that it knows to be free.
         self._fastest = min(setup.speed, math.sqrt(2 * BRAKE * self._look_ahead))
-        self._turning = False
         self._path: Path | None = None
         self._points: Floats | None = None
         # An arc that was free, with room, is not tested again for this many steps.
         self._calm = round(CALM_FOR / setup.period)
-        self._left = 0
-        self._room = 0.0
+        self._left, self._room = 0, 0.0
         self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
-        self.stuck = False
+        self._turning = self.stuck = False
 
     def step(self, path: Path, estimate: Estimate, points: Floats) -> Twist:
         """The command to follow `path`. `points` (3, N) near the robot are x, y (m) and 1, in the frame of the estimates."""

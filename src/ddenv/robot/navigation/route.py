@@ -36,10 +36,8 @@ class Path:
     """
 
     def __init__(self, corners: list[Place], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
-        self.corners = corners
-        self.final = final
-        self.back, self.on = back, on
-        self.off = 0.0
+        self.corners, self.final = corners, final
+        self.back, self.on, self.off = back, on, 0.0
         self._legs = []
         for (x, y), end in pairwise(corners):
             dx, dy = end[0] - x, end[1] - y
@@ -48,8 +46,7 @@ class Path:
             self._legs.append(Leg(x, y, cosine, sine, length))
         # The length of the path from the start of each leg.
         self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
-        self._number = 0
-        self._along = 0.0
+        self._number, self._along = 0, 0.0
 
     @property
     def end(self) -> Place:
@@ -154,8 +151,7 @@ class Planner:
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
-        self._goal = setup.goal
-        self._tolerance = setup.tolerance
+        self._goal, self._tolerance = setup.goal, setup.tolerance
         self._body = Footprint.of(setup)
         self._side = self._body.side + planner.padding
         self._reach = max(self._body.ahead, self._body.behind)

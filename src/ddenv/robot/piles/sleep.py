@@ -45,18 +45,11 @@ class Sleep:
         alone: bool = False,
     ) -> None:
         hold, clock = context.hold, context.clock
-        self._plant = context.built.plant
-        self._context = context.plant_context
-        self._presence = context.presence
-        self._hold = hold
-        self._twins = context.twins
-        self._period = clock.period
-        self._step = clock.step
-        self._floor = context.floor
-        self._kept = kept
-        self._never = never
-        self._links = Links.of(kept)
-        self._robot = Links.of([context.built.robot])
+        self._plant, self._context = context.built.plant, context.plant_context
+        self._presence, self._hold, self._twins = context.presence, hold, context.twins
+        self._period, self._step, self._floor = clock.period, clock.step, context.floor
+        self._kept, self._never = kept, never
+        self._links, self._robot = Links.of(kept), Links.of([context.built.robot])
         self._entries = [hold.entries([body]) for body in kept]
         number_of = {body.name: number for number, body in enumerate(kept)}
         self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
@@ -66,27 +59,22 @@ class Sleep:
         self._real = hold.start.copy()
         self._away: Booleans = np.zeros(len(hold.start), dtype=bool)
         count = len(kept)
-        self._awake: Booleans = np.zeros(count, dtype=bool)
-        # Fallen out of the world.
-        self._gone: Booleans = np.zeros(count, dtype=bool)
+        # Which models are simulated, have fallen out of the world, or still move although their script has ended.
+        self._awake, self._gone, self._due, self._took_part = np.zeros((4, count), dtype=bool)
         # The number of the script that moves a model, or -1.
         self._played: Integers = np.full(count, -1)
         for number, (_, members) in enumerate(self._scripts):
             self._played[members] = number
-        # Models whose script has ended although they still move.
-        self._due: Booleans = np.zeros(count, dtype=bool)
         # Of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s.
         self.motion = Motion.still(len(self._links.bodies))
         self.pace = np.zeros(len(self._links.bodies))
-        self._took_part: Booleans = np.zeros(count, dtype=bool)
         self._stillness = Stillness(self._links)
         # Where models were when they woke last.
         self._when_woken = Stillness(self._links)
         self._loads = Loads(context, kept)
         # Where the robot was (M, 12) when each model last woke, or was awake, beside it, m.
         self._robot_was = np.full((count, 12), np.inf)
-        self._tick = 0
-        self._now = 0
+        self._tick = self._now = 0
         hold.begin(others=[context.built.robot] if alone else ())
         self._twins.lift_all()
         for entries in self._entries:

@@ -39,8 +39,7 @@ class Lidar:
     ) -> None:
         self._settings = settings
         self._mount = Pose((settings.x, settings.y, settings.z))
-        self._random = random
-        self._state = random.bit_generator.state
+        self._random, self._state = random, random.bit_generator.state
         self._turns = 0
         self._fan = Fan.of(settings)
         self._names = obstacles.names

@@ -35,9 +35,7 @@ class Notice:
         """
         self.first_touched: dict[str, float] = {}
         self._first_seen: dict[str, float] = {}
-        self._sensors = sensors
-        self._context = context.plant_context
-        self._sleep = sleep
+        self._sensors, self._context, self._sleep = sensors, context.plant_context, sleep
         built = context.built
         self._contacts = built.plant.get_contact_results_output_port()
         self._robot = frozenset(one.get_value() for one in built.robot.geometry)

@@ -49,8 +49,7 @@ class Template:
         self._solid = with_ground_boxes(
             world, self._whole.corners, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
         )
-        self._robot = robot
-        self._scenario = scenario
+        self._robot, self._scenario = robot, scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(model.name for model in world.models)
