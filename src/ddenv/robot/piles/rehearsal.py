@@ -151,7 +151,7 @@ class Rehearsals:
         near_robot = spread(self._to_robot[numbers] < NEAR, joined)
         return self._known(self._piles(numbers, joined, ~near_robot), present)
 
-    def settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
+    def _settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
         """All piles of the plant with their scripts, as if there were no robot. None: the simulation broke.
 
         Piles that come near each other on their way are one pile.
@@ -173,7 +173,7 @@ class Rehearsals:
         places: dict[str, tuple[Pose, ...]] = {}
         found: dict[str, set[str]] = {"restless": set(), "fallen": set(), "broken": set()}
         ticks, seconds = context.clock.ticks, 0.0
-        for pile, script in self.settle(present):
+        for pile, script in self._settle(present):
             if script is None:
                 found["broken"].update(_names(pile))
                 continue
@@ -206,7 +206,7 @@ class Rehearsals:
         """
         hold, presence = self._context.hold, self._context.presence
         presence.remove(frozenset())
-        settled = self.settle(present)
+        settled = self._settle(present)
         hold.begin(others=(self._context.built.robot,))
         presence.join(self._bodies, (), robot=False)
         below: dict[str, set[str]] = {}
