@@ -97,7 +97,7 @@ class Links:
         halves = np.einsum("nij,nj->ni", np.abs(turns), self.halves[numbers])
         return Motion(centers - halves, centers + halves, moving + turning * self.reach[numbers], places, turns)
 
-    def ways(self, numbers: Sequence[int], before: Motion, after: Motion) -> Floats:
+    def ways(self, numbers: Sequence[int] | slice, before: Motion, after: Motion) -> Floats:
         """How far (K,) each link's farthest point has moved between two motions, m.
 
         Over time that is small, unlike `Motion.speed`, for links that only tremble, as boards do that lie across each other.
@@ -182,7 +182,7 @@ class Stillness:
 
     def moved(self, motion: Motion) -> Booleans:
         """Which models (M,) have moved since their time was last counted anew."""
-        ways = self._links.ways(range(len(self._links.bodies)), self._was, motion)
+        ways = self._links.ways(slice(None), self._was, motion)
         return np.maximum.reduceat(ways, self._links.first) > SLOW * CALM
 
     def restart(self, models: Booleans, motion: Motion) -> None:
