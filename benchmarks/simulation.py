@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
+from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.runs.subject import load_parts, scenario_for_world
 from ddenv.world.load import SCENARIOS, load_scenario
@@ -89,21 +90,21 @@ def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], sim
     built, context = shared.built, shared.plant_context
     present = keep | template._always
     kept = [body for name, body in built.moving.items() if name in present]
-    template._sleeping = False
+    shared.presence.remove(template.names - present)
+    shared.diagram_context.SetTime(0.0)
+    sleep = Sleep(shared, kept, (), never=True)
     try:
-        shared.presence.remove(template.names - present)
-        with template._asleep(kept, present):
-            motors = built.plant.get_desired_state_input_port(built.robot.instance)
-            simulator = Simulator(built.diagram, shared.diagram_context)
+        motors = built.plant.get_desired_state_input_port(built.robot.instance)
+        simulator = Simulator(built.diagram, shared.diagram_context)
 
-            def advance() -> None:
-                for number, wheels in enumerate(speeds, start=1):
-                    motors.FixValue(context, np.concatenate([np.zeros_like(wheels), wheels]))
-                    simulator.AdvanceTo(min(number * period, simulated))
+        def advance() -> None:
+            for number, wheels in enumerate(speeds, start=1):
+                motors.FixValue(context, np.concatenate([np.zeros_like(wheels), wheels]))
+                simulator.AdvanceTo(min(number * period, simulated))
 
-            return cpu(advance)[0]
+        return cpu(advance)[0]
     finally:
-        template._sleeping = True
+        sleep.end()
 
 
 def cpu(work: Callable[[], Any]) -> tuple[float, Any]:

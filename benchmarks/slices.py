@@ -43,7 +43,7 @@ FORGOTTEN = {
     "lidar": lambda: setattr(Lidar, "took_part", {}),
     "unusual": lambda: setattr(Repertoire, "unusual", lambda *_: frozenset()),
     "carriers": lambda: setattr(Template, "_carriers", lambda *_: frozenset()),
-    "ties": lambda: setattr(Template, "ties", lambda *_: []),
+    "ties": lambda: setattr(Variants, "ties", lambda *_: []),
 }
 # Implied tests of each run.
 PARTS = 6

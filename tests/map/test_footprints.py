@@ -54,12 +54,6 @@ def test_areas_from_above(shape, area):
     assert polygon_area(polygon) == pytest.approx(area, rel=1e-3)
 
 
-def test_a_lying_capsule_is_a_rectangle_with_round_ends():
-    lying = print_of(Capsule(0.5, 2), Pose.from_rpy(1, 1, 0, 0, np.pi / 2, 0))
-    assert lying.low == pytest.approx((-0.5, 0.5), abs=1e-6)
-    assert lying.high == pytest.approx((2.5, 1.5), abs=1e-6)
-
-
 def test_a_model_without_shapes_is_a_point():
     seen = print_of(Plane((1, 1)))
     assert seen.polygons == ()

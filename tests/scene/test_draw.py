@@ -256,12 +256,6 @@ def test_each_link_at_a_joint_goes_its_own_way(screen, stage):
     assert screen.poses[f"/world/models/{forearm}"] == pytest.approx(np.eye(4))
 
 
-def test_what_is_drawn_around_a_small_robot_is_small():
-    assert scale_of((0, 0, 0), (6, 0, 0)) == 1
-    assert scale_of((0, 0, 0), (0.5, 0, 0)) < 0.5
-    assert view((0, 0, 0), (0.5, 0, 0)).radius < 1
-
-
 def test_path_on_ground_is_below_a_tilted_robot():
     upright = np.array([[0, 0, 0, 1, 1, 0, 0, 0.0]])
     on_its_side = np.array([[0, 0, 0, 1, 0.5**0.5, 0.5**0.5, 0, 0]])
@@ -306,3 +300,6 @@ def test_the_camera_sees_the_robot_go_to_the_right():
     assert seen.center == (5, 0, 0)
     assert seen.camera[1] < 0 < seen.camera[2]
     assert view((1.0, 1.0, 0.0), (1.0, 1.0, 0.0)).radius > 0
+    # What is drawn around a small robot is small.
+    assert scale_of((0, 0, 0), (0.5, 0, 0)) < 0.5 < scale_of((0, 0, 0), (6, 0, 0)) == 1
+    assert view((0, 0, 0), (0.5, 0, 0)).radius < 1

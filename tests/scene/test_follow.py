@@ -9,7 +9,6 @@ import pytest
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live
 from ddenv.scene.shot import HOLD, shot, shot_of
-from ddenv.world.pose import pose_of
 
 
 def live(test: int, slot: int = 0) -> Live:
@@ -130,7 +129,3 @@ def test_between_two_tests_the_last_one_stays_for_a_while(in_round):
     assert shot(state, [live(2)], running, HOLD / 2) == running
     assert shot(state, [], running, HOLD + 1).kind == "replay"
     assert shot(replace(state, status="paused"), [], running, 0.0).kind == "replay"
-
-
-def test_a_running_robots_pose_is_made_a_rotation():
-    assert pose_of((1.0, 2.0, 3.0, 2.0, 0.0, 0.0, 0.0)).quaternion == (1, 0, 0, 0)

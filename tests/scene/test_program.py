@@ -281,12 +281,6 @@ def one_line(process: subprocess.Popen) -> str:
     return error
 
 
-@pytest.mark.programs
-def test_two_scenes_take_two_ports(writer, start_scene):
-    first, second = (url_of(start_scene(writer.path)) for _ in range(2))
-    assert first != second
-
-
 @pytest.mark.parametrize(
     "words",
     slow(

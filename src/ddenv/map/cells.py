@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
 
 Cell = tuple[int, int]
-# Cells for each letter, so that the map stays readable.
-ROOM = 20
+ROOM = 20  # cells for each letter, so that the map stays readable
 # One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN, FLOORS, FAINT_SIGN = "+", ".:", "░"

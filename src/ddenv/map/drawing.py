@@ -29,10 +29,8 @@ WIDTH, HEIGHT = 0.58, 1.15
 GAP = 3.0
 LONGEST_LABEL = 26  # columns
 MARK = 14.0  # half the size of a mark, with some space, pixels
-# Maximum fraction of a name that may cover other models.
-MOST_COVERED = 0.3
-# A model at least this many times larger than a name may carry the name of another model.
-LARGE = 10.0
+MOST_COVERED = 0.3  # maximum fraction of a name that may cover other models
+LARGE = 10.0  # a model at least this many times larger than a name may carry the name of another model
 Point = tuple[float, float]
 
 
@@ -178,31 +176,23 @@ def labels(
     """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m."""
     largest = sorted(wanted, key=lambda index: -models[index].outline.area)[:most]
     names = {index: shortened(models[index].model.name, LONGEST_LABEL) for index in largest}
-    boxes = np.array([_box(each, frame) for each in models]).reshape(-1, 4)
+    left, top, right, bottom = frame.box
+    # The models' boxes on the page, as far as they are on the map.
+    boxes = np.zeros((len(models), 4))
+    for box, each in zip(boxes, models, strict=True):
+        corners = frame.pixels(np.array([each.outline.low, each.outline.high]))
+        around = 0.0 if each.outline.polygons else CROSS
+        box[:2] = np.clip(corners.min(axis=0) - around, (left, top), (right, bottom))
+        box[2:] = np.clip(corners.max(axis=0) + around, (left, top), (right, bottom))
     floors = np.array([each.floor for each in models], dtype=bool)
     marks = [np.array([x - MARK, y - MARK, x + MARK, y + MARK]) for x, y in map(frame.pixel, points)]
     for index, box in place_labels(names, boxes, floors, frame.box, marks, size).items():
-        yield _plate(names[index], box, size)
-
-
-def _box(each: Drawn, frame: Frame) -> np.ndarray:
-    """Left, top, right and bottom of a model on the page, as far as it is on the map."""
-    left, top, right, bottom = frame.box
-    corners = frame.pixels(np.array([each.outline.low, each.outline.high]))
-    around = 0.0 if each.outline.polygons else CROSS
-    low = np.clip(corners.min(axis=0) - around, (left, top), (right, bottom))
-    return np.concatenate([low, np.clip(corners.max(axis=0) + around, (left, top), (right, bottom))])
-
-
-def _plate(name: str, box: np.ndarray, size: float) -> str:
-    """A name on its own background, so that outlines and neighbours do not make it hard to read."""
-    x, y = (box[:2] + box[2:]) / 2
-    long, high = box[2:] - box[:2]
-    return (
-        f'<g transform="translate({x:.1f} {y:.1f})">'
-        f'<rect class="plate" x="{-long / 2:.1f}" y="{-high / 2:.1f}" width="{long:.1f}" height="{high:.1f}" rx="2"/>'
-        f'<text class="label" y="{0.35 * size:.1f}" font-size="{size:g}">{written(name)}</text></g>'
-    )
+        long, high = box[2:] - box[:2]
+        # On its own background, so that outlines and neighbours do not make it hard to read.
+        plate = f'x="{-long / 2:.1f}" y="{-high / 2:.1f}" width="{long:.1f}" height="{high:.1f}"'
+        label = f'y="{0.35 * size:.1f}" font-size="{size:g}">{written(names[index])}'
+        x, y = ((box[:2] + box[2:]) / 2).tolist()
+        yield at((x, y), f'<rect class="plate" {plate} rx="2"/><text class="label" {label}</text>')
 
 
 def place_labels(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ddenv.map.colors import RGB
 from ddenv.world.extent import circle, convex_hull, model_bounds, vertices_of
-from ddenv.world.model import Collision, Model, Plane, World, is_ground
+from ddenv.world.model import Model, Plane, World, is_ground
 from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
@@ -57,23 +57,22 @@ def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE) -> Footpri
 
     `moved` is how the model has moved as a whole since the world's file, in the world frame.
     """
-    outlines = [_outline(each, corners, moved) for each in model.collisions if not isinstance(each.shape, Plane)]
-    polygons = tuple(outline for outline in outlines if len(outline))
+    polygons = []
+    for each in model.collisions:
+        if not isinstance(each.shape, Plane):
+            pose = moved @ each.pose
+            vertices, radius = vertices_of(each.shape, corners)
+            flat = vertices @ pose.rotation()[:2].T + pose.position[:2]
+            around = (flat[:, None] + radius * circle(corners)).reshape(-1, 2) if radius else flat
+            polygons += [outline] if len(outline := convex_hull(around)) else []
     points = np.vstack(polygons) if polygons else np.array([(moved @ model.pose).position[:2]])
     low, high = points.min(axis=0), points.max(axis=0)
-    return Footprint(model.name, polygons, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
+    return Footprint(model.name, tuple(polygons), (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
 
 
 def rings(model: Model, moved: Pose) -> tuple[np.ndarray, ...]:
     """The outlines of a model that has `moved`, as closed lines (N, 2), m."""
     return tuple(np.vstack([each, each[:1]]) for each in footprint(model, moved=moved).polygons)
-
-
-def _outline(collision: Collision, corners: int, moved: Pose) -> np.ndarray:
-    pose = moved @ collision.pose
-    vertices, radius = vertices_of(collision.shape, corners)
-    points = vertices @ pose.rotation()[:2].T + pose.position[:2]
-    return convex_hull((points[:, None] + radius * circle(corners)).reshape(-1, 2) if radius else points)
 
 
 def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
@@ -112,13 +111,14 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     """
     models = [model for model in world.models if not is_ground(model)]
     outlines = [footprint(model, corners) for model in models]
-    boxes = [_box(model) for model in models]
     limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
-    floors = [len(models) > 2 and each.area > limit for each in outlines]
-    drawn = [
-        Drawn(model, outline, *box, _color(model), floor)
-        for model, outline, box, floor in zip(models, outlines, boxes, floors, strict=True)
-    ]
+    drawn = []
+    for model, outline in zip(models, outlines, strict=True):
+        center, size = model.pose.position, (0.0, 0.0, 0.0)
+        if (box := model_bounds(model)) is not None:
+            center, size = vector((box[0] + box[1]) / 2), vector(box[1] - box[0])
+        floor = len(models) > 2 and outline.area > limit
+        drawn.append(Drawn(model, outline, center, size, _color(model), floor))
     return tuple(sorted(drawn, key=_turn))
 
 
@@ -126,15 +126,6 @@ def _turn(each: Drawn) -> tuple[int, float, float]:
     """The sort key: floors, then models with shapes, then those without; heights in steps of 1 cm."""
     group = 0 if each.floor else 1 if each.outline.polygons else 2
     return group, 0.0 if each.floor else round(each.top, 2), -each.outline.area
-
-
-def _box(model: Model) -> tuple[Vector, Vector]:
-    """Centre and size of the box around a model, m."""
-    bounds = model_bounds(model)
-    if bounds is None:
-        return model.pose.position, (0.0, 0.0, 0.0)
-    low, high = bounds
-    return vector((low + high) / 2), vector(high - low)
 
 
 def _color(model: Model) -> RGB:

@@ -11,21 +11,9 @@ import numpy as np
 
 from ddenv.map.colors import BLACK, RGB, WHITE, luminance, packed, readable
 
-# Minimum difference in brightness between a dot and its background, of 255.
-LEAST_APART = 70
+LEAST_APART = 70  # minimum difference in brightness between a dot and its background, of 255
 # Blocks that fill their cells: text over them takes their colour as background.
 FILLED = tuple(map(ord, "█▉▇"))
-
-
-def _apart(backs: np.ndarray, color: int) -> np.ndarray:
-    """`color` for each of the packed colours `backs`, or black or white if `color` is too similar."""
-    colors = np.full(len(backs), color, dtype=np.int32)
-    if color < 0:
-        return colors
-    bright = luminance(backs)
-    near = (backs >= 0) & (abs(bright - luminance(color)) < LEAST_APART)
-    colors[near] = np.where(bright[near] > 110, BLACK, WHITE)
-    return colors
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +60,12 @@ class Canvas:
         filled = touched & np.isin(self.chars, FILLED)
         self.back[filled] = self.fore[filled]
         self.chars[touched] = 0x2800 + bits[touched].astype(np.uint32)
-        self.fore[touched] = _apart(self.back[touched], color)
+        # Black or white where `color` would not stand out.
+        backs = self.back[touched]
+        bright, colors = luminance(backs), np.full(len(backs), color, dtype=np.int32)
+        near = (backs >= 0) & (abs(bright - luminance(color)) < LEAST_APART) & (color >= 0)
+        colors[near] = np.where(bright[near] > 110, BLACK, WHITE)
+        self.fore[touched] = colors
         self.bold[touched] = False
 
     def changed_rows(self, other: Canvas | None) -> list[int]:

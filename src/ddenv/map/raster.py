@@ -17,8 +17,7 @@ import numpy as np
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
-# Tolerance of the fill test at the edges of outlines, pixels.
-SLACK = 1e-9
+SLACK = 1e-9  # tolerance of the fill test at the edges of outlines, pixels
 # A polygon thinner than a pixel and longer than this many of them is widened to one: it would have gaps, or vanish.
 SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model
@@ -286,7 +285,13 @@ def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return cells
-    dots = _dense(view.pixels(points) * 2)
+    # The dots along the line, without gaps. Points far outside are invisible, and would only make it long.
+    places = np.clip(view.pixels(points) * 2, -4000, 4000)
+    counts = np.maximum(1, np.ceil(np.abs(np.diff(places, axis=0)).max(axis=1)).astype(int))
+    start = np.repeat(np.arange(len(counts)), counts)
+    part = (_within(counts) / np.repeat(counts, counts))[:, None]
+    line = places[start] * (1 - part) + places[start + 1] * part
+    dots = np.floor(np.vstack([line, places[-1:]])).astype(int)
     if dash:
         dots = dots[np.arange(len(dots)) // dash % 2 == 0]
     x, y = dots[:, 0], dots[:, 1]
@@ -294,19 +299,6 @@ def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
     x, y = x[seen], y[seen]
     np.bitwise_or.at(cells, (y // 4, x // 2), np.array(DOTS, dtype=np.uint8)[y % 4, x % 2])
     return cells
-
-
-def _dense(dots: np.ndarray) -> np.ndarray:
-    """The integer dots along a polyline, without gaps."""
-    # Points far outside are invisible, and would only make the line long.
-    dots = np.clip(dots, -4000, 4000)
-    steps = np.abs(np.diff(dots, axis=0)).max(axis=1)
-    counts = np.maximum(1, np.ceil(steps).astype(int))
-    start = np.repeat(np.arange(len(counts)), counts)
-    part = (_within(counts) / np.repeat(counts, counts))[:, None]
-    line = dots[start] * (1 - part) + dots[start + 1] * part
-    whole: np.ndarray = np.floor(np.vstack([line, dots[-1:]])).astype(int)
-    return whole
 
 
 def arrow(yaw: float, signs: str = ARROWS) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 
 from ddenv.map.colors import RGB, blend, packed
 from ddenv.map.drawing import Frame, Point, at, badge, labels, path_of, plot, tick, written
@@ -47,64 +46,43 @@ def svg_map(world: World, *, spawn: tuple[float, float, float] | None = None, go
     models = plan(world, CORNERS)
     points = [point[:2] for point in (spawn, goal) if point is not None]
     # A long and narrow world gets a frame that has room for its title.
-    room = NARROWEST, NARROWEST / 3
-    frame = Frame.around(models, points, 0.04, LEAST, (WIDEST, HIGHEST), room, (LEFT, TOP))
-    _, _, right, bottom = frame.box
-    width, height = right + RIGHT, bottom + BOTTOM
+    frame = Frame.around(models, points, 0.04, LEAST, (WIDEST, HIGHEST), (NARROWEST, NARROWEST / 3), (LEFT, TOP))
+    width, height = frame.box[2] + RIGHT, frame.box[3] + BOTTOM
     names = labels(models, range(len(models)), MOST_LABELS, frame, points)
+    marks = []
+    if spawn is not None:
+        x, y, yaw = spawn
+        title = f"<title>start ({x:g}, {y:g}) m, yaw {yaw:g} rad</title>"
+        arrow = f'<path class="start" transform="rotate({-math.degrees(yaw):.1f})" d="M7 -8L26 0L7 8Z"/>'
+        marks.append(at(frame.pixel((x, y)), f"{title}{arrow}{badge('start', 'S')}"))
+    if goal is not None:
+        title = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
+        marks.append(at(frame.pixel(goal), f"{title}{badge('goal', 'G')}"))
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
         f'viewBox="0 0 {width:.0f} {height:.0f}">',
         f"<style>{STYLE}</style>",
         f"<title>{written(world.path.name)}</title>",
         '<rect width="100%" height="100%" fill="#ffffff"/>',
-        *_head(world, models),
-        *plot(frame, 16, "map", (_model(each, frame) for each in models), [*names, *_marks(frame, spawn, goal)]),
+        f'<text class="title" x="{LEFT:.0f}" y="34">{written(shortened(world.path.name, 48))}</text>',
+        tick(LEFT, 56, "start", f"{count(len(models), 'model')}, without the ground"),
+        *plot(frame, 16, "map", (_model(each, frame) for each in models), [*names, *marks]),
         "</svg>",
     ]
     return "\n".join(lines) + "\n"
 
 
-def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
-    name = written(shortened(world.path.name, 48))
-    yield f'<text class="title" x="{LEFT:.0f}" y="34">{name}</text>'
-    yield tick(LEFT, 56, "start", f"{count(len(models), 'model')}, without the ground")
-
-
 def _model(each: Drawn, frame: Frame) -> str:
-    fill = _fill(each)
     kinds = ["model"]
     # Models with many small parts would be all outline.
     kinds += ["many"] if len(each.outline.polygons) > 8 else []
     kinds += [] if each.model.static else ["dynamic"]
     kinds += [] if each.outline.polygons else ["bare"]
-    color = f'fill="{_hex(fill)}" stroke="{_hex(blend(fill, BLACK, 0.45))}"'
-    return f'<path class="{" ".join(kinds)}" {color} d="{path_of(each, frame)}"><title>{_tooltip(each)}</title></path>'
-
-
-def _fill(each: Drawn) -> RGB:
-    return blend(WHITE, each.color, 0.2 if each.floor else 0.8)
-
-
-def _tooltip(each: Drawn) -> str:
+    fill = blend(WHITE, each.color, 0.2 if each.floor else 0.8)
+    color = f'fill="#{packed(fill):06x}" stroke="#{packed(blend(fill, BLACK, 0.45)):06x}"'
     x, y, z = each.model.pose.position
-    size = " x ".join(f"{part:.2f}" for part in each.size)
-    kind = "static" if each.model.static else "dynamic"
     yaw = each.model.pose.yaw()
-    words = f"{kind}, {size} m\npose {x:z.2f}, {y:z.2f}, {z:z.2f} m, yaw {yaw:z.2f} rad, top at {each.top:.2f} m"
-    return f"{written(each.model.name)}\n{words}"
-
-
-def _marks(frame: Frame, spawn: tuple[float, float, float] | None, goal: Point | None) -> Iterator[str]:
-    if spawn is not None:
-        x, y, yaw = spawn
-        title = f"<title>start ({x:g}, {y:g}) m, yaw {yaw:g} rad</title>"
-        arrow = f'<path class="start" transform="rotate({-math.degrees(yaw):.1f})" d="M7 -8L26 0L7 8Z"/>'
-        yield at(frame.pixel((x, y)), f"{title}{arrow}{badge('start', 'S')}")
-    if goal is not None:
-        title = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
-        yield at(frame.pixel(goal), f"{title}{badge('goal', 'G')}")
-
-
-def _hex(color: RGB) -> str:
-    return f"#{packed(color):06x}"
+    size = " x ".join(f"{part:.2f}" for part in each.size)
+    words = f"{written(each.model.name)}\n{'static' if each.model.static else 'dynamic'}, {size} m\n"
+    words += f"pose {x:z.2f}, {y:z.2f}, {z:z.2f} m, yaw {yaw:z.2f} rad, top at {each.top:.2f} m"
+    return f'<path class="{" ".join(kinds)}" {color} d="{path_of(each, frame)}"><title>{words}</title></path>'

@@ -15,7 +15,8 @@ from functools import partial
 from math import isfinite
 from numbers import Real
 from pathlib import Path
-from types import ModuleType, TracebackType
+from traceback import walk_tb
+from types import ModuleType
 from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
@@ -31,8 +32,7 @@ BUILT_IN = {
     "straight": "ddenv.robot.navigation.navigate:Straight",
     "costmap": "ddenv.robot.navigation.navigate:Navigator",
 }
-# The maximum time that an import may take, real s: some load whole frameworks.
-LONGEST_IMPORT = 60.0
+LONGEST_IMPORT = 60.0  # the maximum time that an import may take, real s: some load whole frameworks
 
 Answer = TypeVar("Answer")
 # Modules loaded from the folder of the last user's controller; another folder may have modules of the same names.
@@ -73,7 +73,11 @@ def _import(name: str, folder: Path, key: str) -> ModuleType:
         sys.modules.pop(_brought.pop(), None)
     top = name.partition(".")[0]
     if _has(folder, top):
-        _check_name(top, folder, key)
+        loaded = sys.modules.get(top)
+        places = [] if loaded is None else [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
+        elsewhere = loaded is not None and not any(place and Path(place).is_relative_to(folder) for place in places)
+        if elsewhere or top in sys.stdlib_module_names:
+            raise UserError(f"{key}: '{top}' in {folder} has the name of another module; rename it")
     before = set(sys.modules)
     # So that Python finds files written a moment ago.
     importlib.invalidate_caches()
@@ -97,15 +101,6 @@ def _has(folder: Path, top: str) -> bool:
     return (folder / f"{top}.py").is_file() or (folder / top).is_dir()
 
 
-def _check_name(top: str, folder: Path, key: str) -> None:
-    """Raises UserError if a file of `folder` has the name of a module that other code needs."""
-    loaded = sys.modules.get(top)
-    places = [] if loaded is None else [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
-    elsewhere = loaded is not None and not any(place and Path(place).is_relative_to(folder) for place in places)
-    if elsewhere or top in sys.stdlib_module_names:
-        raise UserError(f"{key}: '{top}' in {folder} has the name of another module; rename it")
-
-
 @contextmanager
 def first_on_path(folder: Path) -> Iterator[None]:
     """Searches modules in `folder` first. Other changes of the path stay."""
@@ -120,8 +115,7 @@ def first_on_path(folder: Path) -> Iterator[None]:
 # The maximum speed of a command, m/s, or rad/s: faster is a mistake.
 FASTEST = 1000.0
 LONGEST_REASON = 300
-# The number of seeds of NumPy's global generator.
-SEEDS = 2**32
+SEEDS = 2**32  # the number of seeds of NumPy's global generator
 # Our own files, which a reported place leaves out: they do not help the author of the code.
 OURS = Path(__file__).parent
 
@@ -158,13 +152,14 @@ class Guarded:
             random.seed(self._setup.seed)
             np.random.seed(self._setup.seed % SEEDS)
             self._controller = self._guarded("__init__", self._make, self._setup)
-        command: Twist | WheelSpeeds = self._guarded("step", self._ask, reading)
-        return command
 
-    def _ask(self, reading: Reading) -> Twist | WheelSpeeds:
-        answer = self._controller.step(reading)
-        self.arrived = bool(getattr(self._controller, "arrived", False))
-        return _command(answer, self._setup.joints)
+        def ask(reading: Reading) -> Twist | WheelSpeeds:
+            answer = self._controller.step(reading)
+            self.arrived = bool(getattr(self._controller, "arrived", False))
+            return _command(answer, self._setup.joints)
+
+        command: Twist | WheelSpeeds = self._guarded("step", ask, reading)
+        return command
 
     def _guarded(self, what: str, call: Callable[[Any], Any], given: Any) -> Any:
         who, limit = f"controller {self._name}: {what}", f"{self._seconds:g} s (controller.answer_within)"
@@ -203,14 +198,11 @@ def _command(answer: Any, joints: tuple[str, ...]) -> Twist | WheelSpeeds:
     speeds = answer.speeds if isinstance(answer, WheelSpeeds) else answer
     if not isinstance(speeds, Mapping):
         raise WrongAnswer(f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds by joint)")
-    return WheelSpeeds({_joint(joint, joints): _number(speed, f"'{joint}'") for joint, speed in speeds.items()})
-
-
-def _joint(joint: Any, joints: tuple[str, ...]) -> str:
-    if not isinstance(joint, str) or joint not in joints:
-        hint = nearest(str(joint)[:80], joints)
-        raise WrongAnswer(f"returned a speed for '{str(joint)[:80]}'{hint}; wheels are {', '.join(joints)}")
-    return joint
+    for joint in speeds:
+        if not isinstance(joint, str) or joint not in joints:
+            shown = str(joint)[:80]
+            raise WrongAnswer(f"returned a speed for '{shown}'{nearest(shown, joints)}; wheels are {', '.join(joints)}")
+    return WheelSpeeds({joint: _number(speed, f"'{joint}'") for joint, speed in speeds.items()})
 
 
 def _number(value: Any, what: str) -> float:
@@ -227,27 +219,19 @@ def _kind(value: Any) -> str:
 
 
 def described(error: BaseException) -> str:
-    """An exception in one line: its type, its text, and the place in the user's code that it came from."""
-    try:
+    """An exception in one line: its type, its text, and the place in the user's code that it came from.
+
+    That is the innermost call in the folder of the first file that is not ours.
+    """
+    text = place = ""
+    with suppress(Exception):
         text = str(error)
-    except Exception:
-        text = ""
-    place = _place(error.__traceback__)
-    return f"{type(error).__name__}{': ' if text else ''}{text}{f' ({place})' if place else ''}"
-
-
-def _place(traceback: TracebackType | None) -> str:
-    """File and line of the innermost call in the folder of the first file that is not ours; "" if there is none."""
-    folder, place = None, ""
-    while traceback is not None:
-        file, line = Path(traceback.tb_frame.f_code.co_filename), traceback.tb_lineno
-        traceback = traceback.tb_next
-        if file.is_relative_to(OURS) or str(file).startswith("<"):
-            continue
-        folder = folder or file.parent
-        if file.is_relative_to(folder):
-            place = f"{file.name}:{line}"
-    return place
+    files = [(Path(each.f_code.co_filename), line) for each, line in walk_tb(error.__traceback__)]
+    theirs = [each for each in files if not each[0].is_relative_to(OURS) and not str(each[0]).startswith("<")]
+    for file, line in theirs:
+        if file.is_relative_to(theirs[0][0].parent):
+            place = f" ({file.name}:{line})"
+    return f"{type(error).__name__}{': ' if text else ''}{text}{place}"
 
 
 class Listener(Protocol):

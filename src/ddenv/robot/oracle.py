@@ -11,14 +11,12 @@ from ddenv.arrays import Floats
 from ddenv.robot.result import RunResult
 from ddenv.world.pose import Pose, Vector
 
-# A robot that leans more than this no longer stands on its wheels, rad.
-LEAN = math.radians(60)
+LEAN = math.radians(60)  # a robot that leans more than this no longer stands on its wheels, rad
 
 # Descending this far (m) within this time (s) is a fall: 1.7 m/s downwards is faster than wheels descend any slope on which they
 # have grip, and a free fall covers 1.8 m in that time.
 DROP, DROP_SECONDS = 1.0, 0.6
-# A robot may drop onto the ground when a run begins, s.
-SETTLING = 1.0
+SETTLING = 1.0  # a robot may drop onto the ground when a run begins, s
 
 # Within half a robot's length (m) of its end for this time (s). A moving robot leaves such a circle in a second or two; one that
 # rocks back and forth to get free stays. The time is shorter than what `Stuck` waits for, so that a run that was cut short is

@@ -12,8 +12,7 @@ from ddenv.world.pose import Pose
 
 # A model that moves farther than this before anything touches it was not at rest in the file, m.
 UNREST = 0.05
-# A line names so many models.
-MOST_NAMES = 3
+MOST_NAMES = 3  # a line names so many models
 
 
 @dataclass(frozen=True)

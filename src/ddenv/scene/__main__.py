@@ -52,24 +52,23 @@ async def _serve(run: RunFile, parent: int) -> None:
     player.tick(time.monotonic())
     print(url, flush=True)
     os.set_blocking(sys.stdin.fileno(), False)
+
+    def point() -> None:
+        """Shows what the last line of standard input asks for: a viewer writes each line at once."""
+        if not (said := os.read(sys.stdin.fileno(), 1 << 16)):
+            loop.remove_reader(sys.stdin.fileno())
+            return
+        with suppress(Invalid):
+            player.show(read(Wanted, said.decode(errors="replace").splitlines()[-1]))
+
     # Without a pipe nobody asks for anything.
     with suppress(PermissionError):
-        loop.add_reader(sys.stdin.fileno(), _point, player, loop)
+        loop.add_reader(sys.stdin.fileno(), point)
     while not ended.is_set() and os.getppid() == parent:
         if server.viewers:
             player.tick(time.monotonic())
         await asyncio.sleep(PERIOD)
     await server.close()
-
-
-def _point(player: Player, loop: asyncio.AbstractEventLoop) -> None:
-    """Shows what the last line of standard input asks for: a viewer writes each line at once."""
-    said = os.read(sys.stdin.fileno(), 1 << 16)
-    if not said:
-        loop.remove_reader(sys.stdin.fileno())
-        return
-    with suppress(Invalid):
-        player.show(read(Wanted, said.decode(errors="replace").splitlines()[-1]))
 
 
 if __name__ == "__main__":

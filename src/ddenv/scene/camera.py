@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from ddenv.scene import colors
 from ddenv.scene.draw import WORLD
@@ -63,16 +62,12 @@ def set_up(stage: Stage, view: View) -> None:
     for path in (("Grid",), ("Axes",), *(("Lights", name) for name in lights)):
         stage.show(path, False)
     stage.set(("Lights", "AmbientLight", DRAWN), "intensity", 0.62)
-    stage.draw_json(("Lights", "Sun"), _sun(view))
-    for name, color in zip(("top_color", "bottom_color"), colors.SKY, strict=True):
-        stage.set(("Background",), name, list(color))
-
-
-def _sun(view: View) -> dict[str, Any]:
     reach = 1.7 * view.radius
     sides = {"left": -reach, "right": reach, "top": reach, "bottom": -reach, "near": 0.1, "far": 8 * view.radius}
     camera = {"type": "OrthographicCamera", **sides}
     shadow = {"bias": -0.0004, "normalBias": 0.01, "radius": 2, "mapSize": [2048, 2048], "camera": camera}
     matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *view.sun, 1]
     light = {"type": "DirectionalLight", "color": 0xFFFAF2, "intensity": 0.62, "matrix": matrix}
-    return {**light, "castShadow": True, "shadow": shadow}
+    stage.draw_json(("Lights", "Sun"), {**light, "castShadow": True, "shadow": shadow})
+    for name, color in zip(("top_color", "bottom_color"), colors.SKY, strict=True):
+        stage.set(("Background",), name, list(color))

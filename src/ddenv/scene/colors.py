@@ -1,8 +1,6 @@
-"""Default colours of models, and colours of the marks that the scene adds: red, green, blue, alpha in 0..1."""
+"""Colours of models without their own, and of the marks that the scene adds: red, green, blue, alpha in 0..1."""
 
 from __future__ import annotations
-
-from ddenv.world.model import Model
 
 Color = tuple[float, float, float, float]
 
@@ -21,11 +19,6 @@ GHOST: Color = (0.06, 0.48, 0.46, 0.45)
 GHOST_TRAIL: Color = (0.06, 0.48, 0.46, 1.0)
 LEFT_OUT: Color = (0.55, 0.25, 0.75, 1.0)
 SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
-
-
-def default_color(model: Model) -> Color:
-    """The colour for whether the model can move."""
-    return STILL if model.static else MOVABLE
 
 
 def of_bytes(color: tuple[int, int, int]) -> Color:

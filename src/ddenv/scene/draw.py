@@ -74,8 +74,7 @@ class Scenery:
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
         self.surface = merge(surfaces)
-        self.ground = _ground(world)
-        self._draw_ground()
+        self.ground = self._draw_ground(world)
         self.wheels = wheels
         self._lowest = self._draw_robot()
         # The lowest and the highest corner of each model.
@@ -210,10 +209,15 @@ class Scenery:
             self.keys[model.name] = self.movers[model.name] = key
         return shape
 
-    def _draw_ground(self) -> None:
-        if self.ground is None:
-            return
-        pose = self.ground
+    def _draw_ground(self, world: World) -> Pose | None:
+        """Draws the plane that is highest at the origin, which may slope. Returns its pose there; None without planes."""
+        solids = [one for model in world.models if is_ground(model) for one in model.collisions]
+        planes = [one.pose for one in solids if isinstance(one.shape, Plane)]
+        places = [(height, plane) for plane in planes if (height := _height_of(plane, 0.0, 0.0)) is not None]
+        if not places:
+            return None
+        height, plane = max(places, key=lambda place: place[0])
+        pose = Pose((0.0, 0.0, height), plane.quaternion)
         sheet = mesh.box((GROUND_SIZE, GROUND_SIZE, 0.02)).at(pose @ Pose((0.0, 0.0, -0.01)))
         self._stage.draw((*WORLD, "ground"), plain(sheet, colors.GROUND, offset=2), shadow=False)
         half = GRID_SIZE / 2
@@ -221,6 +225,7 @@ class Scenery:
         across = np.array([[[x, -half, 0.002], [x, half, 0.002]] for x in at]).reshape(-1, 3)
         grid = Surface(np.concatenate([across, across[:, [1, 0, 2]]]), mesh.EMPTY.faces).at(pose)
         self._stage.draw((*WORLD, "grid"), lines(grid.vertices, colors.GRID), shadow=False)
+        return pose
 
     def _draw_robot(self) -> float:
         body = self.wheels.body
@@ -239,23 +244,6 @@ class Scenery:
                 self._stage.move((*GHOST, *place), pose)
         self._stage.show(GHOST, False)
         return lowest
-
-
-def _ground(world: World) -> Pose | None:
-    """The pose at the origin of the plane that is highest there, which may slope; None without planes."""
-    planes = (
-        collision.pose
-        for model in world.models
-        if is_ground(model)
-        for collision in model.collisions
-        if isinstance(collision.shape, Plane)
-    )
-    grounds = [
-        Pose((0.0, 0.0, height), plane.quaternion)
-        for plane in planes
-        if (height := _height_of(plane, 0.0, 0.0)) is not None
-    ]
-    return max(grounds, key=lambda ground: ground.position[2], default=None)
 
 
 def _height_of(plane: Pose, x: float, y: float) -> float | None:

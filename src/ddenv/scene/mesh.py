@@ -215,7 +215,7 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
 def paint(model: Model) -> list[Surface]:
     """All visuals of a model, in the frame of its poses, by transparency. A link without visuals shows its collisions."""
     groups: dict[float, list[Surface]] = {}
-    default = colors.default_color(model)
+    default = colors.STILL if model.static else colors.MOVABLE
     shown: list[Visual | Collision] = [item for link in model.links for item in link.visuals or link.collisions]
     for item in shown:
         color = (item.color if isinstance(item, Visual) else None) or default

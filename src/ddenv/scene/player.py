@@ -30,8 +30,7 @@ from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
 from ddenv.world.sdf.numbers import changed
 
-# Digits after the point: a hundredth of a millimetre.
-DIGITS = 5
+DIGITS = 5  # digits after the point: a hundredth of a millimetre
 
 
 class Player:
@@ -179,7 +178,12 @@ class Player:
         if any(row.test == following.test for row in self._live):
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
-            self._show_evidence()
+            self._evidence = self._state.evidence_test
+            samples = None if self._evidence is None else self._run.motion(self._evidence)
+            self._scenery.evidence(None if samples is None else table(samples))
+            if self._state.f_position is not None:
+                place, size = self._state.f_position, self._scenery.scale
+                mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
         self._show_parts()
         if following != self._shot:
             self._cut(following)
@@ -231,14 +235,6 @@ class Player:
         self._letters = self._scenery.parts(groups)
         if self._shot is not None:
             self._caption(self._shot, "")
-
-    def _show_evidence(self) -> None:
-        self._evidence = self._state.evidence_test
-        samples = None if self._evidence is None else self._run.motion(self._evidence)
-        self._scenery.evidence(None if samples is None else table(samples))
-        if self._state.f_position is not None:
-            place, size = self._state.f_position, self._scenery.scale
-            mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
 
 
 def _numbers(one: Parting) -> str:

@@ -52,8 +52,7 @@ _POLICY = {
     "connect-src": "'self' ws://127.0.0.1:* ws://localhost:*",
     "frame-ancestors": "'none'",
 }
-# Time between pings, s: lost browsers are noticed after about this time.
-_PING = 15
+_PING = 15  # time between pings, s: lost browsers are noticed after about this time
 # Maximum number of messages waiting for a slow browser before it skips some of the robot's moves.
 _CROWDED = 100
 

@@ -37,7 +37,12 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
         return shot_of_test(state, "live", next(same, running[0]))
     if state.status in ("baseline", "running") and before is not None and idle < HOLD:
         return before
-    test = _to_replay(state)
+    shown = [state.evidence_test] if state.evidence_test is not None else []
+    if state.waiting_candidate is not None and state.round is not None:
+        tests = state.tests_of(state.round.candidates[state.waiting_candidate].tests)
+        shown += [test.id for test in tests if test.outcome == "similar"]
+    finished = (test for test in reversed(state.tests) if test.is_finished)
+    test = next(reversed(state.tests_of(shown)), None) or next(finished, None)
     if test is None:
         return _shot(state, "start", None, frozenset(state.environment), "the robot at its start")
     return shot_of_test(state, "replay", test)
@@ -54,15 +59,6 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
     test = (running[:1] or similar[-1:] or tests[-1:])[0]
     kind = "live" if any(each.test == test.id for each in live) and running else "replay"
     return shot_of_test(state, kind, test, row)
-
-
-def _to_replay(state: RunState) -> Test | None:
-    shown = [state.evidence_test] if state.evidence_test is not None else []
-    if state.waiting_candidate is not None and state.round is not None:
-        tests = state.tests_of(state.round.candidates[state.waiting_candidate].tests)
-        shown += [test.id for test in tests if test.outcome == "similar"]
-    finished = (test for test in reversed(state.tests) if test.is_finished)
-    return next(reversed(state.tests_of(shown)), None) or next(finished, None)
 
 
 def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:

@@ -15,8 +15,7 @@ from meshcat.geometry import Object
 from ddenv.world.pose import Pose
 
 Path = tuple[str, ...]
-# At every path, the viewer keeps the object itself in a child of this name.
-DRAWN = "<object>"
+DRAWN = "<object>"  # at every path, the viewer keeps the object itself in a child of this name
 
 
 class Stage:

@@ -79,18 +79,14 @@ class Wheels:
             place = (to_first @ joint.pose).position
             to_wheel = Pose(place).inverse() @ to_first
             wheel = mesh.merge([item.at(to_wheel) for item in paint(links)])
-            spokes = _spokes(wheel, np.array((x, y, z)), drive.radius).painted(SPOKE_COLOR)
+            # Two bars that cross on the axis, on both faces of the wheel.
+            along = wheel.vertices @ (x, y, z) if len(wheel.vertices) else np.zeros(1)
+            width, middle = float(np.ptp(along)) + 2 * OUT, float(along.min() + along.max()) / 2
+            # The shortest turn from y, along which the bars are made, to the axis.
+            turn = (1 + y, z, 0.0, -x) if y > -1 + 1e-9 else (0.0, 1.0, 0.0, 0.0)
+            at = pose_of((middle * x, middle * y, middle * z, *turn))
+            long, thick = 1.7 * drive.radius, SPOKE * drive.radius
+            bars = [mesh.box(size).at(at) for size in ((long, width, thick), (thick, width, long))]
+            spokes = mesh.merge(bars).painted(SPOKE_COLOR)
             whole = replace(mesh.merge([wheel, spokes]), alpha=1.0)
             yield Wheel(f"wheel {number}", whole, place, (x, y, z), 0 if left else 1)
-
-
-def _spokes(wheel: Surface, axis: np.ndarray, radius: float) -> Surface:
-    """Two bars that cross on the axis, on both faces of a wheel around the origin."""
-    along = wheel.vertices @ axis if len(wheel.vertices) else np.zeros(1)
-    width, middle = float(np.ptp(along)) + 2 * OUT, float(along.min() + along.max()) / 2
-    # The shortest turn from y, along which the bars are made, to the axis.
-    x, y, z = axis.tolist()
-    turn = (1 + y, z, 0.0, -x) if y > -1 + 1e-9 else (0.0, 1.0, 0.0, 0.0)
-    at = pose_of((*(middle * axis), *turn))
-    sizes = (1.7 * radius, width, SPOKE * radius), (SPOKE * radius, width, 1.7 * radius)
-    return mesh.merge([mesh.box(size).at(at) for size in sizes])

@@ -1,14 +1,19 @@
-"""Shapes of collisions: the robot runs into them, and moving ones lie where they should without creeping."""
+"""Shapes of collisions: the robot runs into them, moving ones lie without creeping, and wheels grip them as in Gazebo."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, CoulombFriction
 
-from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of, resting_corners
+from ddenv.robot.drake.shapes import wheel_friction, world_friction
 from ddenv.robot.simulation.template import Template
-from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
+from ddenv.world.drive import find_drive
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.whole import whole_of
 from tests.robot.conftest import link_of, model_of, wedge
@@ -69,63 +74,76 @@ def test_a_moving_shape_falls_and_then_rests_on_the_ground(world_of, add, husky,
     assert np.linalg.norm(rows[-1, 1:4] - rows[10, 1:4]) < 0.002
 
 
-@pytest.mark.parametrize("shape", [Box((0.4, 0.3, 0.2)), Cylinder(0.2, 0.3), HULL, wedge(0.4, 0.5, 0.3)])
-def test_corner_spheres_lie_just_inside(shape):
-    low, high = shape_bounds(shape, Pose())
-    corners = np.array(corners_of(shape))
-    assert (corners.min(axis=0) - CORNER_RADIUS >= low - 1e-9).all()
-    assert (corners.max(axis=0) + CORNER_RADIUS <= high + 1e-9).all()
-    assert corners.min(axis=0) - CORNER_RADIUS == pytest.approx(low, abs=0.007)
-    assert corners.max(axis=0) + CORNER_RADIUS == pytest.approx(high, abs=0.007)
-
-
-def test_a_mesh_of_many_corners_gets_32_spread_over_it():
-    turns = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    rim = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
-    vertices = np.vstack([rim, rim + np.array([0, 0, 1])])
-    number = np.arange(100)
-    after = (number + 1) % 100
-    sides = [np.column_stack(three) for three in ((number, after, after + 100), (number, after + 100, number + 100))]
-    caps = [np.column_stack([np.full(98, 0), number[2:], number[1:-1]])]
-    caps += [np.column_stack([np.full(98, 100), number[1:-1] + 100, number[2:] + 100])]
-    corners = np.array(corners_of(Mesh("drum", vertices, np.vstack([*sides, *caps]))))
-    assert len(corners) == 32
-    assert np.linalg.norm(corners[:, :2], axis=1) == pytest.approx(np.ones(32), abs=0.01)
-    for end in (corners[corners[:, 2] < 0.5], corners[corners[:, 2] > 0.5]):
-        angles = np.sort(np.arctan2(end[:, 1], end[:, 0]))
-        assert np.diff([*angles, angles[0] + 2 * np.pi]).max() < 1.0
-
-
 def test_the_floor_is_below_the_lowest_surface_of_the_world(world_of, add, scenario_of):
     pit = model_of("pit", link_of("link", wedge(1.0, 1.0, 1.0), Pose((0.0, 0.0, -4.0)), mass=None))
     assert whole_of(add(world_of(), pit), scenario_of()).floor == pytest.approx(-6.5)
     assert whole_of(world_of(), scenario_of()).floor == -2.0
 
 
-def tile(across: int) -> list[Collision]:
-    """A tile of `across` times `across` boxes, 0.5 m apart, with every other one a step higher."""
-    places = [(0.5 * i, 0.5 * j, 0.1 * ((i + j) % 2)) for i in range(across) for j in range(across)]
-    return [Collision("box", Box((0.5, 0.5, 0.2)), Pose(place), 0.5) for place in places]
+coefficients = st.floats(0, 1e6) | st.sampled_from([0.0, 1e-300, 1.0, 1000.0])
 
 
-def test_a_link_of_few_shapes_rests_on_all_of_their_corners():
-    collisions = tile(2)
-    assert resting_corners(collisions) == [corners_of(each.shape) for each in collisions]
+def combined(a: float, b: float) -> float:
+    """What Drake makes of two surfaces."""
+    return CalcContactFrictionFromSurfaceProperties(CoulombFriction(a, a), CoulombFriction(b, b)).static_friction()
 
 
-def test_a_link_of_many_shapes_rests_on_the_outermost_corners():
-    collisions = tile(6)
-    rests = resting_corners(collisions)
-    assert len(rests) == 36
-    assert all(set(some) <= set(corners_of(each.shape)) for some, each in zip(rests, collisions, strict=True))
-    places = np.array(
-        [(each.pose @ Pose(corner)).position for each, some in zip(collisions, rests, strict=True) for corner in some]
+@given(coefficients, st.floats(0.01, 10))
+def test_between_a_wheel_and_the_world_the_smaller_coefficient_counts(mu, wheels):
+    assert combined(world_friction(mu, wheels), wheels) == pytest.approx(min(mu, wheels), abs=1e-12)
+
+
+@given(st.floats(1e-6, 1e6), st.floats(1e-6, 1e6), st.floats(0.01, 10))
+def test_within_the_world_at_least_half_the_smaller_and_at_most_the_smaller(a, b, wheels):
+    smaller = min(a, b, wheels)
+    assert 0.499 * smaller <= combined(world_friction(a, wheels), world_friction(b, wheels)) <= 1.001 * smaller
+
+
+@given(st.floats(1e-6, 1e6), st.floats(1e-6, 10), st.floats(0.01, 10))
+def test_of_the_rest_of_the_robot_at_least_half_the_smaller_and_at_most_twice(mu, part, wheels):
+    smaller = min(mu, part, wheels)
+    assert 0.499 * smaller <= combined(world_friction(mu, wheels), part)
+    assert combined(world_friction(mu, wheels), part) <= 2.001 * min(mu, part)
+
+
+def test_wheels_without_friction_make_all_ground_slippery():
+    assert world_friction(1.0, 0.0) == 0.0
+    assert combined(world_friction(1.0, 0.0), 0.0) == 0.0
+
+
+def test_the_grippiest_wheel_counts_and_the_hull_does_not(husky):
+    def with_mu(link, mu):
+        return replace(link, collisions=tuple(replace(one, mu=mu) for one in link.collisions))
+
+    links = tuple(
+        with_mu(link, {"front_left_wheel_link": 0.7, "rear_right_wheel_link": 0.9}.get(link.name, 0.5))
+        if "wheel" in link.name
+        else with_mu(link, 7.0)
+        for link in husky.links
     )
-    every = np.array([(each.pose @ Pose(corner)).position for each in collisions for corner in corners_of(each.shape)])
-    assert len(places) < 64
-    # As wide as the whole tile, on top and below.
-    assert places.min(axis=0) == pytest.approx(every.min(axis=0)) and places.max(axis=0) == pytest.approx(
-        every.max(axis=0)
+    assert wheel_friction(replace(husky, links=links), find_drive(husky)) == 0.9
+    assert wheel_friction(husky, find_drive(husky)) == 1.5
+
+
+def drive(world_of, husky, scenario_of, box, mu: float):
+    """A run that speeds up as hard as the ground of friction `mu` lets it."""
+    ground = box("floor", "0 0 0.05 0 0 0", "60 20 0.1", mu=mu)
+    scenario = scenario_of(
+        failure={"timeout": 3.0},
+        goal={"x": 90, "y": 0},
+        robot={"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.24}},
+        controller={"speed": 5.0, "acceleration": 5.0},
     )
-    low = places[places[:, 2] == every[:, 2].min()]
-    assert np.ptp(low[:, 0]) > 2 and np.ptp(low[:, 1]) > 2
+    return Template(world_of(ground), husky, scenario).run(frozenset({"floor"}), seed=1)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.02, 0.1])
+def test_spinning_wheels_push_with_mu_times_the_weight(world_of, husky, scenario_of, box, mu):
+    rows = drive(world_of, husky, scenario_of, box, mu).trajectory
+    speed = np.gradient(rows[:, 1], rows[:, 0])
+    assert (speed[25] - speed[10]) / (rows[25, 0] - rows[10, 0]) == pytest.approx(mu * 9.81, rel=0.01, abs=1e-3)
+
+
+def test_ground_that_is_rougher_than_the_wheels_is_all_the_same(world_of, husky, scenario_of, box):
+    runs = [drive(world_of, husky, scenario_of, box, mu).trajectory.tobytes() for mu in (1.5, 100.0, 1000.0)]
+    assert runs[0] == runs[1] == runs[2]

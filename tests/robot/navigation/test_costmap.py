@@ -24,23 +24,6 @@ def to_barrel(points: np.ndarray) -> np.ndarray:
     return np.hypot(points[:, 0] - 3.0, points[:, 1] - 1.0)
 
 
-@pytest.mark.parametrize("at", [AT_START, Estimate(1.0, -2.0, 1.2), Estimate(5.0, 1.0, -3.0)])
-def test_beams_end_where_the_barrel_is(at):
-    costmap = Costmap(setup((9, 0)))
-    costmap.see(look(BARREL, at), at)
-    assert len(costmap.points) >= 3
-    assert to_barrel(costmap.points) == pytest.approx(0.3, abs=1e-6)
-
-
-def test_what_went_away_is_cleared_where_beams_pass():
-    costmap = Costmap(setup((9, 0)))
-    costmap.see(look(BARREL, AT_START), AT_START)
-    version = costmap.version
-    costmap.see(look(Ground(), AT_START), AT_START)
-    assert not len(costmap.points)
-    assert costmap.version > version
-
-
 def test_noise_makes_no_other_map():
     costmap, random = Costmap(setup((9, 0))), np.random.default_rng(0)
     for number in range(30):
@@ -61,19 +44,6 @@ def test_what_is_out_of_sight_is_kept():
     turned = Estimate(0.0, 0.0, math.pi + math.atan2(1, 3))
     costmap.see(look(Ground(), turned), turned)
     assert costmap.points == pytest.approx(seen)
-
-
-def test_the_map_rolls_with_the_robot():
-    costmap = Costmap(setup((9, 0)))
-    costmap.see(look(BARREL, AT_START), AT_START)
-    for x in (3.0, 8.0):
-        at = Estimate(x, 0.0, 0.0)
-        costmap.see(look(BARREL, at), at)
-        assert len(costmap.points)
-        assert to_barrel(costmap.points) == pytest.approx(0.3, abs=1e-6)
-    at = Estimate(9.5, 0.0, 0.0)
-    costmap.see(look(BARREL, at), at)
-    assert not len(costmap.points)
 
 
 def test_ground_that_a_tilted_robot_sees_is_no_obstacle():

@@ -30,13 +30,6 @@ def test_turns_to_a_goal_behind():
     assert is_there(drive(setup((-5, 0.5)), Ground()), (-5, 0.5))
 
 
-def test_around_a_wall():
-    ground = Ground(walls=((4, -2, 4, 2),))
-    drove = drive(setup((8, 0)), ground)
-    assert is_there(drove, (8, 0))
-    assert min(drove.rooms(ground)) > 0.05
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 def test_among_barrels_within_its_limits(seed):
     ground = Ground(circles=tuple((2 + 1.7 * n, (-1) ** (n + seed) * 0.4 * (n % 3), 0.3) for n in range(6)))
@@ -114,10 +107,3 @@ def test_goes_on_when_an_obstacle_went_away():
     closed = Ground(walls=((4, -30, 4, 30),))
     drove = drive(setup((8, 0)), lambda time: closed if time < 6 else Ground(), until=40)
     assert is_there(drove, (8, 0))
-
-
-def test_the_same_again():
-    ground = Ground(circles=((4, 0.2, 0.3),))
-    first, second = (drive(setup((7, 0)), ground, seed=3) for _ in range(2))
-    assert first.poses == second.poses
-    assert first.twists == second.twists

@@ -53,10 +53,6 @@ def wall(ax: float, ay: float, bx: float, by: float) -> np.ndarray:
     return np.column_stack([np.linspace(ax, bx, count), np.linspace(ay, by, count)])
 
 
-def gap(width: float) -> np.ndarray:
-    return np.concatenate([wall(3, -9, 3, -width / 2), wall(3, width / 2, 3, 9)])
-
-
 def test_straight_where_nothing_is():
     planner = Planner(setup((20.0, 3.0)))
     assert planner.plan(np.empty((0, 2)), 1.0, 0.0).corners == [(1.0, 0.0), (20.0, 3.0)]
@@ -72,21 +68,6 @@ def test_around_a_wall():
     assert planner.room(path, points) >= HUSKY[2] + 0.05 - 1e-6
     shortest = 2 * math.hypot(1.45, 3) + 0.1
     assert path.left <= 1.2 * shortest
-
-
-def test_through_a_gap_across_it():
-    path = Planner(setup((5.5, 0.0))).plan(gap(1.1), 1.0, -2.0)
-    corners = np.array(path.corners)
-    through = np.flatnonzero((corners[:-1, 0] < 3) & (corners[1:, 0] > 3))
-    (leg,) = through
-    way = corners[leg + 1] - corners[leg]
-    assert abs(math.atan2(way[1], way[0])) < 0.1
-    assert corners[leg, 0] < 3 - HUSKY[0]
-    assert corners[leg + 1, 0] > 3 + HUSKY[1]
-
-
-def test_not_through_a_gap_that_is_too_narrow():
-    assert Planner(setup((5.5, 0.0))).plan(gap(0.7), 1.0, 0.0) is None
 
 
 def test_to_the_border_when_the_goal_is_beyond():

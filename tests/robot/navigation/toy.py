@@ -109,11 +109,10 @@ def drive(
     slips: Callable[[float], bool] = lambda time: False,
     blind: bool = False,
     seed: int = 0,
-    navigator: Navigator | None = None,
 ) -> Drive:
     """Drives until the robot has arrived or given up, at most `until` s; while it `slips` it does not move."""
     random = np.random.default_rng(seed)
-    drove = Drive(navigator or Navigator(given))
+    drove = Drive(Navigator(given))
     x, y, heading = start
     twist = Twist(0.0, 0.0)
     for tick in range(round(until / PERIOD)):

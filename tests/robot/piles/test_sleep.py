@@ -9,6 +9,7 @@ import pytest
 
 from ddenv.robot.drake.plant import MANY
 from ddenv.robot.piles import rehearsal
+from ddenv.robot.piles.sleep import BEARS, BORE, GRAVITY, Loads
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
@@ -226,19 +227,6 @@ def test_what_falls_out_of_the_world_is_left_alone(add, world_of, husky, scenari
 
 
 @pytest.mark.rates
-def test_a_run_leaves_no_trace_in_the_next(template):
-    tower = [cube(f"storey_{number}", 2.0, 0.0, 0.15 + 0.3 * number) for number in range(2)]
-    models = (*tower, cube("far", 3.0, 3.0, 0.5), flap("flap", 1.0, -3.0))
-    names = [model.name for model in models]
-    used = template(*models)
-    first = run(used, *names)
-    for keep in ((), names[:1], names[1:], names[::2]):
-        run(used, *keep, seed=2)
-    assert bits(run(used, *names)) == bits(first)
-    assert bits(run(template(*models), *names)) == bits(first)
-
-
-@pytest.mark.rates
 def test_what_moves_longer_than_it_could_be_rehearsed_goes_on_moving(template, monkeypatch):
     swing = flap("flap", 1.0, -3.0, lower=-np.inf, damping=0.0)
     whole = run(template(swing), "flap").motions["flap"]
@@ -297,3 +285,61 @@ def test_without_gravity_a_model_floats_until_it_is_pushed(template):
     result = run(template(*floating), "far", "near")
     assert set(result.motions) == {"near"}
     assert result.motions["near"][-1, 1] > 2.0
+
+
+MASS = 2.0
+WEIGHT = MASS * GRAVITY
+YES, NO = np.array([True]), np.array([False])
+
+
+class Pressed(Loads):
+    """One model on which the robot presses with `force`, N."""
+
+    force = 0.0
+
+    def _forces(self):
+        return np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, -self.force]]])
+
+    def lie_down(self) -> None:
+        self.note(NO, YES)
+        self.note(YES, NO)
+
+
+@pytest.fixture
+def loads(world_of, add, husky, scenario_of):
+    board = model_of("board", link_of("link", Box((0.9, 0.1, 0.04)), Pose((3.0, 0.0, 0.02)), MASS))
+    context = Template(add(world_of(), board), husky, scenario_of()).context
+    loads = Pressed(context, list(context.built.moving.values()))
+    loads.lie_down()
+    return loads
+
+
+def wakes(loads: Pressed, force: float) -> bool:
+    loads.force = force
+    return bool(loads.changed(seconds=1.0)[0])
+
+
+def test_a_model_bears_a_few_times_its_weight(loads):
+    assert not wakes(loads, 0.9 * BEARS * WEIGHT)
+    assert wakes(loads, 1.1 * BEARS * WEIGHT)
+
+
+@pytest.mark.parametrize("stayed", [True, False])
+def test_a_change_that_moved_nothing_wakes_the_model_no_second_time(loads, stayed):
+    change = 2 * BEARS * WEIGHT
+    assert wakes(loads, change)
+    loads.woke(YES, YES)
+    if stayed:
+        loads.bore(YES)
+    loads.lie_down()
+    # It lies under that load now; it changes back, and by a little more than it is known to bear.
+    assert wakes(loads, 0.0) != stayed
+    assert wakes(loads, (1 + 1.1 * BORE) * change)
+
+
+def test_what_woke_otherwise_is_not_known_to_bear_more(loads):
+    assert wakes(loads, 2 * BEARS * WEIGHT)
+    loads.woke(YES, NO)
+    loads.bore(YES)
+    loads.lie_down()
+    assert wakes(loads, 0.0)

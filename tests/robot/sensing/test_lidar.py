@@ -77,15 +77,6 @@ def test_noise_is_as_large_as_it_is_set():
     assert errors.std() == pytest.approx(0.02, rel=0.03)
 
 
-def test_the_same_seed_gives_the_same_noise_and_another_seed_other_noise():
-    def ranges(seed: int) -> list[bytes]:
-        lidar = lidar_of(WALL, settings=plain(noise=0.01), seed=seed)
-        return [scan(lidar).ranges.tobytes() for _ in range(3)]
-
-    assert ranges(1) == ranges(1)
-    assert len({*ranges(1), *ranges(2)}) == 6
-
-
 def test_the_noise_of_a_beam_does_not_depend_on_what_others_meet():
     near = still("near", Box((0.2, 0.2, 0.2)), Pose((1.0, 0.0, 0.0)))
     settings = plain(noise=0.01)
@@ -109,38 +100,12 @@ def test_a_scan_is_the_same_whatever_else_is_asked_for():
     assert set(first.first_seen) == {"ball", "hidden", "wall"}
 
 
-def test_scans_on_the_way_are_those_that_a_lidar_takes_first_there():
-    random = np.random.default_rng(3)
-    floor = still("floor", Plane((1.0, 1.0)), Pose((0.0, 0.0, -0.1)))
-    boxes = [
-        still(f"box{number}", Box((0.4, 0.6, 0.1)), Pose.from_rpy(*random.uniform((-9, -9, -0.3), (9, 9, 0.3)), *turn))
-        for number, turn in enumerate(random.uniform(-0.5, 0.5, (60, 3)))
-    ]
-    settings = plain(range=4.0, x=0.3)
-    lidar, others = lidar_of(floor, *boxes, settings=settings), 0
-    for number in range(60):
-        tilt = 0.012 * math.sin(number / 3), 0.012 * math.cos(number / 5)
-        pose = Pose.from_rpy(0.1 * number - 3.0, 0.0, 0.02 * math.sin(number), *tilt, number / 30)
-        ranges = scan(lidar, pose).ranges
-        others += np.isfinite(ranges).sum()
-        np.testing.assert_array_equal(ranges, scan(lidar_of(floor, *boxes, settings=settings), pose).ranges)
-    assert others > 1000
-
-
 def test_a_scan_can_be_copied_and_stored():
     taken = scan(lidar_of(WALL, settings=plain(noise=0.01)))
     nearer = replace(taken, ranges=taken.ranges / 2)
     stored = pickle.loads(pickle.dumps(taken))
     np.testing.assert_array_equal(stored.ranges, taken.ranges)
     np.testing.assert_array_equal(nearer.ranges * 2, taken.ranges)
-
-
-def test_a_removed_model_is_looked_through():
-    near = ball("near", 1.5)
-    assert ahead(lidar_of(near, WALL)) == pytest.approx(1.0)
-    assert ahead(lidar_of(near, WALL, present={"wall"})) == pytest.approx(3.0)
-    assert ahead(lidar_of(near, WALL, present=())) == math.inf
-    assert ahead(lidar_of()) == math.inf
 
 
 def test_links_are_where_their_poses_say_in_the_order_of_the_models():
@@ -165,14 +130,6 @@ def test_a_link_that_is_fixed_in_the_world_stays():
     nowhere = Pose((50.0, 0.0, 0.0))
     assert ahead(lidar, Pose(), nowhere, nowhere) == pytest.approx(2.0)
     assert ahead(lidar, Pose(), nowhere, Pose((1.1, 0.0, 0.0))) == pytest.approx(1.0)
-
-
-def test_a_shape_away_from_its_links_origin_turns_about_that():
-    model = loose("board", Box((0.2, 1.0, 0.2)), Pose((3.0, 0.0, 0.0)))
-    (link,) = model.links
-    at_origin = model_of("board", link_of("link", link.collisions[0].shape, Pose()))
-    assert ahead(lidar_of(model), Pose(), Pose.from_rpy(3.0, 0.0, 0.0, 0.0, 0.0, math.pi / 2)) == pytest.approx(2.5)
-    assert ahead(lidar_of(at_origin), Pose(), Pose((3.0, 0.0, 0.0))) == pytest.approx(2.9)
 
 
 def test_models_are_seen_when_a_beam_first_ends_on_them():

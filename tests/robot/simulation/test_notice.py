@@ -13,7 +13,7 @@ from ddenv.robot.simulation.taking_part import ENDLESS, Hull
 from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
-from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, noticed, run
+from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, run
 from tests.tiers import slow
 
 WALL = box_model("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")
@@ -50,17 +50,6 @@ def test_what_is_touched_at_the_start_and_at_the_end_counts(world_of, husky, sce
     short = Template(world_of(WALL), husky, scenario_of(**low | {"failure": {"timeout": end}}))
     assert run(short, "wall").first_touched == whole.first_touched
     assert run(short, "wall").simulated_seconds == end
-
-
-@pytest.mark.rates
-def test_the_tiles_of_the_ditch_are_touched_in_driving_order(ditch, ditch_world):
-    result = ditch.run(frozenset(ditch_world.elements()), seed=0)
-    names = ["asphalt_near", "rough_tile_10", "rough_tile_11", "rough_tile_20", "asphalt_far"]
-    assert list(result.first_touched) == names
-    times = list(result.first_touched.values())
-    assert times == sorted(set(times))
-    # It is blind, and high above the ground plane.
-    assert result.first_sensed == result.first_touched
 
 
 def test_what_is_within_range_is_sensed_before_it_is_touched(world_of, husky, scenario_of):
@@ -178,109 +167,34 @@ def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husk
     assert bits(bare) == bits(result)
 
 
-@pytest.mark.rates
-def test_noticing_changes_no_bit_of_a_run_in_the_ditch(ditch, ditch_world, monkeypatch):
-    keep = frozenset(ditch_world.elements())
-    for seed in (0, 3):
-        result = ditch.run(keep, seed)
-        bare = without_noticing(monkeypatch, lambda seed=seed: ditch.run(keep, seed))
-        assert result.first_touched
-        assert bits(bare) == bits(result)
-
-
-@pytest.mark.rates
-def test_a_used_template_notices_the_same_as_a_fresh_one(world_of, add, husky, scenario_of):
-    crate = model_of("crate", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.0, 0.2, 0.15))))
-    world = add(world_of(WALL, box_model("post", "0 -2 0.5 0 0 0", "0.2 0.2 1")), crate)
-    scenario = scenario_of(sensors={"view_range": 1.5, "view_angle": 2.0}, failure={"timeout": 3.0})
-    used = Template(world, husky, scenario)
-    first = run(used, "wall", "crate", "post")
-    assert set(first.first_touched) == {"ground", "crate"}
-    assert set(first.first_sensed) == {"ground", "crate", "wall"}
-    run(used, "post", seed=2)
-    run(used, "crate", seed=3)
-    assert noticed(run(used, "wall", "crate", "post")) == noticed(first)
-    assert noticed(run(Template(world, husky, scenario), "wall", "crate", "post")) == noticed(first)
-
-
-@pytest.mark.rates
-def test_contacts_that_cannot_be_worked_out_are_the_next_steps_to_report(world_of, husky, scenario_of):
-    template = Template(world_of(WALL), husky, scenario_of())
-    before = run(template, "wall")
-
-    def poison(_time: float, pose: tuple[float, ...], _models: object) -> None:
-        state = template.context.plant_context.get_mutable_discrete_state_vector()
-        if pose[0] > 0.75:
-            state.SetFromVector(np.full(state.size(), np.nan))
-
-    broken = template.run(frozenset({"wall"}), 1, poison)
-    assert (broken.outcome, broken.failure) == ("error", "not-finite")
-    assert broken.first_touched == {"ground": before.first_touched["ground"]}
-    assert noticed(run(template, "wall")) == noticed(before)
-
-
-def boxes(*places: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes from x0, y0, x1, y1 and, if it is not on the eye's height, z0, z1."""
-    rows = np.array([place if len(place) == 6 else (*place, -0.5, 0.5) for place in places])
-    return rows[:, [0, 1, 4]], rows[:, [2, 3, 5]]
-
-
-@pytest.mark.parametrize(
-    ("box", "view_range", "degrees", "seen"),
-    [
-        ((2, -1, 3, 1), 2.0, 90, True),
-        ((2, -1, 3, 1), 1.9, 90, False),
-        ((-3, -1, -2, 1), 5.0, 90, False),
-        ((-3, -1, -2, 1), 5.0, 360, True),
-        # It lies across an edge of the view, with no corner in it.
-        ((1, 0.5, 1.5, 9), 5.0, 90, True),
-        ((-9, 2, 9, 3), 5.0, 90, True),
-        ((-9, 2, 9, 3), 2.5, 90, False),
-        # All around the eye, above it, too high above it.
-        ((-1, -1, 1, 1), 0.1, 1, True),
-        ((-1, -1, 1, 1, 1, 2), 1.0, 1, True),
-        ((-1, -1, 1, 1, 1, 2), 0.9, 1, False),
-        # Along the edge behind, where directions jump by a whole turn.
-        ((-3, 0.1, -2, 0.2), 5.0, 359, True),
-        ((-3, -0.001, -2, 0.001), 5.0, 350, False),
-        ((-3, -1, -2, 1), 5.0, 350, True),
-    ],
-)
-def test_a_box_is_in_view_if_some_part_of_it_is_near_enough_and_within_the_field_of_view(
-    box, view_range, degrees, seen
-):
-    low, high = boxes(box)
-    for turns in (-1, 0, 1):
-        heading = np.array([turns * math.tau])
-        assert in_view(low, high, np.zeros(3), heading, view_range, math.radians(degrees)).tolist() == [seen]
-
-
 def test_in_view_agrees_with_looking_at_many_points_of_each_box():
     random = np.random.default_rng(3)
     low = random.uniform(-4, 4, (300, 3)) * (1, 1, 0.3)
     high = low + random.uniform(0.2, 4, (300, 3))
-    heading, view_range, view_angle = 2.5, 2.5, math.radians(100)
+    view_range = 2.5
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 41)] * 2, [0.0, 0.5, 1.0]), axis=-1).reshape(-1, 3)
 
-    def some(view_range: float, view_angle: float) -> np.ndarray:
+    def some(heading: float, view_range: float, view_angle: float) -> np.ndarray:
         points = low[:, None] + grid * (high - low)[:, None]
         points[:, :, 2] = np.clip(0.0, low[:, None, 2], high[:, None, 2])
         offset = np.arctan2(points[..., 1], points[..., 0]) - heading
         ahead = np.abs(np.remainder(offset + math.pi, math.tau) - math.pi) <= view_angle / 2
         return (ahead & (np.linalg.norm(points, axis=2) <= view_range)).any(axis=1)
 
-    seen = in_view(low, high, np.zeros(3), np.array([heading]), view_range, view_angle)
-    # All that some point is in view of, and nothing that is out of a slightly wider view.
-    assert 30 < seen.sum() < 270
-    assert (seen | ~some(view_range, view_angle)).all()
-    assert (~seen | some(view_range + 0.15, view_angle + 0.1)).all()
+    for heading, view_angle in ((2.5, 1.7), (math.pi, 1.6), (-2.5, 5.0), (0.0, math.tau)):
+        seen = in_view(low, high, np.zeros(3), np.array([heading]), view_range, view_angle)
+        # All that some point is in view of, and nothing that is out of a slightly wider view.
+        assert 30 < seen.sum() < 290
+        assert (seen | ~some(heading, view_range, view_angle)).all()
+        assert (~seen | some(heading, view_range + 0.15, view_angle + 0.1)).all()
 
 
 def reach_of(robot):
     return Hull.of(robot).reach
 
 
-def test_reach_is_that_of_the_farthest_part_however_the_joints_stand():
+def test_reach_is_that_of_the_farthest_part_however_the_joints_stand(husky):
+    assert reach_of(husky) < 1.0
     base = link_of("base", Box((0.6, 0.8, 0.0001)), Pose((5.0, 0.0, 1.0)))
     # Folded back over the base, with its hinge 1 m ahead.
     arm = link_of("arm", Sphere(0.2), Pose((5.0, 0.0, 1.0)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +12,6 @@ from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.simulation import taking_part
-from ddenv.robot.simulation.taking_part import Hull
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
@@ -205,17 +203,3 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     assert not is_implied(worlds["asleep"], everything["asleep"])
     monkeypatch.setattr(Variants, "ties", lambda *_: [])
     assert not is_implied(worlds["ties"], everything["ties"], more["ties"])
-
-
-def test_the_hull_holds_the_robot_whatever_its_wheels_do(husky):
-    hull = Hull.of(husky)
-    assert len(hull.centers) == len([link for link in husky.links if link.collisions])
-    low, high = hull.bounds(Pose())
-    assert (high.max(axis=0) - low.min(axis=0) < (1.3, 1.1, 0.7)).all()
-    assert hull.reach < 1.0
-    loose = model_of(
-        "loose", link_of("a", Box((1, 1, 1)), Pose(), 1.0), link_of("b", Sphere(0.1), Pose((3, 0, 0)), 1.0)
-    )
-    low, high = Hull.of(loose).bounds(Pose((1.0, 2.0, 0.0)))
-    assert np.isfinite(low).all()
-    assert (high - low).max() > 1e8

@@ -1,4 +1,4 @@
-"""One template, many runs: how they end, who may listen, and that no run leaves a trace in the next."""
+"""One world, many runs: how they end, who may listen, and that no run leaves a trace; also in smaller plants for what is left."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ import pytest
 
 from ddenv.engine.mcap_file import Streams
 from ddenv.errors import UserError
-from ddenv.robot.simulation.template import Template
-from ddenv.world.model import Sphere
+from ddenv.robot.simulation import template as variants
+from ddenv.robot.simulation.template import Template, Variants
+from ddenv.runs.subject import load_parts
+from ddenv.world.load import SCENARIOS, load_scenario
+from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
-from tests.robot.conftest import joint_of, link_of, model_of
+from ddenv.world.scenario import Scenario
+from tests.robot.conftest import all_bits, cube, joint_of, link_of, model_of
+from tests.tiers import slow
 
 NOTHING = frozenset()
 
@@ -43,25 +48,11 @@ def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(world_of
     assert np.linalg.norm(trajectory[:, 4:], axis=1) == pytest.approx(np.ones(14))
 
 
-def test_turns_round_to_a_goal_behind_it(world_of, husky, scenario_of):
-    result = Template(world_of(), husky, scenario_of(goal={"x": -2.0, "y": 1.0})).run(NOTHING, seed=1)
-    assert result.outcome == "pass"
-
-
 def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
     spawn = {"x": 1.5, "y": -2.0, "z": 0.14, "yaw": 1.0}
     scenario = scenario_of(robot={"model": "husky.sdf", "spawn": spawn}, failure={"timeout": 0.1})
     start = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory[0]
     assert start[1:] == pytest.approx([1.5, -2.0, 0.14, np.cos(0.5), 0, 0, np.sin(0.5)])
-
-
-def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_of, husky, scenario_of, box):
-    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
-    blocked = template.run(frozenset({"wall"}), seed=1)
-    assert (blocked.outcome, blocked.failure) == ("failed", "stuck")
-    assert blocked.simulated_seconds == pytest.approx(10.0)
-    assert blocked.end_pose[0] < 1.1
-    assert template.run(NOTHING, seed=1).outcome == "pass"
 
 
 def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(world_of, husky, scenario_of):
@@ -95,18 +86,17 @@ def test_unknown_models_are_refused(world_of, husky, scenario_of):
         Template(world_of(), husky, scenario_of()).run(frozenset({"wal"}), seed=1)
 
 
-def test_progress_gets_every_row(world_of, husky, scenario_of):
-    reported = []
-    template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
-    result = template.run(NOTHING, 1, lambda time_s, pose, _: reported.append((time_s, *pose)))
-    assert np.array(reported).tobytes() == result.trajectory.tobytes()
-
-
-def test_progress_gets_the_models_that_can_move(world_of, husky, scenario_of, box):
+def test_progress_gets_every_row_and_the_models_that_can_move(world_of, husky, scenario_of, box):
     world = world_of(box("ball", "2 0 0.2 0 0 0", "0.4 0.4 0.4", mass=5.0), box("wall", "9 0 1 0 0 0", "1 1 2"))
-    places = []
+    rows, places = [], []
+
+    def hear(time_s: float, pose: tuple[float, ...], models: dict) -> None:
+        rows.append((time_s, *pose))
+        places.append(models)
+
     template = Template(world, husky, scenario_of(failure={"timeout": 6.0}))
-    result = template.run(frozenset({"ball", "wall"}), 1, lambda *told: places.append(told[2]))
+    result = template.run(frozenset({"ball", "wall"}), 1, hear)
+    assert np.array(rows).tobytes() == result.trajectory.tobytes()
     assert {name for models in places for name in models} == {"ball"}
     assert np.array([models["ball"] for models in places]).tobytes() == result.motions["ball"][:, 1:].tobytes()
 
@@ -140,30 +130,16 @@ def test_what_breaks_in_progress_is_the_callers(world_of, husky, scenario_of, bo
     assert same(template.run(wall, seed=1), before)
 
 
-def test_other_seeds_give_other_noise(world_of, husky, scenario_of):
-    template = Template(world_of(), husky, scenario_of())
-    assert not same(template.run(NOTHING, seed=1), template.run(NOTHING, seed=2))
-
-
 def test_a_world_drake_cannot_simulate_is_the_users(world_of, add, husky, scenario_of):
     ghost = replace(model_of("ghost", link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)), mass=None)), static=False)
-    with pytest.raises(UserError, match=r"ghost.*no <inertial>"):
-        Template(add(world_of(), ghost), husky, scenario_of())
-
-
-def test_impossible_inertia_is_the_users(world_of, add, husky, scenario_of):
     heavy = link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)))
-    heavy = replace(heavy, inertia=replace(heavy.inertia, moments=(1.0, 1.0, 9.0)))
-    with pytest.raises(UserError, match="cannot be simulated"):
-        Template(add(world_of(), model_of("heavy", heavy)), husky, scenario_of())
-
-
-def test_models_that_move_in_a_loop_are_the_users(world_of, add, husky, scenario_of):
+    heavy = model_of("heavy", replace(heavy, inertia=replace(heavy.inertia, moments=(1.0, 1.0, 9.0))))
     links = [link_of(name, Sphere(0.1), Pose((float(x), 3.0, 1.0))) for x, name in enumerate("abc")]
     pairs = (("a", "b"), ("b", "c"), ("a", "c"))
     loop = model_of("loop", *links, joints=tuple(joint_of("ball", *pair, (0.0, 3.0, 1.0)) for pair in pairs))
-    with pytest.raises(UserError, match="cannot be simulated"):
-        Template(add(world_of(), loop), husky, scenario_of())
+    for model, complaint in ((ghost, r"ghost.*no <inertial>"), (heavy, ""), (loop, "")):
+        with pytest.raises(UserError, match=f"cannot be simulated.*{complaint}"):
+            Template(add(world_of(), model), husky, scenario_of())
 
 
 def test_a_listener_hears_every_step_and_changes_no_bit(world_of, husky, scenario_of):
@@ -177,3 +153,119 @@ def test_a_listener_hears_every_step_and_changes_no_bit(world_of, husky, scenari
     # A run that is made again is heard from its start.
     template.run(frozenset(), 3, listener=streams)
     assert [reading.time for reading, _ in streams.heard] == times
+
+
+ALL = frozenset({"a", "b", "c", "d"})
+
+
+@pytest.fixture
+def built(monkeypatch) -> list[frozenset[str]]:
+    """The moving models that are left out of each smaller plant which is built. Building is so cheap that it always pays."""
+    monkeypatch.setattr(variants, "BUILD", 0.0)
+    monkeypatch.setattr(variants, "PAIR", 0.0)
+    reported: list[frozenset[str]] = []
+    without = Template.without
+
+    def tell(self: Template, names: frozenset[str]) -> Template:
+        smaller = without(self, names)
+        reported.append(ALL - smaller.names)
+        return smaller
+
+    monkeypatch.setattr(Template, "without", tell)
+    return reported
+
+
+@pytest.fixture
+def cubes(world_of, add) -> World:
+    """A cube in the robot's way, a pile of two that falls beside it, a cube far away."""
+    return add(world_of(), cube("a", 1.2, 0), cube("b", 1, 3), cube("c", 1, 3.1, 0.5), cube("d", 5, -9))
+
+
+@pytest.fixture
+def scenario(scenario_of) -> Scenario:
+    return scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0})
+
+
+def rubble() -> tuple[World, Model, Scenario]:
+    scenario = load_scenario(SCENARIOS / "rubble.yaml")
+    short = scenario.model_copy(update={"failure": scenario.failure.model_copy(update={"timeout": 6.0})})
+    return *load_parts(scenario), short
+
+
+@pytest.mark.rates
+def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_any_order():
+    world, robot, scenario = rubble()
+    names = world.elements()
+    parts = [frozenset(part) for part in (names[:11], names[:6] + names[16:21], names[::6])]
+    whole = Template(world, robot, scenario)
+    expected = [all_bits(whole.run(part, seed=2)) for part in parts]
+    touched = {name for *_, (_, first_touched) in expected for name in first_touched}
+    # That plant does not know what takes part, so it has times of scans that nobody read, too.
+    times = [sensed for *_, (sensed, _) in expected]
+    assert touched & whole.removable
+    smaller = Variants(world, robot, scenario)
+    for number in (2, 0, 1, 2, 0):
+        *run, (sensed, first_touched) = all_bits(smaller.run(parts[number], seed=2))
+        assert sensed.items() <= times[number].items()
+        assert (*run, (times[number], first_touched)) == expected[number]
+
+
+@pytest.mark.rates
+def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_was_left_out(
+    world_of, add, husky, scenario
+):
+    """The frame of a door holds a cube up: with the door the cube falls less far."""
+    frame = link_of("frame", Box((1.0, 1.0, 0.5)), Pose((1.0, 4.0, 0.25)), mass=5.0)
+    leaf = link_of("leaf", Box((0.1, 0.1, 0.1)), Pose((1.0, 6.0, 1.0)))
+    joints = (
+        joint_of("fixed", "world", "frame", (1.0, 4.0, 0.0)),
+        joint_of("revolute", "world", "leaf", (1.0, 6.0, 1.0)),
+    )
+    world = add(world_of(), model_of("a", frame, leaf, joints=joints), cube("b", 1.0, 4.0, 0.8))
+    smaller = Variants(world, husky, scenario)
+    for keep, height in (({"b"}, 0.15), ({"a", "b"}, 0.65), ({"b"}, 0.15)):
+        rows = smaller.run(frozenset(keep), 1).motions["b"]
+        assert rows[-1, 3] == pytest.approx(height, abs=0.005)
+
+
+@pytest.mark.rates
+def test_a_plant_is_built_once_while_it_is_asked_for(cubes, husky, scenario, built, monkeypatch):
+    smaller = Variants(cubes, husky, scenario)
+    for seed in range(3):
+        smaller.run(ALL, seed)
+        smaller.run(ALL - {"a"}, seed)
+    assert built == [{"a"}]
+    # Those that were used last are held.
+    monkeypatch.setattr(variants, "MOST", 2)
+    for left_out in ("b", "a", "c", "a", "b"):
+        smaller.run(ALL - {left_out}, 1)
+    assert built == [{"a"}, {"b"}, {"c"}, {"b"}]
+
+
+TOO_DEAR = {"BUILD": 1.0, "PAIR": 1.0, "LARGEST": 3, "HELD": 0.0}
+
+
+@pytest.mark.parametrize("limit", slow(pytest.mark.rates, TOO_DEAR, but=["LARGEST"]))
+def test_no_plant_is_built_that_costs_more_than_it_saves(cubes, husky, scenario, built, monkeypatch, limit):
+    monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
+    result = Variants(cubes, husky, scenario).run(ALL - {"d"}, 1)
+    assert not built
+    assert all_bits(result) == all_bits(Template(cubes, husky, scenario).run(ALL - {"d"}, 1))
+
+
+def test_what_is_protected_stays(cubes, husky, scenario, built):
+    protected = scenario.model_copy(update={"protected": ("a",)})
+    result = Variants(cubes, husky, protected).run(frozenset({"b"}), 1)
+    assert built == [{"c", "d"}]
+    assert "a" in result.motions
+
+
+def test_the_floor_is_that_of_the_whole_world(world_of, husky, scenario_of, box):
+    """What is removed must not change when the robot has fallen out of the world."""
+    cellar = box("a", "0 9 -20 0 0 0", "1 1 1", mass=1.0)
+    world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), cellar, ground=False)
+    scenario = scenario_of(goal={"x": 50, "y": 0})
+    table = frozenset({"table"})
+    assert all_bits(Variants(world, husky, scenario).run(table, 1)) == all_bits(
+        Template(world, husky, scenario).run(table, 1)
+    )

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
@@ -33,9 +33,9 @@ from pydrake.multibody.tree import (
 from pydrake.multibody.tree import Joint as DrakeJoint
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from ddenv.arrays import Floats
 from ddenv.robot.drake.shapes import (
-    drake_shapes,
+    CORNER_RADIUS,
+    drake_shape,
     resting_corners,
     surface,
     to_drake,
@@ -52,10 +52,7 @@ from ddenv.world.scenario import Simulation
 # Where the twins of models wait that are not at rest: this deep, and this far from each other, m. Shapes in one place would make
 # Drake's search for contacts slow.
 DEEP, DEEPER, APART = -1e5, -2e5, 1e3
-
-
-# A model with more shapes than this has a twin with bodies of its own, see `Twin`.
-MANY = 8
+MANY = 8  # a model with more shapes than this has a twin with bodies of its own, see `Twin`
 
 
 @dataclass(frozen=True)
@@ -73,24 +70,17 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Place:
-    """The frame that a link's twin is welded to. While the twin is not needed the frame waits at `away` in the world."""
-
-    frame: FixedOffsetFrame
-    away: RigidTransform
-
-
-@dataclass(frozen=True)
 class Twin:
-    """What stands for a model where it lies at rest: `parts`, or where it has many shapes `places` with a body for each link.
+    """What stands for a model where it lies at rest: `parts`, or where it has many shapes a body for each link.
 
-    `geometry` are its shapes. To move a shape of the world takes Drake longer the more shapes the plant has: half a millisecond in
-    a world of boards, 12 ms among 3,200. To move a frame takes it microseconds, but each body costs 14 us in every step.
+    `geometry` are its shapes, `places` the frames that such bodies are welded to, each with where it waits in the world while it is
+    not needed. To move a shape of the world takes Drake longer the more shapes the plant has: half a millisecond in a world of
+    boards, 12 ms among 3,200. To move a frame takes it microseconds, but each body costs 14 us in every step.
     """
 
     geometry: tuple[GeometryId, ...]
     parts: tuple[Part, ...] = ()
-    places: tuple[Place, ...] = ()
+    places: tuple[tuple[FixedOffsetFrame, RigidTransform], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -99,7 +89,7 @@ class Body:
 
     `links` are the links' bodies, `poses` their start poses in the world frame, `geometry` the collision geometry of the links that
     can move. `bounds` are the boxes around the links in each link's own frame; None for a link that cannot move or has no
-    geometry. `own_pairs` are the geometries of each two links that touch each other: none, unless the model collides with itself.
+    geometry.
     """
 
     name: str
@@ -108,7 +98,6 @@ class Body:
     poses: tuple[Pose, ...]
     geometry: tuple[GeometryId, ...]
     bounds: tuple[Bounds | None, ...]
-    own_pairs: tuple[tuple[tuple[GeometryId, ...], tuple[GeometryId, ...]], ...] = ()
 
     @property
     def base(self) -> RigidBody:
@@ -120,7 +109,8 @@ class Built:
     """The plant of a world.
 
     `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
-    world. `moving` are the dynamic models in the order of the world file; `twins` stand for those of them that float.
+    world. `moving` are the dynamic models in the order of the world file; `twins` stand for those of them that float. `own_pairs`
+    are the geometries of each two links of a model that touch each other: none, unless it collides with itself.
     """
 
     diagram: Diagram
@@ -130,6 +120,11 @@ class Built:
     static: dict[str, tuple[GeometryId, ...]]
     moving: dict[str, Body]
     twins: dict[str, Twin]
+    own_pairs: dict[str, list[tuple[list[GeometryId], list[GeometryId]]]]
+
+    def shapes(self) -> list[tuple[str, tuple[GeometryId, ...]]]:
+        """The collision shapes of each model but the robot: first those that never move, then those that can."""
+        return [*self.static.items(), *((name, body.geometry) for name, body in self.moving.items())]
 
 
 def build(world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float) -> Built:
@@ -163,65 +158,53 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         for model in world.models
         if not model.static and model.links
     }
+    # Those that can lie anywhere, and touch themselves nowhere.
     twins = {
-        model.name: _twin(plant, model, wheels) for model in world.models if model.name in moving and _floats(model)
+        model.name: _twin(plant, model, wheels)
+        for model in world.models
+        if model.name in moving
+        and not model.self_collide
+        and all("world" not in (j.parent, j.child) for j in model.joints)
     }
     filters = scene_graph.collision_filter_manager()
     for body in moving.values():
         own = GeometrySet(list(static[body.name])), GeometrySet(list(body.geometry))
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(*own))
     plant.Finalize()
-    moving = {name: replace(body, own_pairs=_own_pairs(plant, scene_graph, body)) for name, body in moving.items()}
-    return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins)
-
-
-def _floats(model: Model) -> bool:
-    """Whether `model` can lie anywhere, and touches itself nowhere."""
-    return not model.self_collide and not any("world" in (joint.parent, joint.child) for joint in model.joints)
+    # Drake has filtered links that a joint connects.
+    filtered = scene_graph.model_inspector().CollisionFiltered
+    shapes = {name: map(plant.GetCollisionGeometriesForBody, body.links) for name, body in moving.items()}
+    own_pairs = {
+        name: [pair for pair in combinations(filter(None, found), 2) if not filtered(pair[0][0], pair[1][0])]
+        for name, found in shapes.items()
+    }
+    return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins, own_pairs)
 
 
 def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
     # Without corners: the model rests on nothing while its twin stands for it.
-    shapes = [
-        (number, link, collision.mu, *one)
-        for number, link in enumerate(model.links)
-        for collision in link.collisions
-        for one in drake_shapes(collision)
-    ]
-    if len(shapes) > MANY:
-        return _welded_twin(plant, model, wheels)
-    parts: list[Part] = []
-    for number, link, mu, shape, pose in shapes:
-        name = str(plant.num_collision_geometries())
-        away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
-        properties = surface(world_friction(mu, wheels))
-        geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, shape, name, properties)
-        parts.append(Part(geometry, number, shape, transform(link.pose.inverse() @ pose), away))
-    return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
-
-
-def _welded_twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
+    if len(model.collisions) <= MANY:
+        parts: list[Part] = []
+        for number, link in enumerate(model.links):
+            for one in link.collisions:
+                name = str(plant.num_collision_geometries())
+                away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
+                shape, properties = drake_shape(one.shape), surface(world_friction(one.mu, wheels))
+                geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, shape, name, properties)
+                parts.append(Part(geometry, number, shape, transform(link.pose.inverse() @ one.pose), away))
+        return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
-    geometry: list[GeometryId] = []
-    places: list[Place] = []
+    shapes: list[GeometryId] = []
+    places: list[tuple[FixedOffsetFrame, RigidTransform]] = []
     for link in model.links:
         away = RigidTransform(to_drake(np.array([APART * plant.num_bodies(), 0.0, DEEPER])))
         loose = FixedOffsetFrame(f"at/{link.name}", plant.world_frame(), away, instance)
         frame = cast(FixedOffsetFrame, plant.AddFrame(loose))
         body = plant.AddRigidBody(link.name, instance, SpatialInertia.Zero())
         plant.AddJoint(WeldJoint(f"weld/{link.name}", frame, body.body_frame(), RigidTransform()))
-        geometry += _register(plant, body, link.pose.inverse(), [link], wheels, corners=False)
-        places.append(Place(frame, away))
-    return Twin(tuple(geometry), places=tuple(places))
-
-
-def _own_pairs(
-    plant: MultibodyPlant, scene_graph: SceneGraph, body: Body
-) -> tuple[tuple[tuple[GeometryId, ...], tuple[GeometryId, ...]], ...]:
-    """`Body.own_pairs` of a finished plant, in which Drake has filtered links that a joint connects."""
-    filtered = scene_graph.model_inspector().CollisionFiltered
-    links = [tuple(found) for link in body.links if (found := plant.GetCollisionGeometriesForBody(link))]
-    return tuple(pair for pair in combinations(links, 2) if not filtered(pair[0][0], pair[1][0]))
+        shapes += _register(plant, body, link.pose.inverse(), [link], wheels, corners=False)
+        places.append((frame, away))
+    return Twin(tuple(shapes), places=tuple(places))
 
 
 def _add_moving(
@@ -261,13 +244,18 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
 def _register(
     plant: MultibodyPlant, body: RigidBody, frame: Pose, links: Iterable[Link], wheels: float | None, corners: bool
 ) -> list[GeometryId]:
-    """Registers the collisions of `links` on `body`; `frame` is the pose of the world in the body's frame."""
+    """Registers the collisions of `links` on `body`; `frame` is the pose of the world in the body's frame.
+
+    With `corners`, each gets small spheres to rest on: a face that rests on a single contact point would creep.
+    """
     identities = []
     for link in links:
-        rests = resting_corners(link.collisions) if corners else [()] * len(link.collisions)
+        rests = resting_corners(link.collisions) if corners else [[]] * len(link.collisions)
         for collision, places in zip(link.collisions, rests, strict=True):
             mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
-            for shape, pose in drake_shapes(collision, places):
+            shapes = [(drake_shape(collision.shape), collision.pose)]
+            shapes += [(Sphere(CORNER_RADIUS), collision.pose @ Pose(place)) for place in places]
+            for shape, pose in shapes:
                 # Drake requires different names; nothing reads them.
                 name = str(plant.num_collision_geometries())
                 identities.append(
@@ -293,8 +281,15 @@ def _add_joint(
     plant: MultibodyPlant, joint: Joint, links: dict[str, tuple[Link, RigidBody]], instance_name: str
 ) -> None:
     """Adds `joint` between two of `links`, or between one of them and the world. Raises ValueError for an unknown kind."""
-    # Both frames have the same axes in the start pose, so that every joint position is 0 there.
-    at = RigidTransform(RotationMatrix(to_drake(_axes(joint))), to_drake(np.array(joint.pose.position)))
+    # The axes of both frames, as columns, are the same in the start pose, so that every joint position is 0 there.
+    axes = BALL_AXES if joint.kind == "ball" else np.eye(3)
+    if joint.kind == "universal":
+        first, second = np.array(joint.axis), np.array(joint.axis2)
+        # Exactly orthogonal: the axes of a file are so only to a few digits.
+        second = second - first * (first @ second)
+        second /= math.sqrt(second @ second)
+        axes = np.column_stack([first, second, np.cross(first, second)])
+    at = RigidTransform(RotationMatrix(to_drake(axes)), to_drake(np.array(joint.pose.position)))
     frames: list[Frame] = []
     for end, name in (("parent", joint.parent), ("child", joint.child)):
         pose, body = (Pose(), plant.world_body()) if name == "world" else (links[name][0].pose, links[name][1])
@@ -302,17 +297,6 @@ def _add_joint(
         frames.append(plant.AddFrame(FixedOffsetFrame(f"{instance_name}/{joint.name}/{end}", body.body_frame(), place)))
     parent, child = frames
     plant.AddJoint(_joint(joint, parent, child))
-
-
-def _axes(joint: Joint) -> Floats:
-    """The axes (columns of a 3 x 3 matrix) of a joint's frames in the world frame; the world's own for most kinds."""
-    if joint.kind == "universal":
-        first, second = np.array(joint.axis), np.array(joint.axis2)
-        # Exactly orthogonal: the axes of a file are so only to a few digits.
-        second = second - first * (first @ second)
-        second /= math.sqrt(second @ second)
-        return np.column_stack([first, second, np.cross(first, second)])
-    return BALL_AXES if joint.kind == "ball" else np.eye(3)
 
 
 def _joint(joint: Joint, parent: Frame, child: Frame) -> DrakeJoint:

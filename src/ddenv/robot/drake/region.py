@@ -16,10 +16,8 @@ from ddenv.arrays import Booleans, Floats
 from ddenv.world.extent import Bounds, model_bounds, stacked
 from ddenv.world.model import Model
 
-# How far a region extends to each side of the straight way to the goal, m.
-WIDTH = 8.0
-# And around each model that can move, m: most of them fall or lie where they are.
-AROUND = 4.0
+WIDTH = 8.0  # how far a region extends to each side of the straight way to the goal, m
+AROUND = 4.0  # and around each model that can move, m: most of them fall or lie where they are
 # Whatever is simulated keeps this distance from the edge at each tick, m: between two ticks nothing gets so far and back, unless it
 # does 40 m/s.
 MARGIN = 2.0

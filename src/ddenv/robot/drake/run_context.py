@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 from typing import cast
 
 import numpy as np
@@ -13,7 +12,7 @@ from pydrake.systems.framework import Context
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.clock import Clock
-from ddenv.robot.drake.plant import Body, Built, Part
+from ddenv.robot.drake.plant import Body, Built, Twin
 from ddenv.robot.drake.region import Region
 from ddenv.robot.drake.shapes import to_drake, transform
 from ddenv.world.pose import Pose
@@ -46,45 +45,40 @@ class Presence:
 
         Only the difference to the last call costs time: most runs keep nearly the same models as the run before.
         """
-        gone, back = self._static(removed - self._removed), self._static(self._removed - removed)
+        static = self._built.static
+        gone = [static[name] for name in removed - self._removed if static.get(name)]
+        back = [static[name] for name in self._removed - removed if static.get(name)]
         if gone:
             self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._movers))
         if back:
             self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._movers))
-        if gone or back:
-            self._removed = removed
-            self._kept = {name: geometry for name, geometry in self._built.static.items() if name not in removed}
-
-    def _static(self, names: frozenset[str]) -> list[tuple[GeometryId, ...]]:
-        return [geometry for name in names if (geometry := self._built.static.get(name))]
+        self._removed = removed
+        self._kept = {name: geometry for name, geometry in static.items() if name not in removed}
 
     def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
         """Lets `bodies` touch themselves, each other, `others`, what is kept and never moves, and with `robot` also the robot."""
-        declaration = CollisionFilterDeclaration()
-        for body, rest in self._pairs(bodies, others, robot):
-            declaration.AllowBetween(body, rest)
-        self._filters.Apply(declaration)
+        self._apply(CollisionFilterDeclaration.AllowBetween, bodies, others, robot)
 
     def part(self, bodies: Sequence[Body], others: Sequence[Body]) -> None:
         """Undoes `join`. `others` are the moving models that `bodies` could touch besides each other."""
-        declaration = CollisionFilterDeclaration()
-        for body, rest in self._pairs(bodies, others, True):
-            declaration.ExcludeBetween(body, rest)
-        self._filters.Apply(declaration)
+        self._apply(CollisionFilterDeclaration.ExcludeBetween, bodies, others, True)
 
-    def _pairs(
-        self, bodies: Sequence[Body], others: Sequence[Body], robot: bool
-    ) -> Iterator[tuple[GeometrySet, GeometrySet]]:
+    def _apply(
+        self, between: Callable[..., object], bodies: Sequence[Body], others: Sequence[Body], robot: bool
+    ) -> None:
+        declaration = CollisionFilterDeclaration()
         bodies = [body for body in bodies if body.name not in self._built.twins]
         for number, body in enumerate(bodies):
             mine = GeometrySet(list(body.geometry))
-            yield mine, _set([*self._free, *(other.geometry for other in (*bodies[number + 1 :], *others))])
+            other_bodies = [other.geometry for other in (*bodies[number + 1 :], *others)]
+            between(declaration, mine, _set([*self._free, *other_bodies]))
             if robot:
-                yield mine, self._robot
+                between(declaration, mine, self._robot)
             # A model does not touch its own links that never move: a door its frame.
-            yield mine, _set(geometry for name, geometry in self._kept.items() if name != body.name)
-            for one, other in body.own_pairs:
-                yield GeometrySet(list(one)), GeometrySet(list(other))
+            between(declaration, mine, _set(geometry for name, geometry in self._kept.items() if name != body.name))
+            for one, other in self._built.own_pairs[body.name]:
+                between(declaration, GeometrySet(one), GeometrySet(other))
+        self._filters.Apply(declaration)
 
 
 def _set(groups: Iterable[tuple[GeometryId, ...]]) -> GeometrySet:
@@ -107,9 +101,7 @@ class Hold:
     """
 
     def __init__(self, built: Built, plant_context: Context, start: Floats) -> None:
-        self._plant = built.plant
-        self._context = plant_context
-        self.start = start
+        self._plant, self._context, self.start = built.plant, plant_context, start
         self._bodies = tuple(built.moving.values())
         self._count = built.plant.num_positions()
         self._held: Booleans = np.zeros(len(start), dtype=bool)
@@ -202,38 +194,34 @@ class Twins:
     def lay(self, body: Body, places: Floats, turns: Floats) -> None:
         """Puts the twin of `body` where its links are: places (L, 3) m and rotations (L, 3, 3) in the world frame."""
         self._laid[body.name] = body
-        twin = self._twins[body.name]
         links = [
             RigidTransform(RotationMatrix.ProjectToRotationMatrix(to_drake(turn)), to_drake(place))
             for place, turn in zip(places, turns, strict=True)
         ]
-        self._put(twin.parts, [links[part.link] @ part.pose for part in twin.parts])
-        # A twin has either parts or places.
-        for place, link in zip(twin.places, links, strict=False):
-            place.frame.SetPoseInParentFrame(self._plant_context, link)
+        self._put(self._twins[body.name], links)
 
     def lift(self, bodies: Iterable[Body]) -> None:
         """Takes the twins of `bodies` away."""
         for body in bodies:
             if self._laid.pop(body.name, None):
-                twin = self._twins[body.name]
-                self._put(twin.parts, [part.away for part in twin.parts])
-                for place in twin.places:
-                    place.frame.SetPoseInParentFrame(self._plant_context, place.away)
+                self._put(self._twins[body.name], None)
 
     def lift_all(self) -> None:
         """Takes all twins away."""
         self.lift(tuple(self._laid.values()))
 
-    def _put(self, parts: Sequence[Part], poses: Sequence[RigidTransform]) -> None:
-        for part, pose in zip(parts, poses, strict=True):
+    def _put(self, twin: Twin, links: Sequence[RigidTransform] | None) -> None:
+        """Puts a twin where its links are; None: away."""
+        for part in twin.parts:
+            pose = part.away if links is None else links[part.link] @ part.pose
             self._scene_graph.ChangeShape(self._context, self._source, part.geometry, part.shape, pose)
         # Drake adds such a shape anew. Where it then touched one on a body that is welded to the world, Drake would crash.
-        moved = GeometrySet([part.geometry for part in parts])
+        moved = GeometrySet([part.geometry for part in twin.parts])
         self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(moved, self._welded))
+        for number, (frame, away) in enumerate(twin.places):
+            frame.SetPoseInParentFrame(self._plant_context, away if links is None else links[number])
 
 
-@dataclass(frozen=True)
 class RunContext:
     """A plant with the one context that all its runs use in turn.
 
@@ -241,26 +229,17 @@ class RunContext:
     `region` is not in the plant; None if everything is.
     """
 
-    built: Built
-    diagram_context: Context
-    plant_context: Context
-    presence: Presence
-    hold: Hold
-    twins: Twins
-    clock: Clock
-    floor: float
-    region: Region | None
-
-    @classmethod
-    def of(cls, built: Built, robot: Pose, clock: Clock, floor: float, region: Region | None = None) -> RunContext:
+    def __init__(self, built: Built, robot: Pose, clock: Clock, floor: float, region: Region | None = None) -> None:
         """Everything where it starts. `robot` takes the robot's own frame to the world frame."""
-        context = built.diagram.CreateDefaultContext()
-        plant_context = built.plant.GetMyMutableContextFromRoot(context)
+        self.built, self.clock, self.floor, self.region = built, clock, floor, region
+        self.diagram_context = built.diagram.CreateDefaultContext()
+        self.plant_context = built.plant.GetMyMutableContextFromRoot(self.diagram_context)
         # The plant's default context has all models at the world's origin.
         for body, origin in [(built.robot, robot), *((body, Pose()) for body in built.moving.values())]:
             for link, pose in zip(body.links, body.poses, strict=True):
                 if link.is_floating_base_body():
-                    built.plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, link, transform(origin @ pose))
-        start = cast(Floats, built.plant.GetPositionsAndVelocities(plant_context))
-        presence, hold = Presence(built, context), Hold(built, plant_context, start)
-        return cls(built, context, plant_context, presence, hold, Twins(built, context), clock, floor, region)
+                    built.plant.SetFloatingBaseBodyPoseInWorldFrame(self.plant_context, link, transform(origin @ pose))
+        start = cast(Floats, built.plant.GetPositionsAndVelocities(self.plant_context))
+        self.presence = Presence(built, self.diagram_context)
+        self.hold = Hold(built, self.plant_context, start)
+        self.twins = Twins(built, self.diagram_context)

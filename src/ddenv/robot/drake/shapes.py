@@ -8,14 +8,8 @@ from itertools import count
 from typing import Any
 
 import numpy as np
+from pydrake import geometry as drake
 from pydrake.common.eigen_geometry import Quaternion
-from pydrake.geometry import AddContactMaterial, Convex, ProximityProperties
-from pydrake.geometry import Box as DrakeBox
-from pydrake.geometry import Capsule as DrakeCapsule
-from pydrake.geometry import Cylinder as DrakeCylinder
-from pydrake.geometry import Ellipsoid as DrakeEllipsoid
-from pydrake.geometry import Shape as DrakeShape
-from pydrake.geometry import Sphere as DrakeSphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction
 from scipy.spatial import ConvexHull, QhullError
@@ -57,31 +51,21 @@ def world_friction(mu: float, wheels: float) -> float:
     return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
 
 
-def surface(mu: float) -> ProximityProperties:
+def surface(mu: float) -> drake.ProximityProperties:
     """A surface with Drake's friction coefficient `mu`.
 
     Static and dynamic friction are equal: with a difference, wheels stick and slip at the rate of the time steps.
     """
-    properties = ProximityProperties()
-    AddContactMaterial(DISSIPATION, STIFFNESS, CoulombFriction(mu, mu), properties)
+    properties = drake.ProximityProperties()
+    drake.AddContactMaterial(DISSIPATION, STIFFNESS, CoulombFriction(mu, mu), properties)
     return properties
 
 
 CORNER_RADIUS = 0.002  # m
-# A link with more corners rests on the outermost ones alone.
-MOST_CORNERS = 64
+MOST_CORNERS = 64  # a link with more corners rests on the outermost ones alone
 # Around a cylinder's rim, and on a convex mesh at most.
 RIM_CORNERS = 8
 MESH_CORNERS = 32
-
-
-def drake_shapes(collision: Collision, corners: Sequence[Vector] = ()) -> list[tuple[DrakeShape, Pose]]:
-    """The Drake shapes of `collision` and their poses, with the spheres on `corners` on which a moving model rests.
-
-    A face that rests on a single contact point would creep.
-    """
-    spheres = [(DrakeSphere(CORNER_RADIUS), collision.pose @ Pose(corner)) for corner in corners]
-    return [(drake_shape(collision.shape), collision.pose), *spheres]
 
 
 def resting_corners(collisions: Sequence[Collision]) -> list[list[Vector]]:
@@ -103,21 +87,21 @@ def resting_corners(collisions: Sequence[Collision]) -> list[list[Vector]]:
     return [[corner for corner in found if next(numbers) in outermost] for found in corners]
 
 
-def drake_shape(shape: Shape) -> DrakeShape:
+def drake_shape(shape: Shape) -> drake.Shape:
     """`shape` as Drake's own. Raises ValueError for a shape that cannot be simulated."""
     match shape:
         case Box(size):
-            return DrakeBox(*size)
+            return drake.Box(*size)
         case Cylinder(radius, length):
-            return DrakeCylinder(radius, length)
+            return drake.Cylinder(radius, length)
         case Sphere(radius):
-            return DrakeSphere(radius)
+            return drake.Sphere(radius)
         case Capsule(radius, length):
-            return DrakeCapsule(radius, length)
+            return drake.Capsule(radius, length)
         case Ellipsoid(radii):
-            return DrakeEllipsoid(*radii)
+            return drake.Ellipsoid(*radii)
         case Mesh(origin, vertices):
-            return Convex(points=to_drake(np.asfortranarray(vertices.T, dtype=float)), label=origin)
+            return drake.Convex(points=to_drake(np.asfortranarray(vertices.T, dtype=float)), label=origin)
     raise ValueError(f"{type(shape).__name__} cannot be simulated")
 
 
@@ -143,9 +127,15 @@ def _mesh_corners(mesh: Mesh) -> list[Vector]:
     areas = np.linalg.norm(normals, axis=1)
     faces, normals = mesh.faces[areas > 0], normals[areas > 0] / areas[areas > 0, None]
     used = np.unique(faces)
-    middle = mesh.vertices[used].mean(axis=0)
+    points = mesh.vertices[used]
+    middle = points.mean(axis=0)
+    # The first, then always the one farthest from all chosen ones.
+    taken, distances = [0], np.linalg.norm(points - points[0], axis=1)
+    while len(taken) < min(MESH_CORNERS, len(points)):
+        taken.append(int(distances.argmax()))
+        distances = np.minimum(distances, np.linalg.norm(points - points[taken[-1]], axis=1))
     centers = []
-    for number in used[_spread(mesh.vertices[used], MESH_CORNERS)]:
+    for number in used[taken]:
         vertex = mesh.vertices[number]
         around = normals[(faces == number).any(axis=1)]
         # At the sphere's radius behind each face; least squares where more than three faces meet.
@@ -156,13 +146,3 @@ def _mesh_corners(mesh: Mesh) -> list[Vector]:
         x, y, z = (vertex + inward).tolist()
         centers.append((x, y, z))
     return centers
-
-
-def _spread(points: Floats, count: int) -> list[int]:
-    """Indices of up to `count` of `points` (N, 3): the first, then always the one farthest from all chosen ones."""
-    taken = [0]
-    distances = np.linalg.norm(points - points[0], axis=1)
-    while len(taken) < min(count, len(points)):
-        taken.append(int(distances.argmax()))
-        distances = np.minimum(distances, np.linalg.norm(points - points[taken[-1]], axis=1))
-    return taken

@@ -20,14 +20,12 @@ from ddenv.text import printable
 SUPERVISOR = Path(__file__).with_name("supervise.py")
 BEGIN, END = b"+", b"."
 PIECE = 65536
-# How often a silent command is checked, s.
-TICK = 0.2
+TICK = 0.2  # how often a silent command is checked, s
 # The maximum time between two checks that counts, s: it is longer where we were stopped ourselves.
 LONGEST_LOOK = 1.0
 # How long the supervisor may take to end a command, s: longer than the grace that it gives the command.
 STOP_WAIT = 10.0
-# The maximum that can be left in a pipe when the command has ended, bytes.
-MOST_LEFT = 16 * PIECE
+MOST_LEFT = 16 * PIECE  # the maximum that can be left in a pipe when the command has ended, bytes
 # How much of the end of stderr is kept, in bytes, and how much of its last line is reported, in characters.
 KEPT = 16384
 SHOWN = 200
@@ -135,7 +133,16 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
         for stream, taker in takers:
             selector.register(stream, selectors.EVENT_READ, taker)
         while said is None:
-            said = _look(selector, command)
+            for key, _ in selector.select(TICK):
+                if key.fileobj is command.line:
+                    # Its final message; "" if it ended without one.
+                    said = ""
+                    with contextlib.suppress(OSError):
+                        said = command.line.recv(64).decode()
+                elif piece := os.read(key.fd, PIECE):
+                    key.data(piece)
+                else:
+                    selector.unregister(key.fileobj)
             late = f"took longer than {seconds:g} s of wall clock" if clock.look() > limit else ""
             if said is None and not why and (why := late or too_much()):
                 command.say(END)
@@ -151,20 +158,6 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
                 taker(os.read(stream.fileno(), PIECE))
     code, reason = _read(said)
     return Ended(None if why else code, why or reason, "".join(complaints.last_lines(1)), complaints.is_exception())
-
-
-def _look(selector: selectors.BaseSelector, command: Running) -> str | None:
-    """Takes new output. Returns the supervisor's final message, "" if it ended without one, None while the command runs."""
-    for key, _ in selector.select(TICK):
-        if key.fileobj is command.line:
-            with contextlib.suppress(OSError):
-                return command.line.recv(64).decode()
-            return ""
-        if piece := os.read(key.fd, PIECE):
-            key.data(piece)
-        else:
-            selector.unregister(key.fileobj)
-    return None
 
 
 def _read(said: str) -> tuple[int | None, str]:

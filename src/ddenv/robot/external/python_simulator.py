@@ -109,7 +109,12 @@ class PythonSimulator:
         """Makes a test, and adds what it yields and returns to `poses`. Raises BadLog for nonsense."""
         answer = self._simulator.run(world, seed, self._scenario.failure.timeout)
         if isinstance(answer, Generator):
-            answer = _drained(answer, poses)
+            rows = answer
+            try:
+                while True:
+                    poses.add(next(rows))
+            except StopIteration as stop:
+                answer = stop.value
         if not isinstance(answer, Ended) or not isinstance(answer.reached, bool | np.bool_):
             raise BadLog(f"returned {_shown(answer)}; expected ddenv.Ended(reached), with True or False")
         for row in answer.poses:
@@ -124,16 +129,6 @@ class PythonSimulator:
     def _guarded(self, what: str, call: Callable[[], Answer]) -> Answer:
         """Returns `call()`. Raises UserError, in one line, for whatever that raises."""
         return guarded(f"simulator {self._name}: {what}", call, self._folder, f"{LONGEST_START:g} s")
-
-
-def _drained(rows: Generator[Row, None, Ended], poses: Poses) -> Ended:
-    while True:
-        try:
-            row = next(rows)
-        except StopIteration as stop:
-            ended: Ended = stop.value
-            return ended
-        poses.add(row)
 
 
 class Poses:

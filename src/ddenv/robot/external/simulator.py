@@ -33,8 +33,7 @@ from ddenv.world.scenario import Scenario, Whole
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
-# The meaning of the command's exit codes; all others are errors.
-OUTCOMES = {0: "pass", 1: "failed"}
+OUTCOMES = {0: "pass", 1: "failed"}  # the meaning of the command's exit codes; all others are errors
 
 
 class ExternalSimulator:
@@ -42,8 +41,7 @@ class ExternalSimulator:
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError if the command cannot be started."""
-        self._world = world
-        self._scenario = scenario
+        self._world, self._scenario = world, scenario
         self._whole = whole_of(world, scenario)
         self._words = command_words(scenario)
         self._names = frozenset(model.name for model in world.models)
@@ -87,12 +85,11 @@ class ExternalSimulator:
         values = {"world": str(world), "scenario": str(whole), "seed": str(seed), "log": str(file or "/dev/stdout")}
         words, environment = filled(self._words, values), self._environment(values)
 
-        def take(piece: bytes) -> None:
-            if file is None:
-                log.add(piece)
-
         def too_much() -> str:
-            size = log.size if file is None else _size(file)
+            size = log.size
+            if file is not None:
+                with contextlib.suppress(OSError):
+                    size = file.stat().st_size
             return TOO_LARGE if size > MOST_BYTES else ""
 
         try:
@@ -100,10 +97,12 @@ class ExternalSimulator:
                 scenario = scenario_in(self._scenario, self._whole, world)
                 write_files(folder, {world: without(self._world, self._removable - keep), whole: scenario})
                 command.say(BEGIN)
-                ended = watch(command, self.limit, take, too_much)
+                ended = watch(command, self.limit, log.add if file is None else lambda _: None, too_much)
                 # Reading a log that is too large would take longer than writing it did.
-                if file is not None and ended.reason != TOO_LARGE:
-                    _read(file, log)
+                if file is not None and ended.reason != TOO_LARGE and file.is_file():
+                    with contextlib.suppress(OSError), file.open("rb") as content:
+                        while log.size <= MOST_BYTES and (piece := content.read(1_000_000)):
+                            log.add(piece)
         except OSError as error:
             ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")
         return ended, log
@@ -122,7 +121,6 @@ class ExternalSimulator:
         return {**os.environ, **known}
 
     def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, Floats]:
-        """The outcome, the failure and the trajectory (N, 8) of a run that ended like this."""
         said = f": {ended.complaint}" if ended.complaint else ""
         if ended.code is None or ended.code not in OUTCOMES:
             why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"
@@ -185,23 +183,6 @@ def _no_room(error: OSError) -> UserError:
     return UserError(f"no temporary file can be written ({why}); set TMPDIR to a folder with room")
 
 
-def _read(file: Path, log: PoseLog) -> None:
-    """Reads the file that the command had to write; a missing file, or one that is no plain file, has no rows."""
-    with contextlib.suppress(OSError):
-        if not file.is_file():
-            return
-        with file.open("rb") as content:
-            while log.size <= MOST_BYTES and (piece := content.read(1_000_000)):
-                log.add(piece)
-
-
-def _size(file: Path) -> int:
-    try:
-        return file.stat().st_size
-    except OSError:
-        return 0
-
-
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 EXPECTED = f"expected {','.join(COLUMNS)} (s, m, a quaternion)"
 MOST_BYTES = 64_000_000
@@ -211,8 +192,7 @@ LONGEST_LINE = 1000
 GREATEST = 1e9
 SHORTEST_QUATERNION = 1e-6
 SHORTEST_GAP = 0.001  # s
-# How many characters of a wrong line are reported.
-SHOWN = 60
+SHOWN = 60  # how many characters of a wrong line are reported
 
 # t (s), x, y, z (m), qw, qx, qy, qz.
 Row = tuple[float, float, float, float, float, float, float, float]
@@ -231,13 +211,11 @@ class PoseLog:
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
-        self._rest = b""
-        self._number = 0
-        self._began = False
+        self._rest, self._problem = b"", ""
+        self._number, self._began = 0, False
         self._rows: list[Row] = []
         self._last: Row | None = None
         self.size = 0
-        self._problem = ""
 
     def add(self, piece: bytes) -> None:
         """Reads the next bytes. After a mistake, which `finish` reports, nothing more is read."""
@@ -284,26 +262,15 @@ class PoseLog:
         if not text or text.startswith("#"):
             return
         fields = [field.strip() for field in text.split(",")]
-        header = not self._began and not any(map(_is_number, fields))
-        self._began = True
-        if header:
-            self._header(text, fields)
-        else:
-            self._row(text, fields)
-
-    def _header(self, text: str, fields: list[str]) -> None:
-        """Checks a header: it may name eight columns as it likes, but must not name the quaternion's in another order."""
-        turned = [field.lower() for field in fields[4:]]
-        known = list(COLUMNS[4:])
-        if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
-            raise self._wrong(text)
-
-    def _row(self, text: str, fields: list[str]) -> None:
-        try:
-            numbers = [float(field) for field in fields]
-        except ValueError:
-            raise self._wrong(text) from None
-        if len(numbers) != len(COLUMNS) or not all(map(math.isfinite, numbers)):
+        numbers = [number for field in fields if (number := _number(field)) is not None]
+        began, self._began = self._began, True
+        if not began and not numbers:
+            # A header may name eight columns as it likes, but must not name the quaternion's in another order.
+            turned, known = [field.lower() for field in fields[4:]], list(COLUMNS[4:])
+            if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
+                raise self._wrong(text)
+            return
+        if not len(fields) == len(numbers) == len(COLUMNS) or not all(map(math.isfinite, numbers)):
             raise self._wrong(text)
         kept = self.take(numbers, f"the pose log, line {self._number}")
         if kept is not None and self._progress is not None:
@@ -333,9 +300,8 @@ class PoseLog:
         return BadLog(f"the pose log, line {self._number}: {EXPECTED}, found '{shown}'")
 
 
-def _is_number(field: str) -> bool:
+def _number(field: str) -> float | None:
     try:
-        float(field)
+        return float(field)
     except ValueError:
-        return False
-    return True
+        return None

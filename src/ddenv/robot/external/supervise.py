@@ -22,8 +22,7 @@ from pathlib import Path
 # How long a command may take to end before it is killed, and how long its remaining processes are killed, s.
 GRACE = 2.0
 PATIENCE = 5.0
-# From Linux' <sys/prctl.h>.
-PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # from Linux' <sys/prctl.h>
 
 
 def main() -> None:
@@ -61,22 +60,18 @@ def run(words: list[str], worker: socket.socket) -> str:
     while process.poll() is None:
         ready, _, _ = select.select(sources, [], [])
         if worker in ready:
-            end(process)
+            # Some commands have something to clean up, such as a container.
+            signal_group(process.pid, signal.SIGTERM)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(GRACE)
+            signal_group(process.pid, signal.SIGKILL)
+            process.wait()
         else:
             os.read(woken, 64)
     signal_group(process.pid, signal.SIGKILL)
     kill_children()
     code = process.returncode
     return f"exit {code}" if code >= 0 else f"signal {-code}"
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    """Asks the command to end before it kills it: some have something to clean up, such as a container."""
-    signal_group(process.pid, signal.SIGTERM)
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(GRACE)
-    signal_group(process.pid, signal.SIGKILL)
-    process.wait()
 
 
 def kill_children() -> None:

@@ -10,12 +10,10 @@ from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.navigation.footprint import Footprint, seen_from
 from ddenv.robot.protocol import Estimate, Imu, Scan, Setup
 
-# A beam clears a cell if it goes farther than the cell by this many cells.
-PASSED = 1.5
+PASSED = 1.5  # a beam clears a cell if it goes farther than the cell by this many cells
 # When the robot tilts more than this (rad), its beams pass above or below what they would clear.
 LEVEL = 0.12
-# What rounding changes is less, m.
-SPARE = 1e-6
+SPARE = 1e-6  # what rounding changes is less, m
 
 
 class Costmap:
@@ -31,8 +29,7 @@ class Costmap:
         planner = setup.settings.planner
         self.resolution = planner.resolution
         self.count = max(round(planner.size / planner.resolution), 4)
-        self.spots = np.empty((3, 0))
-        self.version = 0
+        self.spots, self.version = np.empty((3, 0)), 0
         body = Footprint.of(setup)
         # One cell of the rim is kept: a robot that turns may still hit what is there.
         self._middle = (body.ahead - body.behind) / 2
@@ -43,10 +40,9 @@ class Costmap:
         self._slots: Integers = np.empty(0, dtype=int)
         # The occupied slots at the last change of the version, and those that are occupied or next to one, (count^2,).
         self._known = self._slots
-        self._around: Booleans = np.zeros(self.count**2, dtype=bool)
+        self._around, self._hit = np.zeros((2, self.count**2), dtype=bool)
         beside = (-1, 0, 1)
         self._beside = np.array([[dx * self.count + dy] for dx in beside for dy in beside])
-        self._hit: Booleans = np.zeros(self.count**2, dtype=bool)
         self._places = np.ones((3, self.count**2))
         self._angles: Floats | None = None
         self._beams = np.empty((2, 0))
@@ -99,7 +95,18 @@ class Costmap:
         return limits
 
     def _mark(self, scan: Scan, estimate: Estimate, roll: float, pitch: float) -> None:
-        turn = _rotation(roll, pitch, estimate.heading)
+        """Marks the cells in which beams end, but for those that end on the ground before a tilted robot."""
+        cr, sr = math.cos(roll), math.sin(roll)
+        cp, sp = math.cos(pitch), math.sin(pitch)
+        ch, sh = math.cos(estimate.heading), math.sin(estimate.heading)
+        # From the robot's frame to the world frame.
+        turn = np.array(
+            [
+                [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
+                [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
+                [-sp, cp * sr, cp * cr],
+            ]
+        )
         start = turn @ scan.origin
         reach = (self.count / 2 - 1) * self.resolution - math.hypot(start[0], start[1])
         (near,) = (scan.ranges < reach).nonzero()
@@ -131,21 +138,18 @@ class Costmap:
             middle = [[(part + 0.5) * self.resolution] for part in cell]
             gone |= (np.abs(spots[:2] - middle) > self.count * self.resolution / 2).any(axis=0)
         if level and len(scan.ranges) > 2:
-            gone |= self._seen_through(scan, seen[0] + (self._middle - scan.origin[0]), seen[1] - scan.origin[1])
+            # What the nearest beam and both its neighbours have passed.
+            x, y = seen[0] + (self._middle - scan.origin[0]), seen[1] - scan.origin[1]
+            ranges, far = scan.ranges, self._far
+            np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
+            np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
+            nearest = self._beams_at(scan, x, y)
+            gone |= np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
         if gone.any():
             self._hit[slots[gone]] = False
             kept: Booleans = ~gone
             slots, spots = slots[kept], spots[:, kept]
         self._keep(slots, spots)
-
-    def _seen_through(self, scan: Scan, x: Floats, y: Floats) -> Booleans:
-        """Which places (N,), given in the lidar's frame, the nearest beam and both its neighbours have passed."""
-        ranges, far = scan.ranges, self._far
-        np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
-        np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
-        nearest = self._beams_at(scan, x, y)
-        passed: Booleans = np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
-        return passed
 
     def _beams_at(self, scan: Scan, x: Floats, y: Floats) -> Integers:
         """The numbers (N,) of the beams nearest to places in the lidar's frame; out of its view there are no such beams."""
@@ -153,8 +157,7 @@ class Costmap:
         beams = np.arctan2(y, x)
         beams -= first
         beams /= (scan.angles[-1] - first) / (len(scan.angles) - 1)
-        nearest: Integers = np.rint(beams, out=beams).astype(int)
-        return nearest
+        return np.rint(beams, out=beams).astype(int)
 
     def _keep(self, slots: Integers, spots: Floats) -> None:
         same = len(slots) == len(self._slots) and bool((slots == self._slots).all())
@@ -167,17 +170,3 @@ class Costmap:
             return
         self._known, self._around = slots, around
         self.version += 1
-
-
-def _rotation(roll: float, pitch: float, heading: float) -> Floats:
-    """The rotation (3, 3) from the robot's frame to the world frame."""
-    cr, sr = math.cos(roll), math.sin(roll)
-    cp, sp = math.cos(pitch), math.sin(pitch)
-    ch, sh = math.cos(heading), math.sin(heading)
-    return np.array(
-        [
-            [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
-            [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )

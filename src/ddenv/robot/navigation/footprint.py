@@ -10,10 +10,8 @@ import numpy as np
 from ddenv.arrays import Booleans, Floats
 from ddenv.robot.protocol import Estimate, Setup
 
-# Points nearer to the robot than this part of its padding count as touched.
-TOUCHED = 0.6
-# Turns a direction, with its components swapped, by 90 degrees to the left.
-LEFT = np.array([-1.0, 1.0])
+TOUCHED = 0.6  # points nearer to the robot than this part of its padding count as touched
+LEFT = np.array([-1.0, 1.0])  # turns a direction, with its components swapped, by 90 degrees to the left
 
 
 @dataclass(frozen=True, slots=True)

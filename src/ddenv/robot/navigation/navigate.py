@@ -8,13 +8,12 @@ import numpy as np
 
 from ddenv.robot.navigation.costmap import Costmap
 from ddenv.robot.navigation.footprint import Footprint
-from ddenv.robot.navigation.pursuit import BACK_SPEED, Follower, may_back_up, may_turn
+from ddenv.robot.navigation.pursuit import BACK_SPEED, BACK_UP, TURN_LEFT, Follower, room
 from ddenv.robot.navigation.route import Path, Planner
 from ddenv.robot.protocol import STOP, Estimate, Imu, Reading, Setup, Twist
 from ddenv.world.pose import wrap
 
-# Clearing the costmap keeps what is within this distance of the robot, m.
-NEAR = 1.5
+NEAR = 1.5  # clearing the costmap keeps what is within this distance of the robot, m
 # After clearing, the lidar gets this time to see obstacles again, s.
 LOOK = 0.5
 BACK = 0.4  # m
@@ -46,16 +45,19 @@ class Recovery:
 
     def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
         """The command, from the time of `begin` on; None once the behaviour is over."""
+        body = self._body
         match (self.made - 1) % 4:
             case 1:
                 gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
                 going = gone < BACK and time < self._since + LONGEST_BACK
-                return Twist(-self._speed, 0.0) if going and may_back_up(self._body, map_.spots, estimate) else None
+                may = going and room(body, map_.spots, estimate, BACK_UP) is not None
+                return Twist(-self._speed, 0.0) if may else None
             case 2:
                 self._turned += wrap(estimate.heading - self._heading)
                 self._heading = estimate.heading
                 turning = self._turned < math.tau and time < self._since + LONGEST_TURN
-                return Twist(0.0, self._rate) if turning and may_turn(self._body, map_.spots, estimate, 1.0) else None
+                may = turning and room(body, map_.spots, estimate, TURN_LEFT) is not None
+                return Twist(0.0, self._rate) if may else None
             case kind:
                 if time == self._since:
                     # What is near is kept where the lidar does not look.
@@ -97,22 +99,17 @@ class Straight:
 # The robot made progress when it moved this far (m), or turned by this angle (rad).
 MOVED = 0.1
 TURNED = 0.3
-# Turning alone counts as progress for no longer than this many times the patience.
-ON_THE_SPOT = 4
+ON_THE_SPOT = 4  # turning alone counts as progress for no longer than this many times the patience
 
 
 class Progress:
-    """Watches whether the robot still makes progress: since when it has neither moved nor turned."""
+    """Watches whether the robot still makes progress: since when, from its first look on, it has neither moved nor turned."""
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
         self._from: Estimate | None = None
         self._heading = 0.0
         self._moved = self._turned = 0.0
-
-    def begin(self) -> None:
-        """Forgets the past: from now on the robot has to make progress again."""
-        self._from = None
 
     def is_stalled(self, time: float, estimate: Estimate) -> bool:
         """Whether the robot at `estimate` has made no progress for too long at `time` (s)."""
@@ -132,19 +129,15 @@ THINK_EVERY = 0.5
 THINK = 1.0
 # If the robot cannot follow its plan, it makes no new one within this distance (m) of where it made the last.
 ELSEWHERE = 0.1
-# A plan that ends at the map's border is renewed when less than this (m) is left of it.
-TOO_SHORT = 2.0
-# A robot this far (m) off its plan makes a new one.
-BESIDE = 0.5
+TOO_SHORT = 2.0  # a plan that ends at the map's border is renewed when less than this (m) is left of it
+BESIDE = 0.5  # a robot this far (m) off its plan makes a new one
 # The robot keeps its plan if a new one is less than this many times shorter and has no more than this additional room (m), unless
 # the robot is this far (m) off its plan.
 LONGER = 1.1
 CLOSER = 0.03
 SWAY = 0.2
-# This far (m) from its last recovery the robot starts to count its recovery attempts anew.
-BETTER = 0.5
-# Clocks that add up periods deviate by less than this, s.
-TICK = 1e-6
+BETTER = 0.5  # this far (m) from its last recovery the robot starts to count its recovery attempts anew
+TICK = 1e-6  # clocks that add up periods deviate by less than this, s
 
 
 class Navigator:
@@ -162,20 +155,16 @@ class Navigator:
         self._follower = Follower(setup)
         self._progress = Progress(planner.patience)
         self._recovery = Recovery(setup)
-        self._recovers = False
         self._path: Path | None = None
         self._imu: Imu | None = None
         self._near = self._map.spots
+        # When (s) it looked, planned and found a path last; where, and on which version of the map, it planned.
         self._looked = self._planned = -math.inf
-        self._planned_at = setup.start[:2]
-        self._found = 0.0
-        self._planned_on = -1
-        self._blocked = False
+        self._found, self._planned_at, self._planned_on = 0.0, setup.start[:2], -1
         self._recovered: tuple[float, float] | None = None
         self._speed = 0.0
-        self._waits = False
-        self.arrived = False
-        self.gave_up = False
+        self._recovers = self._blocked = self._waits = False
+        self.arrived = self.gave_up = False
 
     def step(self, reading: Reading) -> Twist:
         """The command for the next period."""
@@ -282,5 +271,5 @@ class Navigator:
         self._found = reading.time
         self._planned = -math.inf
         self._recovered = (reading.estimate.x, reading.estimate.y)
-        self._progress.begin()
+        self._progress = Progress(self._setup.settings.planner.patience)
         return STOP

@@ -14,30 +14,31 @@ from ddenv.world.pose import wrap
 
 # Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)
-# The deceleration that the robot can rely on, m/s^2.
-BRAKE = 1.0
+BRAKE = 1.0  # the deceleration that the robot can rely on, m/s^2
 # At a standstill it aims at this part of the lookahead distance: the slower it is, the closer it keeps to its path.
 NEAREST = 0.4
 # It turns on the spot when the path leads farther aside than the first angle, until it is within the second, rad.
 ASIDE = 0.9
 ALONG = 0.25
-# When it is aligned with its path within this angle (rad) and still not free, it stops.
-ALIGNED = 0.04
+ALIGNED = 0.04  # when it is aligned with its path within this angle (rad) and still not free, it stops
 # Slower turns than this (rad/s) are lost between the wheels and the ground.
 LEAST_TURN = 0.2
 BACK_SPEED = 0.25  # m/s
-# A point within the margin may come nearer by this in a step, m.
-GIVE = 0.001
+GIVE = 0.001  # a point within the margin may come nearer by this in a step, m
 # With this much room (m) around it the robot drives at full speed, with no room at this part of it.
 ROOM = 0.35
 SLOWEST = 0.25
 # With this much room (m) it need not test its arc again for this time, s.
 CALM = 0.1
 CALM_FOR = 0.1
-# The parts of an arc at which the footprint is tested.
-PLACES = np.linspace(0.0, 1.0, 7)
-# The minimum curvature of an arc, rad: too little to matter.
-BENT = 1e-6
+PLACES = np.linspace(0.0, 1.0, 7)  # the parts of an arc at which the footprint is tested
+BENT = 1e-6  # the minimum curvature of an arc, rad: too little to matter
+# Small turns on the spot, and a little way back, as poses for `room`.
+TURN_LEFT, TURN_RIGHT = (
+    np.stack([seen_from(Estimate(0.0, 0.0, side * angle))[:2] for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+    for side in (1.0, -1.0)
+)
+BACK_UP = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)
 
 
 class Follower:
@@ -50,15 +51,13 @@ class Follower:
         self._body = Footprint.of(setup)
         # Faster, the robot could not stop within the space that it knows to be free.
         self._fastest = min(setup.speed, math.sqrt(2 * BRAKE * self._look_ahead))
-        self._turning = False
         self._path: Path | None = None
         self._points: Floats | None = None
         # An arc that was free, with room, is not tested again for this many steps.
         self._calm = round(CALM_FOR / setup.period)
-        self._left = 0
-        self._room = 0.0
+        self._left, self._room = 0, 0.0
         self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
-        self.stuck = False
+        self._turning = self.stuck = False
 
     def step(self, path: Path, estimate: Estimate, points: Floats) -> Twist:
         """The command to follow `path`. `points` (3, N) near the robot are x, y (m) and 1, in the frame of the estimates."""
@@ -79,11 +78,12 @@ class Follower:
         for part in PARTS:
             if part != PARTS[0]:
                 distance, bearing = self._aim(path, estimate, part)
-            room = self._room_on_arc(distance, bearing, estimate, points)
-            if room is not None:
-                self._room = room
-                self._left = self._calm if part == PARTS[0] and room >= CALM else 0
-                return self._drive(path, distance, bearing, room)
+            arc = None if abs(bearing) > ASIDE else _arc(distance, bearing)
+            free = None if arc is None else room(self._body, points, estimate, arc)
+            if free is not None:
+                self._room = free
+                self._left = self._calm if part == PARTS[0] and free >= CALM else 0
+                return self._drive(path, distance, bearing, free)
         return self._turn(bearing, estimate, points)
 
     def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
@@ -92,14 +92,6 @@ class Follower:
         x, y = path.ahead(part * share * self._look_ahead)
         dx, dy = x - estimate.x, y - estimate.y
         return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
-
-    def _room_on_arc(self, distance: float, bearing: float, estimate: Estimate, points: Floats) -> float | None:
-        """The distance (m) that the robot keeps from all `points` on its arc to the aim; None if it touches one."""
-        if abs(bearing) > ASIDE:
-            return None
-        if not points.shape[1]:
-            return ROOM
-        return room(self._body, points, estimate, _arc(distance, bearing))
 
     def _drive(self, path: Path, distance: float, bearing: float, room: float) -> Twist:
         bend = 2 * math.sin(bearing) / max(distance, 1e-6)
@@ -120,12 +112,14 @@ class Follower:
             self.stuck = True
             return STOP
         rate = min(max(self._gain * abs(bearing), LEAST_TURN), self._setup.turn_rate)
-        sides = (1.0, -1.0) if bearing > 0 else (-1.0, 1.0)
+        sides = [(1.0, TURN_LEFT), (-1.0, TURN_RIGHT)]
+        if bearing <= 0:
+            sides.reverse()
         # For a small bearing the robot does not turn the long way round.
-        for side in sides if abs(bearing) > math.pi / 2 else sides[:1]:
-            if may_turn(self._body, points, estimate, side):
+        for side, places in sides if abs(bearing) > math.pi / 2 else sides[:1]:
+            if room(self._body, points, estimate, places) is not None:
                 return Twist(0.0, side * rate)
-        if abs(bearing) > math.pi / 2 and may_back_up(self._body, points, estimate):
+        if abs(bearing) > math.pi / 2 and room(self._body, points, estimate, BACK_UP) is not None:
             return Twist(-min(BACK_SPEED, self._setup.speed), 0.0)
         self.stuck = True
         return STOP
@@ -137,6 +131,8 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     `places` are relative to the robot at `estimate`; the first one is where it is now. A point within the margin may come a little
     nearer, so that the robot can turn away from it, but must not be touched, or touched harder.
     """
+    if not points.shape[1]:
+        return ROOM
     apart = body.apart(points, places @ seen_from(estimate))
     least = float(apart.min())
     if least >= 0:
@@ -144,20 +140,6 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     now, nearest = apart[0], apart[1:].min(axis=0)
     may = np.minimum(now, np.maximum(np.minimum(now, 0.0) - GIVE, -body.margin))
     return None if (nearest < may).any() else 0.0
-
-
-def may_turn(body: Footprint, points: Floats, estimate: Estimate, side: float) -> bool:
-    """Whether the robot can turn on the spot a little without touching `points` (3, N); `side` is 1 for left, -1 for right."""
-    return not points.shape[1] or room(body, points, estimate, LEFT if side > 0 else RIGHT) is not None
-
-
-def may_back_up(body: Footprint, points: Floats, estimate: Estimate) -> bool:
-    """Whether the robot can back up a little without touching `points` (3, N)."""
-    return not points.shape[1] or room(body, points, estimate, BACK) is not None
-
-
-def _turned(angle: float) -> Floats:
-    return seen_from(Estimate(0.0, 0.0, angle))[:2]
 
 
 def _arc(distance: float, bearing: float) -> Floats:
@@ -173,9 +155,3 @@ def _arc(distance: float, bearing: float) -> Floats:
     along[:, 2] = -radius * sines
     across[:, 2] = radius - radius * cosines
     return places
-
-
-# Small turns on the spot, and a little way back.
-LEFT = np.stack([_turned(angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
-RIGHT = np.stack([_turned(-angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
-BACK = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

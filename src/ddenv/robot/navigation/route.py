@@ -36,15 +36,17 @@ class Path:
     """
 
     def __init__(self, corners: list[Place], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
-        self.corners = corners
-        self.final = final
-        self.back, self.on = back, on
-        self.off = 0.0
-        self._legs = [_leg(*pair) for pair in pairwise(corners)]
+        self.corners, self.final = corners, final
+        self.back, self.on, self.off = back, on, 0.0
+        self._legs = []
+        for (x, y), end in pairwise(corners):
+            dx, dy = end[0] - x, end[1] - y
+            length = math.hypot(dx, dy)
+            cosine, sine = (dx / length, dy / length) if length else (1.0, 0.0)
+            self._legs.append(Leg(x, y, cosine, sine, length))
         # The length of the path from the start of each leg.
         self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
-        self._number = 0
-        self._along = 0.0
+        self._number, self._along = 0, 0.0
 
     @property
     def end(self) -> Place:
@@ -81,19 +83,10 @@ class Path:
         return np.array([self.ahead(0.0), *self.corners[self._number + 1 :]])
 
 
-def _leg(start: Place, end: Place) -> Leg:
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    length = math.hypot(dx, dy)
-    if not length:
-        return Leg(*start, 1.0, 0.0, 0.0)
-    return Leg(*start, dx / length, dy / length, length)
-
-
 # Steps from a cell, counterclockwise from the x axis; step k runs along axis k % 4.
 STEPS = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
 AXES = np.arange(8) % 4
-# Longer than any path: only what cannot be passed is longer.
-LONGEST = 1e9
+LONGEST = 1e9  # longer than any path: only what cannot be passed is longer
 
 
 class Grid:
@@ -142,14 +135,10 @@ WEIGHT = 4.0
 FALL = 5.0
 # The factor for a direction in which only a shorter robot would fit: the straightened path may fit this one.
 TIGHT = 1.5
-# The factor for blocked cells where the robot already is: it has to get out of there.
-HEAVY = 50.0
-# A path can be cut short at corners that are at most this many cells apart.
-APART = 3
-# A shortcut may come nearer to an obstacle by this, m.
-NEARER = 0.015
-# A path at most this many times longer than the straight line is not searched again.
-STRAIGHT = 1.03
+HEAVY = 50.0  # the factor for blocked cells where the robot already is: it has to get out of there
+APART = 3  # a path can be cut short at corners that are at most this many cells apart
+NEARER = 0.015  # a shortcut may come nearer to an obstacle by this, m
+STRAIGHT = 1.03  # a path at most this many times longer than the straight line is not searched again
 # Before and after a narrow place the path goes straight on for the first of these distances (m) that is free.
 STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
 # The sharpest turn there, as the cosine of its angle.
@@ -162,8 +151,7 @@ class Planner:
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
-        self._goal = setup.goal
-        self._tolerance = setup.tolerance
+        self._goal, self._tolerance = setup.goal, setup.tolerance
         self._body = Footprint.of(setup)
         self._side = self._body.side + planner.padding
         self._reach = max(self._body.ahead, self._body.behind)
@@ -189,28 +177,7 @@ class Planner:
         free, near = legs_beside(points, ends[:1], ends[1:], 0.0, self._body.ahead, self._side)
         if free[0] and near[0] >= self._inflation:
             return straight
-        return self._search(points, (x, y))
-
-    def room(self, path: Path, points: Floats) -> float | None:
-        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if one blocks it."""
-        rest = path.rest()
-        inflation: float = self._inflation
-        if not len(points) or len(rest) < 2:
-            return inflation
-        back = np.full(len(rest) - 1, path.back)
-        # What is beside the robot now does not block its path.
-        back[0] = -min(self._body.ahead, path.left)
-        free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
-        return min(float(near.min()), inflation) if free.all() else None
-
-    def is_best(self, path: Path, points: Floats) -> bool:
-        """Whether no path can be much better than what is left of `path`: it is free, with room, and nearly straight."""
-        room = self.room(path, points)
-        if room is None or room < self._inflation:
-            return False
-        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
-
-    def _search(self, points: Floats, start: Place) -> Path | None:
+        start = (x, y)
         corner = (np.rint(np.array(start) / self._step) - self._grid.count // 2) * self._step
         factors, near = self._costs(points - corner)
         factors[:, self._close] = np.minimum(factors[:, self._close], HEAVY)
@@ -234,6 +201,25 @@ class Planner:
         on_map = bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
         final = left <= self._tolerance and on_map
         return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
+
+    def room(self, path: Path, points: Floats) -> float | None:
+        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if one blocks it."""
+        rest = path.rest()
+        inflation: float = self._inflation
+        if not len(points) or len(rest) < 2:
+            return inflation
+        back = np.full(len(rest) - 1, path.back)
+        # What is beside the robot now does not block its path.
+        back[0] = -min(self._body.ahead, path.left)
+        free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
+        return min(float(near.min()), inflation) if free.all() else None
+
+    def is_best(self, path: Path, points: Floats) -> bool:
+        """Whether no path can be much better than what is left of `path`: it is free, with room, and nearly straight."""
+        room = self.room(path, points)
+        if room is None or room < self._inflation:
+            return False
+        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
 
     def _target(self, lengths: Floats, corner: Floats, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""

@@ -13,10 +13,10 @@ from pydrake.systems.framework import Context
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.plant import Body
+from ddenv.world.extent import Bounds
 
 NEAR = 0.1  # m; models this near to something that moves are simulated with it
-# Half the size of a box around nothing: no other box is ever near it, m.
-NOTHING = -1e6
+NOTHING = -1e6  # half the size of a box around nothing: no other box is ever near it, m
 
 
 @dataclass(frozen=True)
@@ -41,22 +41,21 @@ class Motion:
 
     def of(self, numbers: Sequence[int]) -> Motion:
         """The motion of the links `numbers` alone."""
-        return Motion(*(part[numbers] for part in self._parts()))
+        return Motion(*(part[numbers] for part in vars(self).values()))
+
+    def copy(self) -> Motion:
+        return Motion(*(part.copy() for part in vars(self).values()))
 
     def put(self, numbers: Sequence[int], other: Motion) -> None:
         """Overwrites the motion of the links `numbers` with `other`."""
-        for mine, others in zip(self._parts(), other._parts(), strict=True):
+        for mine, others in zip(vars(self).values(), vars(other).values(), strict=True):
             mine[numbers] = others
 
     def below(self, height: float) -> Booleans:
         """Which links (N,) lie completely below `height` (m)."""
         # A box around nothing has its highest corner below its lowest.
         empty = self.high[:, 2] < self.low[:, 2]
-        below: Booleans = np.where(empty, self.places[:, 2], self.high[:, 2]) < height
-        return below
-
-    def _parts(self) -> tuple[Floats, ...]:
-        return self.low, self.high, self.speed, self.places, self.turns
+        return np.where(empty, self.places[:, 2], self.high[:, 2]) < height
 
 
 @dataclass(frozen=True)
@@ -98,14 +97,14 @@ class Links:
         halves = np.einsum("nij,nj->ni", np.abs(turns), self.halves[numbers])
         return Motion(centers - halves, centers + halves, moving + turning * self.reach[numbers], places, turns)
 
-    def pace(self, numbers: Sequence[int], before: Motion, after: Motion, seconds: float) -> Floats:
-        """The mean speed (K,) of each link's fastest point between two motions that lie `seconds` apart, m/s.
+    def ways(self, numbers: Sequence[int] | slice, before: Motion, after: Motion) -> Floats:
+        """How far (K,) each link's farthest point has moved between two motions, m.
 
-        Unlike `Motion.speed` it is small for links that only tremble, as boards do that lie across each other.
+        Over time that is small, unlike `Motion.speed`, for links that only tremble, as boards do that lie across each other.
         """
         way = np.linalg.norm(after.places - before.places, axis=1)
         turn = np.linalg.norm(after.turns - before.turns, axis=(1, 2)) / np.sqrt(2.0)
-        return cast(Floats, (way + turn * self.reach[numbers]) / seconds)
+        return cast(Floats, way + turn * self.reach[numbers])
 
     @property
     def models(self) -> Integers:
@@ -136,28 +135,22 @@ def tight_gaps(a: Links, of_a: Motion, b: Links, of_b: Motion, wanted: Booleans)
     apart = np.full((len(a.bodies), len(b.bodies)), np.inf)
     rows, columns = np.nonzero(wanted[a.models][:, b.models])
     if len(rows):
-        apart[rows, columns] = _parted(
-            (a.centers[rows], a.halves[rows], of_a.places[rows], of_a.turns[rows]),
-            (b.centers[columns], b.halves[columns], of_b.places[columns], of_b.turns[columns]),
-        )
+        turns, others_turns = of_a.turns[rows], of_b.turns[columns]
+        way = np.einsum("nij,nj->ni", others_turns, b.centers[columns]) + of_b.places[columns]
+        way = way - np.einsum("nij,nj->ni", turns, a.centers[rows]) - of_a.places[rows]
+        # The 15 axes that can part two boxes.
+        own, others = np.swapaxes(turns, 1, 2), np.swapaxes(others_turns, 1, 2)
+        crosses = np.cross(own[:, :, None], others[:, None]).reshape(len(way), 9, 3)
+        lengths = np.linalg.norm(crosses, axis=2, keepdims=True)
+        crosses = np.where(lengths > 1e-6, crosses / np.maximum(lengths, 1e-6), 0.0)
+        axes = np.concatenate([own, others, crosses], axis=1)
+        spans = [
+            np.einsum("nkj,nj->nk", np.abs(np.einsum("nka,nja->nkj", axes, each)), halves)
+            for each, halves in ((own, a.halves[rows]), (others, b.halves[columns]))
+        ]
+        apart[rows, columns] = (np.abs(np.einsum("nka,na->nk", axes, way)) - spans[0] - spans[1]).max(axis=1)
     least: Floats = np.minimum.reduceat(apart, a.first, axis=0)
     return np.minimum.reduceat(least, b.first, axis=1)
-
-
-def _parted(a: tuple[Floats, ...], b: tuple[Floats, ...]) -> Floats:
-    """The gap (N,) between N pairs of boxes: along the axis where it is widest, of the 15 that can part two boxes."""
-    way = np.einsum("nij,nj->ni", b[3], b[0]) + b[2] - np.einsum("nij,nj->ni", a[3], a[0]) - a[2]
-    own, others = np.swapaxes(a[3], 1, 2), np.swapaxes(b[3], 1, 2)
-    crosses = np.cross(own[:, :, None], others[:, None]).reshape(len(way), 9, 3)
-    lengths = np.linalg.norm(crosses, axis=2, keepdims=True)
-    crosses = np.where(lengths > 1e-6, crosses / np.maximum(lengths, 1e-6), 0.0)
-    axes = np.concatenate([own, others, crosses], axis=1)
-    spans = [
-        np.einsum("nkj,nj->nk", np.abs(np.einsum("nka,nja->nkj", axes, each[3].swapaxes(1, 2))), each[1])
-        for each in (a, b)
-    ]
-    gap: Floats = (np.abs(np.einsum("nka,na->nk", axes, way)) - spans[0] - spans[1]).max(axis=1)
-    return gap
 
 
 def spread(start: Booleans, joined: Booleans) -> Booleans:
@@ -179,8 +172,7 @@ class Stillness:
 
     def __init__(self, links: Links) -> None:
         self._links = links
-        count = len(links.bodies)
-        self._places, self._turns = np.zeros((count, 3)), np.zeros((count, 3, 3))
+        self._was = Motion.still(len(links.bodies))
         self._calm = np.zeros(len(links.first))  # s
 
     def look(self, motion: Motion, seconds: float) -> None:
@@ -190,22 +182,19 @@ class Stillness:
 
     def moved(self, motion: Motion) -> Booleans:
         """Which models (M,) have moved since their time was last counted anew."""
-        way = np.linalg.norm(motion.places - self._places, axis=1)
-        turn = np.linalg.norm(motion.turns - self._turns, axis=(1, 2)) / np.sqrt(2.0)
-        moved: Booleans = np.maximum.reduceat(way + turn * self._links.reach, self._links.first) > SLOW * CALM
-        return moved
+        ways = self._links.ways(slice(None), self._was, motion)
+        return np.maximum.reduceat(ways, self._links.first) > SLOW * CALM
 
     def restart(self, models: Booleans, motion: Motion) -> None:
         """Counts the time of `models` (M,) from now on."""
         links = self._links.of_models(np.flatnonzero(models))
-        self._places[links], self._turns[links] = motion.places[links], motion.turns[links]
+        self._was.put(links, motion.of(links))
         self._calm[models] = 0.0
 
     @property
     def at_rest(self) -> Booleans:
         """Which models (M,) have been still for long enough."""
-        rest: Booleans = self._calm >= CALM
-        return rest
+        return self._calm >= CALM
 
 
 @dataclass(frozen=True)
@@ -213,8 +202,8 @@ class Script:
     """How a pile of K models moves alone, with a row for each tick of the clock.
 
     `names` are its models in the order of the world file. `states` (T, E) are the pile's positions and velocities in the order of
-    `Hold.entries`; `motions` and `paces` (T of each; `Links.pace`, m/s) are those of its links. `resting` (K,) are the models that
-    are at rest after the last row, or have fallen out of the world.
+    `Hold.entries`; `motions` and `paces` (T of each) are those of its links, paces their mean speeds since the row before, m/s.
+    `resting` (K,) are the models that are at rest after the last row, or have fallen out of the world.
     """
 
     names: tuple[str, ...]
@@ -222,6 +211,11 @@ class Script:
     motions: tuple[Motion, ...]
     paces: tuple[Floats, ...]
     resting: Booleans
+
+    def bounds(self) -> Bounds:
+        """The lowest and the highest corner of the box around all that the pile passes through, m."""
+        low = np.min([motion.low.min(axis=0) for motion in self.motions], axis=0)
+        return low, np.max([motion.high.max(axis=0) for motion in self.motions], axis=0)
 
     @property
     def size(self) -> int:

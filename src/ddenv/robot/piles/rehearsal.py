@@ -1,4 +1,4 @@
-"""How piles move while nobody comes near them: simulated once for each pile, and played back in every run.
+"""How piles move while nobody comes near them, where they come to rest, and which models rest on which.
 
 A pile that is simulated together with the robot would change the last bits of the robot's motion, even from far away: the
 solver ends its iterations for all contacts of the world at once. So each pile that starts away from the robot is simulated
@@ -9,23 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+from pydrake.geometry import QueryObject
+from pydrake.math import RotationMatrix
 from pydrake.systems.analysis import Simulator
 
-from ddenv.arrays import Booleans, Floats
+from ddenv.arrays import Booleans
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.motion import NEAR, Links, Motion, Script, gaps, spread
+from ddenv.robot.piles.motion import CALM, NEAR, Links, Script, gaps, spread
 from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.settled import Settled
 from ddenv.world.extent import model_bounds
 from ddenv.world.model import World, still_links
+from ddenv.world.pose import Pose, vector
 
 # The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
 BUDGET = 200.0
 LEAST = 1.0
-# What the scripts of a world may take in a worker's memory, bytes.
-MEMORY = 200e6
+MEMORY = 200e6  # what the scripts of a world may take in a worker's memory, bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +94,12 @@ class Repertoire:
 
     def add(self, names: tuple[str, ...], present: frozenset[str], script: Script | None, margin: float) -> Known:
         """Stores the script of a pile that can touch what is within `margin` (m) of its links."""
-        near = frozenset(self._static) if script is None else frozenset(self._near(script.motions, margin))
+        near = frozenset(self._static)
+        if script is not None:
+            low, high = script.bounds()
+            low, high = low - margin, high + margin
+            boxes = [(name, box) for name, box in self._static.items() if box]
+            near = frozenset(name for name, box in boxes if (box[0] < high).all() and (low < box[1]).all())
         known = Known(names, near, near & present, script)
         self._known.setdefault(names, []).append(known)
         # A pile that cannot be rehearsed takes memory, too: the names of all models that stay.
@@ -99,11 +108,11 @@ class Repertoire:
             self._known, self._size = {}, 0
         return known
 
-    def _near(self, motions: Iterable[Motion], margin: float) -> Iterable[str]:
-        """The static models that a pile could have touched while it moved."""
-        low = np.min([motion.low.min(axis=0) for motion in motions], axis=0) - margin
-        high = np.max([motion.high.max(axis=0) for motion in motions], axis=0) + margin
-        return (name for name, box in self._static.items() if box and (box[0] < high).all() and (low < box[1]).all())
+
+# A contact carries where its normal points at least this far up (the cosine of 60 degrees): boards lean on steep edges.
+UPWARDS = 0.5
+# How often the contacts are looked at within the last `CALM` seconds: models that tremble do not touch all the time.
+LOOKS = 4
 
 
 class Rehearsals:
@@ -117,7 +126,13 @@ class Rehearsals:
         # The same for every run in this world, whatever is kept: removing a model must not end the script of another.
         self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
         context.hold.reset()
-        self._apart, self._to_robot = self._start_gaps()
+        # The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m.
+        self._apart, self._to_robot = np.empty((0, 0)), np.empty(0)
+        if self._bodies:
+            links, robot = Links.of(self._bodies), Links.of([context.built.robot])
+            there = links.observe(self._plant, context.plant_context, range(len(links.bodies)))
+            here = robot.observe(self._plant, context.plant_context, range(len(robot.bodies)))
+            self._apart, self._to_robot = gaps(links, there, links, there), gaps(robot, here, links, there)[0]
 
     def learn(self, present: frozenset[str]) -> None:
         """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has."""
@@ -136,7 +151,7 @@ class Rehearsals:
         near_robot = spread(self._to_robot[numbers] < NEAR, joined)
         return self._known(self._piles(numbers, joined, ~near_robot), present)
 
-    def settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
+    def _settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
         """All piles of the plant with their scripts, as if there were no robot. None: the simulation broke.
 
         Piles that come near each other on their way are one pile.
@@ -151,6 +166,88 @@ class Rehearsals:
                 return settled
             joined = meeting
 
+    def settled(self, present: frozenset[str]) -> Settled:
+        """How the world settles that has the models `present`."""
+        context = self._context
+        context.presence.remove(frozenset())
+        places: dict[str, tuple[Pose, ...]] = {}
+        found: dict[str, set[str]] = {"restless": set(), "fallen": set(), "broken": set()}
+        ticks, seconds = context.clock.ticks, 0.0
+        for pile, script in self._settle(present):
+            if script is None:
+                found["broken"].update(_names(pile))
+                continue
+            seconds = max(seconds, ticks[len(script.states) - 1].time)
+            last, first = script.motions[-1], 0
+            gone = last.below(context.floor)
+            for body, rests in zip(pile, script.resting, strict=True):
+                links = range(first, first := first + len(body.links))
+                turns = (RotationMatrix(last.turns[link]).ToQuaternion().wxyz().tolist() for link in links)
+                places[body.name] = tuple(
+                    Pose(vector(last.places[link]), (w, x, y, z))
+                    for link, (w, x, y, z) in zip(links, turns, strict=True)
+                )
+                if gone[links].all():
+                    found["fallen"].add(body.name)
+                elif not rests:
+                    found["restless"].add(body.name)
+        in_order = [name for name in context.built.moving if name in present]
+        return Settled(
+            seconds=seconds,
+            places={name: places[name] for name in in_order if name in places},
+            **{kind: tuple(name for name in in_order if name in names) for kind, names in found.items()},
+        )
+
+    def supports(self, present: frozenset[str], elements: frozenset[str]) -> list[tuple[str, str]]:
+        """Each of `elements` that can move with each one that it rests on, as (upper, lower), sorted.
+
+        `present` are the models of the world. What rests on something that is no element, and so always stays, rests on what that
+        rests on.
+        """
+        hold, presence = self._context.hold, self._context.presence
+        presence.remove(frozenset())
+        settled = self._settle(present)
+        hold.begin(others=(self._context.built.robot,))
+        presence.join(self._bodies, (), robot=False)
+        below: dict[str, set[str]] = {}
+        try:
+            for back in np.linspace(0.0, CALM, LOOKS):
+                for pile, script in settled:
+                    entries = hold.entries(pile)
+                    # A pile whose simulation breaks is taken as it starts.
+                    values = hold.start[entries]
+                    if script is not None:
+                        ticks = self._context.clock.ticks[: len(script.states)]
+                        values = script.states[sum(tick.time < ticks[-1].time - back for tick in ticks)]
+                    hold.put(entries, values)
+                hold.apply()
+                self._note_contacts(below)
+        finally:
+            presence.part(self._bodies, ())
+        pairs = set()
+        for upper in elements & set(below):
+            reached, ahead = set[str](), set(below[upper])
+            while ahead:
+                one = ahead.pop()
+                reached.add(one)
+                ahead |= set() if one in elements else below.get(one, set()) - reached
+            pairs |= {(upper, lower) for lower in reached & elements - {upper}}
+        return sorted(pairs)
+
+    def _note_contacts(self, below: dict[str, set[str]]) -> None:
+        """Notes for each model that can move what it rests on now."""
+        built = self._context.built
+        # The robot's shapes are missing.
+        model_of = {shape: name for name, identities in built.shapes() for shape in identities}
+        query = cast(QueryObject, built.plant.get_geometry_query_input_port().Eval(self._context.plant_context))
+        for contact in query.ComputePointPairPenetration():
+            first, second = model_of.get(contact.id_A), model_of.get(contact.id_B)
+            # The normal points from the second to the first.
+            up = contact.nhat_BA_W[2]
+            upper, lower = (first, second) if up > 0 else (second, first)
+            if upper and lower and upper != lower and upper in built.moving and abs(up) >= UPWARDS:
+                below.setdefault(upper, set()).add(lower)
+
     def _meetings(self, settled: Sequence[tuple[tuple[Body, ...], Script | None]]) -> Booleans:
         """Which moving models (M, M) of two piles come near each other: by the boxes around all that a pile passes through."""
         count = len(self._bodies)
@@ -160,24 +257,13 @@ class Rehearsals:
             members = [number_of[body.name] for body in bodies]
             pile_of[members] = pile
             if script is not None:
-                low[members] = np.min([motion.low.min(axis=0) for motion in script.motions], axis=0)
-                high[members] = np.max([motion.high.max(axis=0) for motion in script.motions], axis=0)
+                low[members], high[members] = script.bounds()
         apart = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).max(axis=2)
         near: Booleans = (apart < NEAR) & (pile_of[:, None] != pile_of)
         return near
 
     def _known(self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]) -> list[Known]:
-        """What is known of `piles`, rehearsed where nothing is known yet."""
         return [self._repertoire.find(_names(pile), present) or self._rehearse(pile, present) for pile in piles]
-
-    def _start_gaps(self) -> tuple[Floats, Floats]:
-        """The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m."""
-        if not self._bodies:
-            return np.empty((0, 0)), np.empty(0)
-        links, robot = Links.of(self._bodies), Links.of([self._context.built.robot])
-        there = links.observe(self._plant, self._context.plant_context, range(len(links.bodies)))
-        here = robot.observe(self._plant, self._context.plant_context, range(len(robot.bodies)))
-        return gaps(links, there, links, there), gaps(robot, here, links, there)[0]
 
     def _piles(self, numbers: Sequence[int], joined: Booleans, left: Booleans) -> list[tuple[Body, ...]]:
         """The moving models `numbers` (K,) in the groups that `joined` (K, K) makes of them; only groups that are `left` (K,)."""
@@ -191,32 +277,27 @@ class Rehearsals:
         return piles
 
     def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known:
-        script = self._simulate(pile)
-        if script and self._context.region:
-            for motion in script.motions:
-                self._context.region.check((motion.low, motion.high))
-        fastest = max(motion.speed.max() for motion in script.motions) if script else 0.0
-        return self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._context.clock.period)
-
-    def _simulate(self, pile: tuple[Body, ...]) -> Script | None:
-        """Simulates the pile alone until all of it rests or its time is up; None if the simulation breaks."""
-        self._context.diagram_context.SetTime(0.0)
-        sleep = Sleep(self._context, pile, (), alone=True)
+        """Simulates the pile alone until all of it rests or its time is up; there is no script if the simulation breaks."""
+        context, script, margin = self._context, None, NEAR
+        context.diagram_context.SetTime(0.0)
+        sleep = Sleep(context, pile, (), alone=True)
         try:
-            return self._rows(pile, sleep)
+            script = self._rows(pile, sleep)
         # Drake raises SystemExit when one of its own checks fails.
         except (RuntimeError, ValueError, SystemExit):
-            return None
+            pass
         finally:
             sleep.end()
+        if script is not None:
+            if context.region is not None:
+                for motion in script.motions:
+                    context.region.check((motion.low, motion.high))
+            margin = NEAR + max(motion.speed.max() for motion in script.motions) * context.clock.period
+        return self._repertoire.add(_names(pile), present, script, margin)
 
     def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> Script:
-        """Records the pile at each tick."""
-        built, plant_context, entries = (
-            self._context.built,
-            self._context.plant_context,
-            self._context.hold.entries(pile),
-        )
+        built, plant_context = self._context.built, self._context.plant_context
+        entries = self._context.hold.entries(pile)
         motors = self._plant.get_desired_state_input_port(built.robot.instance)
         motors.FixValue(plant_context, np.zeros(motors.size()))
         simulator = Simulator(built.diagram, self._context.diagram_context)
@@ -227,10 +308,9 @@ class Rehearsals:
             if not np.isfinite(self._context.hold.state()).all():
                 raise ValueError("not finite")
             sleep.tick(tick.step)
-            motion, pace = sleep.motion()
             states.append(sleep.state()[entries])
-            motions.append(motion)
-            paces.append(pace)
+            motions.append(sleep.motion.copy())
+            paces.append(sleep.pace.copy())
             if sleep.at_rest.all() or tick.time >= self._longest:
                 break
         return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), sleep.at_rest)

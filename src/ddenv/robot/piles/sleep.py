@@ -45,18 +45,11 @@ class Sleep:
         alone: bool = False,
     ) -> None:
         hold, clock = context.hold, context.clock
-        self._plant = context.built.plant
-        self._context = context.plant_context
-        self._presence = context.presence
-        self._hold = hold
-        self._twins = context.twins
-        self._period = clock.period
-        self._step = clock.step
-        self._floor = context.floor
-        self._kept = kept
-        self._never = never
-        self._links = Links.of(kept)
-        self._robot = Links.of([context.built.robot])
+        self._plant, self._context = context.built.plant, context.plant_context
+        self._presence, self._hold, self._twins = context.presence, hold, context.twins
+        self._period, self._step, self._floor = clock.period, clock.step, context.floor
+        self._kept, self._never = kept, never
+        self._links, self._robot = Links.of(kept), Links.of([context.built.robot])
         self._entries = [hold.entries([body]) for body in kept]
         number_of = {body.name: number for number, body in enumerate(kept)}
         self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
@@ -66,26 +59,22 @@ class Sleep:
         self._real = hold.start.copy()
         self._away: Booleans = np.zeros(len(hold.start), dtype=bool)
         count = len(kept)
-        self._awake: Booleans = np.zeros(count, dtype=bool)
-        # Fallen out of the world.
-        self._gone: Booleans = np.zeros(count, dtype=bool)
+        # Which models are simulated, have fallen out of the world, or still move although their script has ended.
+        self._awake, self._gone, self._due, self._took_part = np.zeros((4, count), dtype=bool)
         # The number of the script that moves a model, or -1.
         self._played: Integers = np.full(count, -1)
         for number, (_, members) in enumerate(self._scripts):
             self._played[members] = number
-        # Models whose script has ended although they still move.
-        self._due: Booleans = np.zeros(count, dtype=bool)
-        self._motion = Motion.still(len(self._links.bodies))
-        self._pace = np.zeros(len(self._links.bodies))
-        self._took_part: Booleans = np.zeros(count, dtype=bool)
+        # Of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s.
+        self.motion = Motion.still(len(self._links.bodies))
+        self.pace = np.zeros(len(self._links.bodies))
         self._stillness = Stillness(self._links)
         # Where models were when they woke last.
         self._when_woken = Stillness(self._links)
         self._loads = Loads(context, kept)
         # Where the robot was (M, 12) when each model last woke, or was awake, beside it, m.
         self._robot_was = np.full((count, 12), np.inf)
-        self._tick = 0
-        self._now = 0
+        self._tick = self._now = 0
         hold.begin(others=[context.built.robot] if alone else ())
         self._twins.lift_all()
         for entries in self._entries:
@@ -102,7 +91,7 @@ class Sleep:
             self._play()
             self._look(np.flatnonzero(self._awake), seconds)
             # What has fallen out of the world is not worth simulating.
-            self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
+            self._gone |= np.logical_and.reduceat(self.motion.below(self._floor), self._links.first)
             self._lay(self._awake & self._gone)
             self._decide(seconds)
         # Also when no moving model is kept: removed ones are held, too.
@@ -112,7 +101,7 @@ class Sleep:
 
     def boxes(self) -> Bounds:
         """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at the last tick."""
-        low, high = self._motion.low, self._motion.high
+        low, high = self.motion.low, self.motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
 
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
@@ -120,24 +109,16 @@ class Sleep:
         their speeds (K,), m/s.
         """
         links = self._links.of_models(np.flatnonzero(self._awake))
-        return self._motion.low[links], self._motion.high[links], self._motion.speed[links]
+        return self.motion.low[links], self.motion.high[links], self.motion.speed[links]
 
     @property
     def took_part(self) -> frozenset[str]:
         """The kept models that were simulated, or were perhaps touched by the robot or by what was."""
         return frozenset(body.name for body in self._bodies(self._took_part))
 
-    def poses(self) -> tuple[Floats, Floats]:
-        """The poses of all L links of the kept models at the last tick: places (L, 3) m and rotations (L, 3, 3)."""
-        return self._motion.places, self._motion.turns
-
     def state(self) -> Floats:
         """The plant's positions and velocities (P + V,), with everything where it really is."""
         return np.where(self._away, self._real, self._hold.state())
-
-    def motion(self) -> tuple[Motion, Floats]:
-        """The motion of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s."""
-        return self._motion.of(range(len(self._links.bodies))), self._pace.copy()
 
     @property
     def at_rest(self) -> Booleans:
@@ -157,8 +138,8 @@ class Sleep:
             row = min(self._tick, len(script.motions) - 1)
             links = self._links.of_models(members)
             self._real[self._entries_of[number]] = script.states[row]
-            self._motion.put(links, script.motions[row])
-            self._pace[links] = script.paces[row]
+            self.motion.put(links, script.motions[row])
+            self.pace[links] = script.paces[row]
             self._hold_still(member for member in members if not self._has_twin[member])
             if row == len(script.motions) - 1:
                 self._played[members] = -1
@@ -170,7 +151,7 @@ class Sleep:
         for number in models:
             if self._has_twin[number] and not self._gone[number]:
                 links = self._links.of_models([number])
-                self._twins.lay(self._kept[number], self._motion.places[links], self._motion.turns[links])
+                self._twins.lay(self._kept[number], self.motion.places[links], self.motion.turns[links])
 
     def _hold_still(self, models: Iterable[int]) -> None:
         """Holds the bodies of `models`: away from everything, or where they are if they have no twin."""
@@ -183,21 +164,21 @@ class Sleep:
         links = self._links.of_models(models)
         if not links:
             return
-        before, now = self._motion.of(links), self._links.observe(self._plant, self._context, links)
-        self._motion.put(links, now)
+        before, now = self.motion.of(links), self._links.observe(self._plant, self._context, links)
+        self.motion.put(links, now)
         if seconds:
-            self._pace[links] = self._links.pace(links, before, now, seconds)
+            self.pace[links] = self._links.ways(links, before, now) / seconds
 
     def _decide(self, seconds: float) -> None:
         """Wakes models and lays others to sleep, `seconds` after the last time."""
-        slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
-        speed = np.maximum.reduceat(self._motion.speed, self._links.first)
+        slow = np.maximum.reduceat(self.pace, self._links.first) < SLOW
+        speed = np.maximum.reduceat(self.motion.speed, self._links.first)
         near, close = self._near(speed)
         played = self._played >= 0
         moving = self._awake | played
         if not (near | close | moving | self._due).any():
             return
-        apart = gaps(self._links, self._motion, self._links, self._motion)
+        apart = gaps(self._links, self.motion, self._links, self.motion)
         apart[self._gone] = apart[:, self._gone] = np.inf
         np.fill_diagonal(apart, np.inf)
         # Pairs (M, M): moved by the same script; near enough to carry each other; near, and one of them is not slow.
@@ -211,7 +192,7 @@ class Sleep:
         # Something that is simulated may touch it before the tick after next.
         beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
         self._took_part |= near | beside.any(axis=1)
-        self._stillness.look(self._motion, seconds)
+        self._stillness.look(self.motion, seconds)
         within = self._settled & (near | touching[:, self._awake].any(axis=1))
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
         start: Booleans = ~self._awake & (close | met | self._due | (pressed & self._settled))
@@ -237,8 +218,8 @@ class Sleep:
         robot = self._robot.observe(self._plant, self._context, range(len(self._robot.bodies)))
         # Its wheels turn, but do not come nearer by that.
         margin = (speed + robot.speed[0]) * self._period
-        wanted = gaps(self._robot, robot, self._links, self._motion) < NEAR + margin
-        apart = tight_gaps(self._robot, robot, self._links, self._motion, wanted)[0]
+        wanted = gaps(self._robot, robot, self._links, self.motion) < NEAR + margin
+        apart = tight_gaps(self._robot, robot, self._links, self.motion, wanted)[0]
         place = np.concatenate([robot.places[0], (robot.turns[0] * self._robot.reach[0] / np.sqrt(2.0)).ravel()])
         passing = np.linalg.norm(self._robot_was - place, axis=1) > PASSED
         lies = self._settled
@@ -249,14 +230,13 @@ class Sleep:
 
     def _struck(self, apart: Floats) -> Booleans:
         """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""
-        pace = np.maximum.reduceat(self._pace, self._links.first)
+        pace = np.maximum.reduceat(self.pace, self._links.first)
         reach = CLOSE + pace * self._period
         wanted = self._settled[:, None] & (self._awake & (pace > FAST)) & (apart < reach)
         if not wanted.any():
             return np.zeros_like(self._awake)
-        tight = tight_gaps(self._links, self._motion, self._links, self._motion, wanted)
-        struck: Booleans = np.asarray((tight < reach).any(axis=1))
-        return struck
+        tight = tight_gaps(self._links, self.motion, self._links, self.motion, wanted)
+        return np.asarray((tight < reach).any(axis=1))
 
     def _wake(self, models: Booleans) -> None:
         """Lets the simulator move `models` (M,), starting from where they are now."""
@@ -274,14 +254,14 @@ class Sleep:
         self._awake |= models
         self._took_part |= models
         self._due &= ~models
-        self._stillness.restart(models, self._motion)
-        self._when_woken.restart(models, self._motion)
+        self._stillness.restart(models, self.motion)
+        self._when_woken.restart(models, self.motion)
 
     def _lay(self, models: Booleans) -> None:
         """Holds `models` (M,), which are awake, where they are now."""
         if not models.any():
             return
-        self._loads.bore(models & ~self._when_woken.moved(self._motion))
+        self._loads.bore(models & ~self._when_woken.moved(self.motion))
         numbers = np.flatnonzero(models)
         entries = np.concatenate([self._entries[number] for number in numbers])
         self._real[entries] = self._hold.state()[entries]
@@ -292,7 +272,7 @@ class Sleep:
         self._settle(numbers)
         self._presence.part(self._bodies(models), self._bodies(self._awake))
         links = self._links.of_models(numbers)
-        self._motion.speed[links] = self._pace[links] = 0.0
+        self.motion.speed[links] = self.pace[links] = 0.0
 
     def _bodies(self, models: Booleans) -> list[Body]:
         return [body for body, chosen in zip(self._kept, models, strict=True) if chosen]
@@ -352,8 +332,7 @@ class Loads:
         before, now = self._at_rest @ self._up, self._mean @ self._up
         lost = self._known & (before > CARRIES * self._weights[:, None]) & (now < LOST * before)
         self._change = np.linalg.norm(change, axis=1)
-        woken: Booleans = (self._change > self._bears) | lost.any(axis=1)
-        return woken
+        return (self._change > self._bears) | lost.any(axis=1)
 
     def woke(self, models: Booleans, pressed: Booleans) -> None:
         """Takes in that `models` (M,) woke, those of them that are `pressed` (M,) by a change of their load."""

@@ -6,7 +6,7 @@ Sensors are compass, IMU and wheel odometry, each with its own noise. The estima
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,17 +36,10 @@ class Truth(NamedTuple):
     wheels: tuple[float, ...]
 
 
-class Noise:
+def noise(random: np.random.Generator) -> Iterator[float]:
     """A stream of standard normal numbers."""
-
-    def __init__(self, random: np.random.Generator) -> None:
-        self._random = random
-        self._drawn: list[float] = []
-
-    def next(self) -> float:
-        if not self._drawn:
-            self._drawn = self._random.standard_normal(DRAWN).tolist()
-        return self._drawn.pop()
+    while True:
+        yield from reversed(random.standard_normal(DRAWN).tolist())
 
 
 class SensorSuite:
@@ -58,29 +51,29 @@ class SensorSuite:
     def __init__(self, settings: Sensors, seed: int) -> None:
         self._settings = settings
         *own, self.lidar = (np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(4))
-        self._compass, self._imu, self._odometry = (Noise(random) for random in own)
+        self._compass, self._imu, self._odometry = (noise(random) for random in own)
         # Drawn first, once a run: the compass's misalignment, the gyro's drift, the wear of the tyres.
-        self._heading_bias = settings.compass_bias * self._compass.next()
-        self._rate_bias = settings.gyro_bias * self._imu.next()
-        self._scale = 1.0 + settings.odometry_bias * self._odometry.next()
+        self._heading_bias = settings.compass_bias * next(self._compass)
+        self._rate_bias = settings.gyro_bias * next(self._imu)
+        self._scale = 1.0 + settings.odometry_bias * next(self._odometry)
 
     def compass(self, truth: Truth) -> float:
         """The measured heading, rad."""
-        return truth.heading + self._heading_bias + self._settings.compass * self._compass.next()
+        return truth.heading + self._heading_bias + self._settings.compass * next(self._compass)
 
     def imu(self, truth: Truth) -> Imu:
         """The measured turn rate, roll and pitch."""
         settings, noise = self._settings, self._imu
         return Imu(
-            yaw_rate=truth.yaw_rate + self._rate_bias + settings.gyro * noise.next(),
-            roll=truth.roll + settings.tilt * noise.next(),
-            pitch=truth.pitch + settings.tilt * noise.next(),
+            yaw_rate=truth.yaw_rate + self._rate_bias + settings.gyro * next(noise),
+            roll=truth.roll + settings.tilt * next(noise),
+            pitch=truth.pitch + settings.tilt * next(noise),
         )
 
     def odometry(self, wheels: Sequence[float]) -> tuple[float, ...]:
         """The measured speeds of the wheels, rad/s; a wheel that slips is not distinguished from one that grips."""
         scale, spread, noise = self._scale, self._settings.odometry, self._odometry
-        return tuple([speed * (scale + spread * noise.next()) for speed in wheels])
+        return tuple([speed * (scale + spread * next(noise)) for speed in wheels])
 
 
 # The standard deviation of a turn rate that is computed from the wheels of a skidding robot, rad/s.
@@ -136,16 +129,7 @@ class Filter:
         # The Jacobian: how an error of the heading and of the bias grows into the other errors.
         xh, yh, hb = -way * sine, way * cosine, -trust * seconds
         xb, yb = xh * hb / 2, yh * hb / 2
-        self._spread_errors(xh, yh, hb, xb, yb)
-        along = (SLIPPING * way) ** 2
-        turned = self._rate_variance * seconds * seconds + UNSEEN**2 * seconds
-        self._xx += along * cosine * cosine
-        self._xy += along * cosine * sine
-        self._yy += along * sine * sine
-        self._hh += turned
-
-    def _spread_errors(self, xh: float, yh: float, hb: float, xb: float, yb: float) -> None:
-        """The covariance P becomes F P F^T, where F is the identity except for these five entries."""
+        # The covariance P becomes F P F^T, where F is the identity except for these five entries.
         hh, h_b, bb = self._hh, self._hb, self._bb
         # The rows of F P for x, y and h, in the columns that are needed.
         x_h = self._xh + xh * hh + xb * h_b
@@ -159,6 +143,12 @@ class Filter:
         self._yh, self._yb = y_h + hb * y_b, y_b
         self._hh = hh + hb * (2 * h_b + hb * bb)
         self._hb = h_b + hb * bb
+        along = (SLIPPING * way) ** 2
+        turned = self._rate_variance * seconds * seconds + UNSEEN**2 * seconds
+        self._xx += along * cosine * cosine
+        self._xy += along * cosine * sine
+        self._yy += along * sine * sine
+        self._hh += turned
 
     def correct(self, compass: float) -> None:
         """The correction by the heading that the compass measures, `compass` (rad)."""
@@ -241,8 +231,20 @@ class Autonomy:
             self._wheels = self._new["wheels"] = self._suite.odometry(truth.wheels)
         if tick.imu:
             self._imu = self._new["imu"] = self._suite.imu(truth)
-        if tick.odometry or tick.imu:
-            self._advance(tick.step)
+        if (tick.odometry or tick.imu) and tick.step:
+            # The mean speeds of the wheels' rims on both sides, m/s.
+            left, right = (
+                self._drive.radius * sum([self._wheels[number] for number in side]) / len(side)
+                for side in (self._left, self._right)
+            )
+            self._filter.advance(
+                speed=(left + right) / 2,
+                wheel_rate=self._skid * (right - left) / self._drive.track,
+                gyro_rate=self._imu.yaw_rate,
+                pitch=self._imu.pitch,
+                seconds=(tick.step - self._advanced) * self._step,
+            )
+            self._advanced = tick.step
         if tick.compass:
             self._new["compass"] = compass = self._suite.compass(truth)
             if tick.step:
@@ -260,20 +262,3 @@ class Autonomy:
         if self.arrived is None and getattr(self._controller, "arrived", False):
             self.arrived = tick.time
         return command
-
-    def _advance(self, step: int) -> None:
-        if step == self._advanced:
-            return
-        # The mean speeds of the wheels' rims on both sides, m/s.
-        left, right = (
-            self._drive.radius * sum([self._wheels[number] for number in side]) / len(side)
-            for side in (self._left, self._right)
-        )
-        self._filter.advance(
-            speed=(left + right) / 2,
-            wheel_rate=self._skid * (right - left) / self._drive.track,
-            gyro_rate=self._imu.yaw_rate,
-            pitch=self._imu.pitch,
-            seconds=(step - self._advanced) * self._step,
-        )
-        self._advanced = step

@@ -17,21 +17,20 @@ import numpy as np
 
 from ddenv.arrays import Floats, Integers
 from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World, still_links
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, World, still_links
 from ddenv.world.pose import HERE, Pose, Vector, vector
 from ddenv.world.scenario import Lidar
 
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
+KIND_OF = {Box: CUBE, Plane: CUBE, Sphere: BALL, Ellipsoid: BALL, Cylinder: TUBE, Capsule: PILL, Mesh: HULL}
 # Where each kind begins in a sorted array of kinds, and where the last one ends.
 BOUNDS = np.arange(len(KINDS) + 1)
 # A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
 # larger than rounding errors.
 SPARE = 1e-6
-# A plane is the top of a cube of this size, m: what lies below it is inside.
-PLANE = 2e4
-# The minimum half thickness of a shape, m.
-THINNEST = 1e-9
+PLANE = 2e4  # a plane is the top of a cube of this size, m: what lies below it is inside
+THINNEST = 1e-9  # the minimum half thickness of a shape, m
 
 
 @dataclass(frozen=True)
@@ -86,15 +85,23 @@ class Obstacles:
 
     @classmethod
     def of(cls, world: World) -> Obstacles:
-        found = [(owner, *one) for owner, model in enumerate(world.models) for one in _shapes(model)]
-        found.sort(key=lambda one: _kind(one[2]))
+        found: list[tuple[int, int, Shape, Pose]] = []
+        for owner, model in enumerate(world.models):
+            still = {link.name for link in still_links(model)}
+            for number, link in enumerate(model.links):
+                fixed = link.name in still
+                frame = Pose() if fixed else link.pose.inverse()
+                for one in link.collisions:
+                    pose = frame @ one.pose @ Pose(_extent(one.shape)[0])
+                    found.append((owner, -1 if fixed else number, one.shape, pose))
+        found.sort(key=lambda one: KIND_OF[type(one[2])])
         owners, links, shapes, poses = zip(*found, strict=True) if found else ((), (), (), ())
         sizes = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
         halves = sizes.T.copy()
         squares = halves * halves
         turns = np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0)
         arrays = Shapes(
-            kinds=np.array([_kind(shape) for shape in shapes], dtype=int),
+            kinds=np.array([KIND_OF[type(shape)] for shape in shapes], dtype=int),
             centers=np.array([pose.position for pose in poses]).reshape(-1, 3).T.copy(),
             frames=turns / halves,
             squares=squares,
@@ -110,33 +117,6 @@ class Obstacles:
         return cls(names, np.array(owners, dtype=int), np.array(links, dtype=int), arrays)
 
 
-def _shapes(model: Model) -> list[tuple[int, Shape, Pose]]:
-    """A model's shapes: the index of the link (-1 if it never moves), the shape, and its pose in the link or in the world."""
-    still = {link.name for link in still_links(model)}
-    found = []
-    for number, link in enumerate(model.links):
-        fixed = link.name in still
-        frame = Pose() if fixed else link.pose.inverse()
-        for one in link.collisions:
-            found.append((-1 if fixed else number, one.shape, frame @ one.pose @ Pose(_extent(one.shape)[0])))
-    return found
-
-
-def _kind(shape: Shape) -> int:
-    match shape:
-        case Box() | Plane():
-            return CUBE
-        case Sphere() | Ellipsoid():
-            return BALL
-        case Cylinder():
-            return TUBE
-        case Capsule():
-            return PILL
-        case Mesh():
-            return HULL
-    raise TypeError(type(shape).__name__)
-
-
 def _extent(shape: Shape) -> tuple[Vector, Vector]:
     """Of the box around `shape` along its own axes: the middle, and half the size, m."""
     if isinstance(shape, Plane):
@@ -147,8 +127,7 @@ def _extent(shape: Shape) -> tuple[Vector, Vector]:
 
 # Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
 NEVER = 1e-200
-# The minimum half length of a capsule's straight part, as a part of its radius.
-SHORTEST = 1e-9
+SHORTEST = 1e-9  # the minimum half length of a capsule's straight part, as a part of its radius
 
 Interval = tuple[Floats, Floats]
 
@@ -238,8 +217,7 @@ class Facets:
         return enter, np.where(rise > 0, crossing, np.inf).min(axis=0)
 
 
-# Directions that differ by a full turn are the same.
-TURNS = np.array([[-math.tau], [0.0], [math.tau]])
+TURNS = np.array([[-math.tau], [0.0], [math.tau]])  # directions that differ by a full turn are the same
 
 
 @dataclass(frozen=True)
@@ -278,7 +256,12 @@ def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats
     Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and
     those of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
     """
-    local = _seen(shapes, origin, axes)
+    # The lidar's position and its three axes in the frame of each shape, (4, 3, K).
+    view = np.empty((4, 3, len(shapes.kinds)))
+    np.subtract(origin[:, None], shapes.centers, out=view[0])
+    view[1:] = axes[:, :, None]
+    frames = shapes.frames
+    local: Floats = view[:, :1] * frames[0] + view[:, 1:2] * frames[1] + view[:, 2:] * frames[2]
     # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two axes.
     edges = local[1:3] * shapes.squares
     centers = (edges * local[0]).sum(axis=1)
@@ -291,16 +274,6 @@ def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats
     np.minimum.at(distances, beams, enter)
     first = enter == distances[beams]
     return distances, beams[first], numbers[first]
-
-
-def _seen(shapes: Shapes, origin: Floats, axes: Floats) -> Floats:
-    """The lidar's position and its three axes in the frame of each shape, (4, 3, K)."""
-    view = np.empty((4, 3, len(shapes.kinds)))
-    np.subtract(origin[:, None], shapes.centers, out=view[0])
-    view[1:] = axes[:, :, None]
-    frames = shapes.frames
-    seen: Floats = view[:, :1] * frames[0] + view[:, 1:2] * frames[1] + view[:, 2:] * frames[2]
-    return seen
 
 
 def _span(centers: Floats, edges: Floats) -> tuple[Floats, Floats]:

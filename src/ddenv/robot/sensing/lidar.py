@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from itertools import accumulate
 from typing import Any
 
@@ -18,8 +17,9 @@ from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
 
-# Random numbers reserved for the noise of each scan.
-DRAWS = 2**40
+DRAWS = 2**40  # random numbers reserved for the noise of each scan
+# Of a scan: its ranges, what its beams measured, also too near or too far, (B,) m each; the beams (H,) that ended on models (H,).
+Measured = tuple[Floats, Floats, Integers, Integers]
 
 
 class Lidar:
@@ -39,8 +39,7 @@ class Lidar:
     ) -> None:
         self._settings = settings
         self._mount = Pose((settings.x, settings.y, settings.z))
-        self._random = random
-        self._state = random.bit_generator.state
+        self._random, self._state = random, random.bit_generator.state
         self._turns = 0
         self._fan = Fan.of(settings)
         self._names = obstacles.names
@@ -75,47 +74,41 @@ class Lidar:
         place = Pose(pose[:3], pose[3:]) @ self._mount
         self._move(places, turns)
         rows = in_the_way(self._fan, self._shapes, np.array(place.position), place.rotation().T)
-        turn = Turn(self._turns, now, place, self._shapes.take(rows), self._owners[rows])
+        models = self._owners[rows]
+        measure = cache(partial(self._measure, self._turns, place, self._shapes.take(rows), models))
         self._turns += 1
-        if self._unseen[turn.models].any():
-            self._notice(turn, now)
-        return LazyScan(now, self._fan.angles, partial(self._ranges, turn), self._mount.position)
+        if self._unseen[models].any():
+            ranges, _, beams, owners = measure()
+            met = np.isfinite(ranges[beams]) & self._unseen[owners]
+            # In the order of the beams, and for one beam in that of the models.
+            for _, owner in sorted(zip(beams[met].tolist(), owners[met].tolist(), strict=True)):
+                self._unseen[owner] = False
+                self.first_seen.setdefault(self._names[owner], now)
+        return LazyScan(now, self._fan.angles, partial(self._ranges, now, measure), self._mount.position)
 
-    def _ranges(self, turn: Turn, limits: Floats | None = None) -> Floats:
-        """The ranges of a scan, infinite where they exceed `limits` (B,) m."""
-        ranges = self._measured(turn)
-        if limits is None:
-            self._note(turn, turn.owners)
-            return ranges
-        # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
-        near: Booleans = turn.measured <= limits
-        self._note(turn, turn.owners[near[turn.beams]])
-        limited: Floats = np.where(near, ranges, np.inf)
-        return limited
+    def _ranges(self, now: float, measure: Callable[[], Measured], limits: Floats | None = None) -> Floats:
+        """The ranges of the scan at `now` (s), infinite where they exceed `limits` (B,) m."""
+        ranges, measured, beams, owners = measure()
+        if limits is not None:
+            # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
+            near: Booleans = measured <= limits
+            ranges, owners = np.where(near, ranges, np.inf), owners[near[beams]]
+        self._read[owners] = np.minimum(self._read[owners], now)
+        return ranges
 
-    def _note(self, turn: Turn, read: Integers) -> None:
-        self._read[read] = np.minimum(self._read[read], turn.time)
-
-    def _measured(self, turn: Turn) -> Floats:
-        """The ranges of `turn`, computed when they are needed first."""
-        if turn.ranges is None:
-            origin, axes = np.array(turn.place.position), turn.place.rotation().T
-            distances, turn.beams, shapes = cast(self._fan, turn.shapes, origin, axes)
-            turn.owners = turn.models[shapes]
-            turn.measured = self._noise(turn.number) + distances
-            beyond = (turn.measured < self._settings.nearest) | (turn.measured > self._settings.range)
-            turn.ranges = np.where(beyond, np.inf, turn.measured)
-        return turn.ranges
-
-    def _noise(self, number: int) -> Floats:
-        """The errors of the ranges of a scan, (B,) m: the same whatever its beams hit, and whichever scans are computed."""
+    def _measure(self, number: int, place: Pose, shapes: Shapes, models: Integers) -> Measured:
+        """Makes scan `number` from `place`; its beams may hit the `shapes` (K,) of these `models` (K,)."""
+        distances, beams, hit = cast(self._fan, shapes, np.array(place.position), place.rotation().T)
+        # The errors of the ranges are the same whatever the beams hit, and whichever scans are computed.
         bits: Any = self._random.bit_generator
         bits.state = self._state
         bits.advance(number * DRAWS)
-        return self._settings.noise * self._random.standard_normal(len(self._fan.angles))
+        noise = self._settings.noise * self._random.standard_normal(len(self._fan.angles))
+        measured = noise + distances
+        beyond = (measured < self._settings.nearest) | (measured > self._settings.range)
+        return np.where(beyond, np.inf, measured), measured, beams, models[hit]
 
     def _move(self, places: Floats, turns: Floats) -> None:
-        """Moves the shapes to where their links are."""
         if not len(self._movers):
             return
         turn = turns[self._links].transpose(1, 2, 0)
@@ -125,34 +118,6 @@ class Lidar:
         a, b, c = self._frames
         frames = first[:, None] * a + second[:, None] * b + third[:, None] * c
         self._shapes.frames[:, :, self._movers] = frames
-
-    def _notice(self, turn: Turn, now: float) -> None:
-        """Notes the models on which a beam ended for the first time, with a measured range."""
-        met = np.isfinite(self._measured(turn)[turn.beams]) & self._unseen[turn.owners]
-        # In the order of the beams, and for one beam in that of the models.
-        for _, owner in sorted(zip(turn.beams[met].tolist(), turn.owners[met].tolist(), strict=True)):
-            if self._unseen[owner]:
-                self._unseen[owner] = False
-                self.first_seen[self._names[owner]] = now
-
-
-@dataclass(slots=True, eq=False)
-class Turn:
-    """Scan `number` of a lidar: its time (s), its pose, and the K shapes that its beams may hit, with their `models` (K,).
-
-    Once computed: its ranges, the distances (B,) m that its beams measured, also too small and too large ones, and the models
-    `owners` (H,) on which the beams `beams` (H,) ended.
-    """
-
-    number: int
-    time: float
-    place: Pose
-    shapes: Shapes
-    models: Integers
-    ranges: Floats | None = None
-    measured: Floats = field(default_factory=lambda: np.empty(0))
-    beams: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
-    owners: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
 
 
 class LazyScan(Scan):
@@ -196,5 +161,4 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
     # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
     extents = np.sqrt(np.maximum((frames * frames).sum(axis=0) - up * up, 0.0))
     met: Booleans = cut & (np.abs(local) - 1.0 <= extents * (fan.range * (1.0 + SPARE)) + SPARE).all(axis=0)
-    in_way: Integers = numbers[met]
-    return in_way
+    return numbers[met]

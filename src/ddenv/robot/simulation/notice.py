@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,15 +35,12 @@ class Notice:
         """
         self.first_touched: dict[str, float] = {}
         self._first_seen: dict[str, float] = {}
-        self._sensors = sensors
-        self._context = context.plant_context
-        self._sleep = sleep
+        self._sensors, self._context, self._sleep = sensors, context.plant_context, sleep
         built = context.built
         self._contacts = built.plant.get_contact_results_output_port()
         self._robot = frozenset(one.get_value() for one in built.robot.geometry)
         # The owners of all other geometry.
-        geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
-        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
+        geometry = [*built.shapes(), *((name, twin.geometry) for name, twin in built.twins.items())]
         self._owners = {one.get_value(): name for name, members in geometry for one in members}
         # The owners of all boxes: those around what never moves, then one around each moving model.
         still = {name: box for name, box in boxes.items() if name in present}
@@ -57,15 +54,27 @@ class Notice:
         Call it after the motors got their command: then Drake computes the contacts that the next step needs in any case, once and
         with the same bits. Contacts that begin and end between two calls are missed.
         """
-        for name in self._touched():
-            self.first_touched[name] = now
+        try:
+            results: Any = self._contacts.Eval(self._context)
+        # If the contacts cannot be computed, the next step reports it.
+        except (RuntimeError, ValueError, SystemExit):
+            return
+        for number in range(results.num_point_pair_contacts()):
+            pair = results.point_pair_contact_info(number).point_pair()
+            name, other = self._owners.get(pair.id_A.get_value()), pair.id_B
+            if name is None:
+                name, other = self._owners.get(other.get_value()), pair.id_A
+            # Most contacts are with the ground that the robot stands on: they fail the cheaper checks, which come first.
+            if name is not None and name not in self.first_touched and other.get_value() in self._robot:
+                self.first_touched[name] = now
 
     def look(self, now: float, place: Vector, heading: float) -> None:
         """Notes what is in view at the time `now` (s) from `place` (m), in the direction `heading` (rad)."""
         sensors, unseen = self._sensors, self._unseen
         if not (sensors.view_range and unseen.any()):
             return
-        low, high = self._boxes()
+        low, high = self._sleep.boxes()
+        low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
         eye, direction = np.array(place), np.array(heading)
         seen = in_view(low[unseen], high[unseen], eye, direction, sensors.view_range, sensors.view_angle)
         for name in self._names[unseen][seen]:
@@ -80,28 +89,6 @@ class Notice:
                 first[name] = min(time, first.get(name, math.inf))
         return dict(sorted(first.items(), key=lambda item: item[1]))
 
-    def _boxes(self) -> tuple[Floats, Floats]:
-        """The lowest and the highest corners, (N, 3) m each, of all boxes now."""
-        low, high = self._sleep.boxes()
-        return np.vstack([self._low, low]), np.vstack([self._high, high])
-
-    def _touched(self) -> Iterator[str]:
-        """The models that the robot touches for the first time."""
-        robot, owners = self._robot, self._owners
-        try:
-            results: Any = self._contacts.Eval(self._context)
-        # If the contacts cannot be computed, the next step reports it.
-        except (RuntimeError, ValueError, SystemExit):
-            return
-        for number in range(results.num_point_pair_contacts()):
-            pair = results.point_pair_contact_info(number).point_pair()
-            name, other = owners.get(pair.id_A.get_value()), pair.id_B
-            if name is None:
-                name, other = owners.get(other.get_value()), pair.id_A
-            # Most contacts are with the ground that the robot stands on: they fail the cheaper checks, which come first.
-            if name is not None and name not in self.first_touched and other.get_value() in robot:
-                yield name
-
 
 # The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
 PARALLEL = 1e-12
@@ -114,7 +101,8 @@ def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range:
     field of view, all in the world frame; `view_angle` (rad) is its full width. A box above, below or around `eye` is always in
     the field of view.
     """
-    seen: Booleans = distances(low, high, eye) <= view_range
+    apart = np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1)
+    seen: Booleans = np.asarray(apart <= view_range)
     if view_angle >= math.tau:
         return seen
     eye, heading = np.broadcast_to(eye, low.shape)[seen], np.broadcast_to(heading, seen.shape)[seen]
@@ -138,11 +126,6 @@ def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
     enter = np.maximum(np.minimum(low / ray, high / ray).max(axis=1), 0.0)
     leave = np.maximum(low / ray, high / ray).min(axis=1)
     return np.where(leave >= enter, enter, np.inf)
-
-
-def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
-    """The distances (...) of the points `eye` (..., 3) from the boxes between `low` and `high` (..., 3), m; 0 inside."""
-    return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
 
 
 def still_boxes(world: World) -> dict[str, Bounds]:

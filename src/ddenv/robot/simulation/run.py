@@ -26,8 +26,7 @@ from ddenv.world.drive import Drive
 from ddenv.world.pose import Pose, angle_between
 from ddenv.world.scenario import Controller, Scenario
 
-# The maximum real time between two recorded poses that counts as time of the run, s.
-LONGEST_LOOK = 10.0
+LONGEST_LOOK = 10.0  # the maximum real time between two recorded poses that counts as time of the run, s
 # The outcome, the failure, and whether the run was cut short.
 End = tuple[str, str, bool]
 
@@ -79,7 +78,7 @@ class Run:
 
         Raises LeftRegion if the plant lacks what comes near.
         """
-        outcome, failure, cut, seconds = self._loop(progress)
+        outcome, failure, cut, seconds = self._loop(progress or (lambda *_: None))
         trajectory = self._recording.trajectory()
         if outcome == "failed":
             failure = kind_of(trajectory, fell=failure == "fell", arrived=self.autonomy.arrived)
@@ -104,7 +103,7 @@ class Run:
             took_part=took_part,
         )
 
-    def _loop(self, progress: Progress | None) -> tuple[str, str, bool, float]:
+    def _loop(self, progress: Progress) -> tuple[str, str, bool, float]:
         """The outcome, the failure, whether the run was cut short, and when (s) it ended."""
         sleep, notice, lidar = self.sleep, self.notice, self.lidar
         for tick in self.context.clock.ticks:
@@ -117,16 +116,23 @@ class Run:
                 self._look()
             pose = self._floating(self._place)
             if self.reached:
-                self.reached.look(pose, self._speed(self.reached.radius))
+                # No part that is rigid with the first link is faster.
+                wx, wy, wz, vx, vy, vz = self._state[self._spin : self._spin + 6]
+                speed = math.hypot(vx, vy, vz) + self.reached.radius * math.hypot(wx, wy, wz)
+                self.reached.look(pose, speed)
             if self.context.region:
                 self.context.region.watch(pose[:2], self.reach, sleep.awake_links()[:2])
             truth = self._truth(pose)
             end = self._end(pose, tick)
             if end is not None or tick.record:
-                self._record(tick.time, pose, progress)
+                self._wall_clock.look()
+                models = {body.name: self._pose(body) for body in self.kept}
+                self._recording.add(tick.time, pose, models)
+                progress(tick.time, pose, models)
                 notice.look(tick.time, pose[:3], truth.heading)
             if end is None:
-                scan = lidar.scan(tick.time, pose, *sleep.poses()) if tick.lidar and lidar else None
+                links = sleep.motion.places, sleep.motion.turns
+                scan = lidar.scan(tick.time, pose, *links) if tick.lidar and lidar else None
                 self.autonomy.sense(tick, truth, scan)
                 end = self._command(tick) if tick.command else None
             if end is not None or tick.record:
@@ -172,13 +178,6 @@ class Run:
             data.get_mutable_value().SetFromVector(self._commanded)
         return None
 
-    def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
-        self._wall_clock.look()
-        models = {body.name: self._pose(body) for body in self.kept}
-        self._recording.add(now, pose, models)
-        if progress is not None:
-            progress(now, pose, models)
-
     def _look(self) -> bool:
         """Reads the state as it is now. Returns whether it is finite."""
         self._state = self.sleep.state().tolist()
@@ -199,11 +198,6 @@ class Run:
         qw, qx, qy, qz, x, y, z = self._state[start : start + 7]
         length = math.hypot(qw, qx, qy, qz)
         return x, y, z, qw / length, qx / length, qy / length, qz / length
-
-    def _speed(self, radius: float) -> float:
-        """A bound of the speed (m/s) of what is rigid with the robot's first link, and within `radius` (m) of its origin."""
-        wx, wy, wz, vx, vy, vz = self._state[self._spin : self._spin + 6]
-        return math.hypot(vx, vy, vz) + radius * math.hypot(wx, wy, wz)
 
     def _truth(self, pose: PoseRow) -> Truth:
         """What the robot's sensors would measure without noise at its `pose`."""
@@ -233,9 +227,10 @@ class Stuck:
     It is a guess: a robot may still come free later. So runs that were not cut short confirm what a reduction leaves.
     """
 
-    def __init__(self, seconds: float = SECONDS) -> None:
-        """`seconds` is how long the robot must not have moved."""
-        self._seconds = seconds
+    def __init__(self, controller: Controller) -> None:
+        # How long a robot with this controller must not have moved, s.
+        patience = PATIENCES * controller.planner.patience if controller.use == "costmap" else 0.0
+        self._seconds = max(SECONDS, patience)
         self._since = 0.0
         self._place: PoseRow | None = None
 
@@ -246,8 +241,3 @@ class Stuck:
             self._since, self._place = now, pose
         # Times are sums of steps: 8 s may come out 1e-15 s short.
         return now - self._since >= self._seconds - 1e-6
-
-
-def seconds_for(controller: Controller) -> float:
-    """How long a robot with this controller must not move to be stuck for good, s."""
-    return max(SECONDS, PATIENCES * controller.planner.patience) if controller.use == "costmap" else SECONDS

@@ -18,7 +18,7 @@ from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow
 from ddenv.world.extent import Bounds, bounds, shape_bounds, stacked
 from ddenv.world.model import Joint, Model, World, held_with, still_links
-from ddenv.world.pose import Pose, Vector, angle_between
+from ddenv.world.pose import Pose, angle_between
 
 # What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
 SLACK = 0.05
@@ -141,7 +141,16 @@ class Hull:
 def _boxes(robot: Model) -> Iterator[Bounds]:
     """The box around each link, wherever its joints take it."""
     frame, first = robot.links[0].pose.inverse(), robot.links[0].pose.position
-    rigid, reached = held_with(robot, robot.links[0].name), _chains(robot)
+    # For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m.
+    chains = {robot.links[0].name: (first, 0.0)}
+    # A file may name its joints in any order.
+    for _ in robot.joints:
+        for joint in robot.joints:
+            if joint.parent in chains and joint.child not in chains:
+                start, length = chains[joint.parent]
+                place = joint.pose.position
+                chains[joint.child] = place, length + math.dist(start, place) + _slide(joint)
+    rigid = held_with(robot, robot.links[0].name)
     joint_of = {joint.child: joint for joint in robot.joints}
     for link in robot.links:
         box = bounds(link.collisions, frame if link.name in rigid else link.pose.inverse())
@@ -150,32 +159,17 @@ def _boxes(robot: Model) -> Iterator[Bounds]:
         if link.name in rigid:
             yield box
             continue
-        joint = joint_of.get(link.name)
-        if joint is not None and joint.parent in rigid:
-            center, far = joint.pose.position, _slide(joint)
+        held = joint_of.get(link.name)
+        if held is not None and held.parent in rigid:
+            center, far = held.pose.position, _slide(held)
         else:
             # Several joints in a row: a ball around the first link.
-            center, far = first, reached[link.name][1] if link.name in reached else math.inf
-        start = joint.pose.position if joint is not None else link.pose.position
+            center, far = first, chains[link.name][1] if link.name in chains else math.inf
+        start = held.pose.position if held is not None else link.pose.position
         corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
         far = min(ENDLESS, far + math.dist(start, link.pose.position) + corner)
         middle = np.array((frame @ Pose(center)).position)
         yield middle - far, middle + far
-
-
-def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
-    """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
-    chains = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
-    # A file may name its joints in any order.
-    for _ in robot.joints:
-        for joint in robot.joints:
-            if joint.parent in chains and joint.child not in chains:
-                start, length = chains[joint.parent]
-                chains[joint.child] = (
-                    joint.pose.position,
-                    length + math.dist(start, joint.pose.position) + _slide(joint),
-                )
-    return chains
 
 
 def _slide(joint: Joint) -> float:

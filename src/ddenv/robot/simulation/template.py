@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 from typing import TypeVar
@@ -12,11 +11,10 @@ from typing import TypeVar
 from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import BUILT_IN, Listener, controllers
-from ddenv.robot.drake.plant import Body, Built, build
+from ddenv.robot.drake.plant import build
 from ddenv.robot.drake.region import LeftRegion, Place, Region
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
-from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
@@ -24,17 +22,16 @@ from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.notice import Notice, still_boxes
-from ddenv.robot.simulation.run import Run, Stuck, seconds_for
+from ddenv.robot.simulation.run import Run, Stuck
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
-from ddenv.world.drive import Drive, find_drive
+from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
 from ddenv.world.whole import whole_of
 
-# A margin for surfaces that sink into each other, and joints that exceed their limits, m.
-YIELD = 0.1
+YIELD = 0.1  # a margin for surfaces that sink into each other, and joints that exceed their limits, m
 
 
 class Template:
@@ -52,8 +49,7 @@ class Template:
         self._solid = with_ground_boxes(
             world, self._whole.corners, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
         )
-        self._robot = robot
-        self._scenario = scenario
+        self._robot, self._scenario = robot, scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(model.name for model in world.models)
@@ -101,8 +97,7 @@ class Template:
     def shapes_without(self, names: frozenset[str]) -> int:
         """The number of collision shapes in the plant, without those of the models `names`."""
         built = self.context.built
-        shapes = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
-        return len(built.robot.geometry) + sum(len(geometry) for name, geometry in shapes if name not in names)
+        return len(built.robot.geometry) + sum(len(geometry) for name, geometry in built.shapes() if name not in names)
 
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
@@ -113,9 +108,17 @@ class Template:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self.names = names
         near = tuple(model for model in self._solid.models if model.name in names - self._far)
-        built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
-        at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
-        self.context = RunContext.of(built, at, self._clock, self._whole.floor, self._region if self._far else None)
+        world, scenario = replace(self._solid, models=near), self._scenario
+        try:
+            built = build(world, self._robot, self._drive, scenario.simulation, scenario.controller.motor_gain)
+        except (ValueError, RuntimeError, SystemExit) as error:
+            raise UserError(f"{world.path}: cannot be simulated: {error}") from error
+        if not built.robot.base.is_floating_base_body():
+            raise UserError(
+                f"robot '{self._robot.name}': its first link must be free to move, not joined to the world or another link"
+            )
+        at = spawn_pose(scenario.robot.spawn) @ self._robot.pose.inverse()
+        self.context = RunContext(built, at, self._clock, self._whole.floor, self._region if self._far else None)
         self.rehearsals = Rehearsals(self.repertoire, self.context)
 
     def run(
@@ -130,50 +133,46 @@ class Template:
 
         Raises LeftRegion if something comes near what is not in the plant.
         """
-        unknown = keep - self.names
-        if unknown:
+        if unknown := keep - self.names:
             raise ValueError(f"no such model: {min(unknown)}")
+        context, scenario = self.context, self._scenario
         removed = self.names - keep - self._always
-        kept = [body for name, body in self.context.built.moving.items() if name not in removed]
+        kept = [body for name, body in context.built.moving.items() if name not in removed]
         present = self.names - removed
-        self.context.presence.remove(removed)
-        with self._asleep(kept, present) as (sleep, unusual):
-            suite = SensorSuite(self._scenario.sensors, seed)
-            lidar = None
-            if self._scenario.sensors.lidar and self._obstacles:
+        context.presence.remove(removed)
+        piles = self.rehearsals.piles(kept, present) if self._sleeping else []
+        held = frozenset(context.built.moving) - set(context.built.twins)
+        unusual = self.repertoire.unusual(piles, present, held) | self._carriers(present)
+        context.diagram_context.SetTime(0.0)
+        scripts = [known.script for known in piles if known.script is not None]
+        sleep = Sleep(context, kept, scripts, never=not self._sleeping)
+        try:
+            suite, lidar, reached = SensorSuite(scenario.sensors, seed), None, None
+            if scenario.sensors.lidar and self._obstacles:
                 movers = [self._models[body.name] for body in kept]
-                lidar = Lidar(self._scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
-            reached = None
+                lidar = Lidar(scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
             if self.slices and self._sleeping and self.repertoire.usual is not None:
                 reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
+            setup = replace(self._setup, seed=seed)
+            controller = self._controllers(setup)
+            if listener is not None:
+                listener.begin(setup)
             run = Run(
-                context=self.context,
-                scenario=self._scenario,
+                context=context,
+                scenario=scenario,
                 drive=self._drive,
                 sleep=sleep,
-                notice=Notice(self.context, self._boxes, self._scenario.sensors, sleep, kept, present),
-                autonomy=self._autonomy(suite, seed, listener),
+                notice=Notice(context, self._boxes, scenario.sensors, sleep, kept, present),
+                autonomy=Autonomy(scenario, suite, self._drive, self._clock, controller, listener),
                 lidar=lidar,
                 reach=self._reach,
-                stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
+                stuck=None if full else Stuck(scenario.controller),
                 reached=reached,
                 unusual=unusual,
                 kept=kept,
                 seed=seed,
             )
             return run.execute(progress)
-
-    @contextmanager
-    def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[tuple[Sleep, frozenset[str]]]:
-        """The moving models `kept` at their start, in a world that keeps the models `present`, and what moves otherwise there."""
-        piles = self.rehearsals.piles(kept, present) if self._sleeping else []
-        held = frozenset(self.context.built.moving) - set(self.context.built.twins)
-        unusual = self.repertoire.unusual(piles, present, held)
-        scripts = [known.script for known in piles if known.script is not None]
-        self.context.diagram_context.SetTime(0.0)
-        sleep = Sleep(self.context, kept, scripts, never=not self._sleeping)
-        try:
-            yield sleep, unusual | self._carriers(present)
         finally:
             sleep.end()
 
@@ -182,36 +181,15 @@ class Template:
         ties = self.repertoire.ties
         return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
-    def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
-        setup = replace(self._setup, seed=seed)
-        controller = self._controllers(setup)
-        if listener is not None:
-            listener.begin(setup)
-        return Autonomy(self._scenario, suite, self._drive, self._clock, controller, listener)
-
-
-def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
-    try:
-        built = build(world, robot, drive, scenario.simulation, scenario.controller.motor_gain)
-    except (ValueError, RuntimeError, SystemExit) as error:
-        raise UserError(f"{world.path}: cannot be simulated: {error}") from error
-    if not built.robot.base.is_floating_base_body():
-        raise UserError(
-            f"robot '{robot.name}': its first link must be free to move, not joined to the world or another link"
-        )
-    return built
-
 
 Result = TypeVar("Result")
-# What a moving model that is switched off costs in each step of a run, s.
-HELD = 5e-6
+HELD = 5e-6  # what a moving model that is switched off costs in each step of a run, s
 # The minimum time to build a plant, and the time for each pair of shapes, s. A pair also takes 0.15 kB.
 BUILD = 0.05
 PAIR = 1e-6
 # A plant with more shapes than this gets no smaller ones beside it: each would take more than 150 MB.
 LARGEST = 1000
-# The maximum number of smaller plants at a time.
-MOST = 4
+MOST = 4  # the maximum number of smaller plants at a time
 
 
 class Variants:
@@ -240,12 +218,12 @@ class Variants:
         return self._within(lambda _: self._template(keep).run(keep, seed, progress, full, listener))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
-        """Which models support which in the whole world; see `piles.settling.supports`."""
-        return self._within(lambda whole: supports(whole.context, whole.rehearsals, whole.names, elements))
+        """Which models support which in the whole world; see `Rehearsals.supports`."""
+        return self._within(lambda whole: whole.rehearsals.supports(whole.names, elements))
 
     def settled(self) -> Settled:
         """How the whole world settles."""
-        return self._within(lambda whole: settled(whole.context, whole.rehearsals, whole.names))
+        return self._within(lambda whole: whole.rehearsals.settled(whole.names))
 
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
         """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.

@@ -1,4 +1,4 @@
-"""Joints of models: what they let move, about or along which axis, and how far."""
+"""Models that move: what is hit, and what joints let move, about or along which axis, and how far."""
 
 from __future__ import annotations
 
@@ -26,10 +26,13 @@ def hung(kind: str, offset=(0.5, 0.0, 0.0), **changes: object) -> Model:
 
 @pytest.fixture
 def motion(world_of, add, husky, scenario_of):
-    """Where a model is (N, 3) from its joint, and its rows (N, 8), in 2 s beside the robot's way."""
+    """Where a model is (N, 3) from its joint, and its rows (N, 8), in 2 s beside the robot's way.
+
+    Another model in its place, which has the same names inside, is removed.
+    """
 
     def run(model: Model) -> tuple[np.ndarray, np.ndarray]:
-        template = Template(add(world_of(), model), husky, scenario_of(**NOWHERE))
+        template = Template(add(world_of(), model, replace(model, name="twin")), husky, scenario_of(**NOWHERE))
         rows = template.run(frozenset({model.name}), seed=1).motions[model.name]
         return rows[:, 1:4] - HINGE, rows
 
@@ -69,19 +72,16 @@ def test_a_ball_joint_swings_in_any_direction(motion, offset):
 
 
 def test_a_universal_joint_turns_about_both_its_axes_only(motion):
+    # Its axes need not be those of the world. Gravity turns nothing about a vertical one.
+    way, _ = motion(hung("universal", (0.6, 0.8, 0.0), axis=(0.0, 0.0, 1.0), axis2=(-0.8, 0.6, 0.0)))
+    assert way @ (-0.8, 0.6, 0.0) == pytest.approx(np.zeros(len(way)), abs=1e-6)
+    assert way[:, 2].min() < -0.9
     axes = {"axis": (1.0, 0.0, 0.0), "axis2": (0.0, 1.0, 0.0)}
     for offset, still in (((0.0, 0.5, 0.0), 0), ((0.5, 0.0, 0.0), 1)):
         way, _ = motion(hung("universal", offset, **axes))
         assert np.linalg.norm(way, axis=1) == pytest.approx(np.full(len(way), 0.5), abs=1e-6)
         assert way[:, still] == pytest.approx(np.zeros(len(way)), abs=1e-6)
         assert way[:, 2].min() < -0.45
-
-
-def test_axes_of_a_universal_joint_need_not_be_those_of_the_world(motion):
-    # About the first axis, which is vertical, gravity turns nothing; the second is the one to swing about.
-    way, _ = motion(hung("universal", (0.6, 0.8, 0.0), axis=(0.0, 0.0, 1.0), axis2=(-0.8, 0.6, 0.0)))
-    assert way @ (-0.8, 0.6, 0.0) == pytest.approx(np.zeros(len(way)), abs=1e-6)
-    assert way[:, 2].min() < -0.9
 
 
 def test_a_joint_without_play_is_fixed(world_of, add, husky, scenario_of):
@@ -116,3 +116,35 @@ def test_only_joints_that_turn_about_one_axis_are_wheels(world_of, husky, scenar
         robot = replace(husky, links=(*husky.links, load), joints=(*husky.joints, joint))
         assert find_drive(robot) == find_drive(husky)
         assert Template(world_of(), robot, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
+
+
+def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(world_of, husky, scenario_of, box):
+    board, crate = (
+        box("board", "1.2 0 0.02 0 0 1.57", "0.9 0.09 0.04", mass=2.0),
+        box("crate", "1.6 -3 0.25 0 0 0", "0.5 0.5 0.5", mass=10.0),
+    )
+    template = Template(world_of(board, crate), husky, scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0}))
+    result = template.run(frozenset({"board", "crate"}), seed=1)
+    rows = result.motions["board"]
+    assert rows[:, 0] == pytest.approx(result.trajectory[:, 0])
+    assert rows[0, 1:4] == pytest.approx([1.2, 0, 0.02])
+    assert np.linalg.norm(rows[-1, 1:4] - rows[0, 1:4]) > 0.001
+    assert "crate" not in result.motions
+    # One that is removed is passed through.
+    removed = template.run(frozenset({"crate"}), seed=1)
+    assert removed.motions == {} and abs(removed.trajectory[1:, 3] - 0.1323).max() < 0.01
+
+
+def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box):
+    inertia = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
+    side = "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
+    pair = (
+        f"<model name='pair'><pose>0 3 1 0 0 0</pose><link name='a'>{inertia}{side}</link>"
+        f"<link name='b'><pose>0 0 0.2 0 0 0</pose>{inertia}{side}</link>"
+        "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint></model>"
+    )
+    template = Template(world_of(pair), husky, scenario_of(failure={"timeout": 2.0}))
+    rows = template.run(frozenset({"pair"}), seed=1).motions["pair"]
+    assert rows[0, 1:4] == pytest.approx([0, 3, 1])
+    assert rows[-1, 3] == pytest.approx(0.1, abs=0.005)
+    assert "pair" not in template.run(frozenset(), seed=1).motions
