@@ -139,16 +139,17 @@ def _race(names: list[str]) -> int:
     from ddenv.learn.race import RACERS, plays_of_runs
     from ddenv.workbench.launch import run_workbench
 
+    if not RACERS[0] <= len(names) <= RACERS[1]:
+        raise UserError(f"--race: expected {RACERS[0]} to {RACERS[1]} runs, found {len(names)}")
+    paths = tuple(map(find_run, names))
+    # Read before the screen, so that runs that cannot race are one line in the terminal.
+    plays_of_runs(paths)
+
     def screen() -> Screen[Any]:
         from ddenv.workbench.learn.race_screen import race_of_runs
 
-        return race_of_runs(runs)
+        return race_of_runs(paths)
 
-    if not RACERS[0] <= len(names) <= RACERS[1]:
-        raise UserError(f"--race: expected {RACERS[0]} to {RACERS[1]} runs, found {len(names)}")
-    runs = tuple(map(find_run, names))
-    # Read before the screen, so that runs that cannot race are one line in the terminal.
-    plays_of_runs(runs)
     return run_workbench(first=screen)
 
 
