@@ -54,7 +54,7 @@ def why_command(run: str, as_json: bool) -> int:
 @options.run_argument
 @click.option(
     "--runs",
-    type=click.IntRange(1),
+    type=options.Whole(1),
     metavar="N",
     help="Minimum number of fresh runs of the world that passes; 20 by default.",
 )
@@ -114,7 +114,7 @@ def isolate_command(
     help="Only numbers whose names match, such as green_patch_01.friction, '*.y' or controller.speed; may be repeated. "
     "Without it the most promising ones come first.",
 )
-@click.option("--budget", type=click.IntRange(1), metavar="N", help="Maximum number of runs; 300 by default.")
+@click.option("--budget", type=options.Whole(1), metavar="N", help="Maximum number of runs; 300 by default.")
 @click.option("--list", "listed", is_flag=True, help="Only list the numbers and the range in which each is tried.")
 @options.engine_options
 def margins_command(

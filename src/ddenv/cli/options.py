@@ -68,6 +68,10 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
         return numbers
 
 
+class Whole(click.IntRange):
+    name = "whole number"
+
+
 # Options.
 
 
@@ -91,7 +95,7 @@ def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) ->
             found.append(click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words))
             continue
         # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
-        kind = click.IntRange(0) if one.none else one.kind
+        kind = Whole(0) if one.none else one.kind
         words += f" {one.more}" if one.shown == "method" else ""
         found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=words))
     return together(*found)
@@ -105,7 +109,7 @@ def jobs_option(what: str = "Tests") -> Option:
     words = f"{what} at the same time."
     return click.option(
         "--jobs",
-        type=click.IntRange(1, int(JOBS.most or 1)),
+        type=Whole(1, int(JOBS.most or 1)),
         default=processor.usable_cores(),
         show_default=True,
         help=words,

@@ -119,7 +119,7 @@ def resume_command(
 @options.run_argument
 @click.option(
     "--runs",
-    type=click.IntRange(1),
+    type=options.Whole(1),
     metavar="N",
     help="Minimum number of runs of what is left; by default as many as the baseline has.",
 )
@@ -175,7 +175,7 @@ def certify_command(
     help="Algorithms separated by commas, or 'all'.",
 )
 @click.option(
-    "--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Seeds per scenario and method."
+    "--seeds", type=options.Whole(1, 1000), default=1, show_default=True, help="Seeds per scenario and method."
 )
 @options.jobs_option()
 @click.option(

@@ -140,7 +140,7 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 
 @click.command("reproduce")
 @options.run_argument
-@click.option("--most", type=click.IntRange(1, 10_000), default=60, show_default=True, help="Maximum number of runs.")
+@click.option("--most", type=options.Whole(1, 10_000), default=60, show_default=True, help="Maximum number of runs.")
 @click.option(
     "--folder",
     type=click.Path(exists=True, file_okay=False, path_type=Path),

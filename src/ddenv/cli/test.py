@@ -32,15 +32,15 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
 @click.option(
-    "--test", type=click.IntRange(1), metavar="NUMBER", help="Use the models and the seed of this test of the run."
+    "--test", type=options.Whole(1), metavar="NUMBER", help="Use the models and the seed of this test of the run."
 )
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
 @click.option(
     "--margin", multiple=True, metavar="NUMBER[=VALUE]", help="Change a number, as 'ddenv export --margin' does."
 )
-@click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up from it.")
-@click.option("--repeat", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
+@click.option("--seed", type=options.Whole(0, 2**31), help="Seed of the first run; the next ones count up from it.")
+@click.option("--repeat", type=options.Whole(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
 @click.option(
     "--simulator", type=Path, metavar="FILE", help="Run in this simulator: a YAML file with its name and its command."
 )

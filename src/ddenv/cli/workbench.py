@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import given_reading, reading_options, runs, runs_and_scenarios
+from ddenv.cli.options import Whole, given_reading, reading_options, runs, runs_and_scenarios
 from ddenv.cli.terminal import say_written
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named
@@ -64,10 +64,10 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 
 @click.command("serve")
 @click.argument("run", required=False, shell_complete=runs)
-@click.option("--port", type=click.IntRange(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
+@click.option("--port", type=Whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
 @click.option(
     "--font-size",
-    type=click.IntRange(6, 72),
+    type=Whole(6, 72),
     default=16,
     show_default=True,
     help="Text size in pixels; 28 for a projector.",
