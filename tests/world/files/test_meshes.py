@@ -120,7 +120,7 @@ def test_text_stl_in_another_encoding_and_of_several_solids(tmp_path):
         ("", "no triangles"),
         ("v 0 0 0\n", "no triangles"),
         ("v 0 0\nf 1 1 1", "fewer than three numbers"),
-        ("v 0 0 0\nf 1 2 3", "out of bounds"),
+        ("v 0 0 0\nf 1 2 3", "does not exist"),
         ("v 0 0 0\nf 1 0 1", "refers to the vertex 0"),
         ("v 0 0 0\nf 1 -2 1", "vertex -2"),
         ("v 0 0 x\n", "no triangles|could not be read to its end"),
