@@ -77,7 +77,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `files` the parsed files. `canonical` has the link that a model's own frame is attached to, by the `id` of its `<model>`.
+    lists, `files` the parsed files.
     """
 
     resources: Resources
@@ -89,7 +89,6 @@ class Context:
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
-    canonical: dict[int, str | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)

@@ -79,11 +79,8 @@ def _copies(part: Part, scope: Scope, text: bytes, folder: str, resources: Resou
     given = [child for child in part.at if child.tag not in NAMING]
     for tag in {child.tag for child in given} & {"pose", "static"}:
         edits += [(child.start, child.end, b"") for child in part.element.findall(tag)]
-    own = {
-        "name": part.name,
-        "placement_frame": part.placement_frame,
-        "canonical_link": part.element.get("canonical_link"),
-    }
+    own = {"name": part.name, "placement_frame": part.placement_frame}
+    own["canonical_link"] = part.element.get("canonical_link", "")
     tag = "".join(f" {name}={quoteattr(value)}" for name, value in own.items() if value)
     # An empty `<model .../>` has no end tag.
     inside = edited(copied[: part.element.end], edits)[tag_end(copied, part.element) :] or b"</model>"

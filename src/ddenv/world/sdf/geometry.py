@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,7 @@ from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
 from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import ONE, Pose, Vector, vector
+from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
 from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, truth
@@ -53,60 +54,50 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
             return _mesh(element, parent, context, scale)
         case "polyline":
             return Placed(_checked(_scaled(read_polyline(geometry, context), scale), element))
-        case "plane":
-            return _plane(element)
         case "empty":
             return None
-        case "heightmap" | "image":
-            _leave_out(element, parent, context)
+        case "heightmap" | "image" as tag:
+            if parent.tag == "visual":
+                context.note("ignored", element, f"a {tag} is not drawn")
+            elif context.ignores(tag):
+                context.note("ignored", element, "left out by --ignore: nothing collides with it")
+            else:
+                raise refuse(element, f"a {tag} is not supported: nothing would collide with it")
             return None
-    return Placed(_primitive(element, scale))
+    return _primitive(element, scale)
 
 
-def _primitive(element: Element, scale: Vector) -> Shape:
+def _primitive(element: Element, scale: Vector) -> Placed:
     match element.tag:
+        case "plane":
+            size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
+            return Placed(Plane((size[0], size[1])), _turned(element.find("normal")))
         case "box":
-            return Box(vector(_sizes(element, "size", scale)))
+            return Placed(Box(vector(_sizes(element, "size", scale))))
         case "ellipsoid":
-            return Ellipsoid(vector(_sizes(element, "radii", scale)))
+            return Placed(Ellipsoid(vector(_sizes(element, "radii", scale))))
         case "sphere":
-            return Sphere(*_sizes(element, "radius", (max(scale),)))
+            return Placed(Sphere(*_sizes(element, "radius", (max(scale),))))
         case "cylinder" | "capsule" | "cone" as tag:
             (radius,), (length,) = _sizes(element, "radius", (max(scale[:2]),)), _sizes(element, "length", scale[2:])
             kinds: dict[str, Callable[[float, float], Shape]] = {"cylinder": Cylinder, "capsule": Capsule, "cone": cone}
-            return kinds[tag](radius, length)
+            return Placed(kinds[tag](radius, length))
     raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
 
 
-def _plane(element: Element) -> Placed:
-    x, y = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
-    normal = element.find("normal")
+def _turned(normal: Element | None) -> Pose:
+    """The shortest rotation from the z axis to a `<normal>`."""
     if normal is None:
-        return Placed(Plane((x, y)))
+        return HERE
     direction = np.array(numbers(normal, 3))
     length = float(np.linalg.norm(direction))
     if not 1e-9 < length < 1e9:
         raise complain(normal, "the normal has no usable length")
-    return Placed(Plane((x, y)), _turn_up_to(direction / length))
-
-
-def _turn_up_to(direction: np.ndarray) -> Pose:
-    """The shortest rotation from the z axis to a unit vector."""
-    x, y, z = (float(part) for part in direction)
+    x, y, z = (direction / length).tolist()
     if z < -1 + 1e-12:
         return Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
-    w = np.sqrt((1 + z) / 2)
-    return Pose((0.0, 0.0, 0.0), (float(w), float(-y / (2 * w)), float(x / (2 * w)), 0.0))
-
-
-def _leave_out(element: Element, parent: Element, context: Context) -> None:
-    """Notes a shape that is not supported. Raises UserError if the robot could collide with it."""
-    if parent.tag == "visual":
-        context.note("ignored", element, f"a {element.tag} is not drawn")
-    elif context.ignores(element.tag):
-        context.note("ignored", element, "left out by --ignore: nothing collides with it")
-    else:
-        raise refuse(element, f"a {element.tag} is not supported: nothing would collide with it")
+    w = math.sqrt((1 + z) / 2)
+    return Pose((0.0, 0.0, 0.0), (w, -y / (2 * w), x / (2 * w), 0.0))
 
 
 def _mesh(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:

@@ -36,10 +36,8 @@ def read_inertia(
         return spread(collisions, density, link_pose, mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:
         computed = spread(collisions, density, link_pose, None)
-        why = (
-            f"mass {mass:g} kg is impossible: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
-        )
-        context.note("replaced", element, why)
+        why = f"{computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
+        context.note("replaced", element, f"mass {mass:g} kg is impossible: {why}")
         return computed
     tensor = element.find("inertia")
     place = element.find("pose")
@@ -52,7 +50,10 @@ def read_inertia(
         rounded = _rounded_up(moments, products)
         if is_possible(rounded, products):
             return Inertia(mass, link_pose @ pose, rounded, products)
-    said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 are impossible"
+    said = "no <inertia>"
+    if tensor is not None:
+        words = (text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
+        said = f"moments {' '.join(words)} kg m^2 are impossible"
     context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
     return spread(collisions, density, link_pose, mass)
 
@@ -66,10 +67,6 @@ def read_density(parent: Element, default: float) -> float:
     if not THINNEST <= density <= DENSEST:
         raise complain(element, f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}")
     return density
-
-
-def _shown(tensor: Element) -> str:
-    return " ".join(text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
 
 
 def _rounded_up(moments: Vector, products: Vector) -> Vector:
@@ -142,7 +139,11 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
         case Cylinder(radius, length):
             return math.pi * radius**2 * length, origin, _cylinder(radius, length)
         case Capsule(radius, length):
-            return _capsule(radius, length)
+            tube, balls = math.pi * radius**2 * length, 4 / 3 * math.pi * radius**3
+            # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
+            across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
+            unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
+            return tube + balls, origin, unit / (tube + balls)
         case Mesh(_, vertices, faces):
             return _polyhedron(vertices[faces])
     raise TypeError(type(shape).__name__)
@@ -151,15 +152,6 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
 def _cylinder(radius: float, length: float) -> np.ndarray:
     across = radius**2 / 4 + length**2 / 12
     return np.diag([across, across, radius**2 / 2])
-
-
-def _capsule(radius: float, length: float) -> tuple[float, np.ndarray, np.ndarray]:
-    tube, balls = math.pi * radius**2 * length, 4 / 3 * math.pi * radius**3
-    volume = tube + balls
-    # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
-    across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
-    unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
-    return volume, np.zeros(3), unit / volume
 
 
 def _polyhedron(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

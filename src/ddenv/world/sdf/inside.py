@@ -8,13 +8,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ddenv.world.model import Collision, Link, Model, Note, Shared, Visual, World, is_ground
+from ddenv.world.model import Link, Model, Note, Shared, Visual, World, is_ground
 from ddenv.world.sdf.xml import Element, place
 
 # Elements and attributes by which others may name a link: then it stays where its last collision goes.
 NAMING = ("joint", "frame", "gripper")
 REFERENCES = ("relative_to", "attached_to", "frame", "placement_frame", "expressed_in")
-Span = tuple[int, int]
 
 
 def opened(world: World, root: Element) -> World:
@@ -28,7 +27,13 @@ def opened(world: World, root: Element) -> World:
         if len(model.collisions) < 2 or is_ground(model):
             models.append(model)
             continue
-        closed = _closed(model, element, model.name in world.anchors)
+        closed = ""
+        if not model.static:
+            closed = "it can move"
+        elif model.name in world.anchors:
+            closed = "other models are placed relative to it"
+        elif element.tag == "include" or element.find(".//include") is not None:
+            closed = "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
         links = {} if closed else dict(_links(element))
         parts = [part for link in model.links if links for part in _parts(model, link, links[link.name])]
         names = {part.name for part in parts}
@@ -42,17 +47,6 @@ def opened(world: World, root: Element) -> World:
         models += parts
         shared += _emptied(model, element, links, parts)
     return replace(world, models=tuple(models), shared=tuple(shared), notes=tuple(notes))
-
-
-def _closed(model: Model, element: Element, is_anchor: bool) -> str:
-    """Why a model cannot be opened; "" if it can."""
-    if not model.static:
-        return "it can move"
-    if is_anchor:
-        return "other models are placed relative to it"
-    if element.tag == "include" or element.find(".//include") is not None:
-        return "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
-    return ""
 
 
 def _links(element: Element, prefix: str = "") -> Iterator[tuple[str, Element]]:
@@ -71,12 +65,13 @@ def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
     for visual in link.visuals if link.collisions else ():
         gaps = [math.dist(visual.pose.position, one.pose.position) for one in link.collisions]
         shown.setdefault(gaps.index(min(gaps)), []).append(visual)
+    prefix = "/".join([model.name, *link.name.split("::")]) if len(model.links) > 1 else model.name
     for number, collision in enumerate(link.collisions):
         visuals = tuple(shown.get(number, ()))
         elements = [named["collision"][collision.name], *(named["visual"][visual.name] for visual in visuals)]
         yield replace(
             model,
-            name=_name(model, link, collision),
+            name=prefix if len(link.collisions) == 1 < len(model.links) else f"{prefix}/{collision.name}",
             pose=collision.pose,
             links=(replace(link, collisions=(collision,), visuals=visuals),),
             spans=tuple((one.start, one.end) for one in elements),
@@ -85,16 +80,9 @@ def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
         )
 
 
-def _name(model: Model, link: Link, collision: Collision) -> str:
-    words = [model.name]
-    words += link.name.split("::") if len(model.links) > 1 else []
-    words += [collision.name] if len(link.collisions) > 1 or len(model.links) == 1 else []
-    return "/".join(words)
-
-
 def _emptied(model: Model, element: Element, links: dict[str, Element], parts: list[Model]) -> Iterator[Shared]:
     """The links and models that go with the last of their parts."""
-    spans: dict[Span, set[str]] = {}
+    spans: dict[tuple[int, int], set[str]] = {}
     for part in parts:
         at: Element | None = links[part.links[0].name]
         while at is not None and at is not element:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -97,9 +98,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     context.model = ""
     context.note_unused(root)
     anchors = scope.references()
-    gravity = next(
-        (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None
-    )
+    gravity = next((each for tag in ("gravity", "physics/gravity") for each in world.findall(tag)), None)
     whole = World(
         path=path,
         name=world.get("name") or "",
@@ -144,20 +143,17 @@ def _solid(model: Model) -> list[Collision]:
 
 
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
-    names = unique_names([part.name for part in scope.parts])
-    counts = Counter(part.name for part in scope.parts)
-    left = {name: list(saved) for name, saved in state.items()}
-    models = []
-    for part, name in zip(scope.parts, names, strict=True):
+    names = [part.name for part in scope.parts]
+    counts, models = Counter(names), []
+    for part, name in zip(scope.parts, unique_names(names), strict=True):
         if name != part.name:
             context.model = name
             context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
-        entries = left.get(part.name)
+        entries = state.get(part.name)
         models.append(assemble(part, name, scope, entries.pop(0) if entries else None, context))
     context.model = ""
-    for entries in left.values():
-        for saved in entries:
-            context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
+    for saved in chain(*state.values()):
+        context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
     return tuple(models)
 
 

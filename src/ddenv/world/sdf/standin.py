@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
@@ -14,22 +14,14 @@ from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.xml import Element, number_or_nan
 
 # The sizes (m) of each kind, as shown in error messages.
-SIZES = {
-    "box": "x,y,z",
-    "cylinder": "radius,length",
-    "sphere": "radius",
-    "capsule": "radius,length",
-    "ellipsoid": "x,y,z",
-}
+SIZES = {"box": "x,y,z", "cylinder": "radius,length", "sphere": "radius"}
+SIZES |= {"capsule": "radius,length", "ellipsoid": "x,y,z"}
 SIBLINGS = ("visual", "collision")
 AUTO, NONE = "auto", "none"
 # In place of a URI: everything that is missing.
 ALL_MISSING = "*"
 LARGEST = 1e6  # m
-HOW = (
-    "box:x,y,z, cylinder:radius,length, sphere:radius, capsule:radius,length, ellipsoid:x,y,z (m), visual, collision, "
-    "auto or none"
-)
+HOW = f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), visual, collision, auto or none"
 
 
 @dataclass(frozen=True)
@@ -59,9 +51,8 @@ def parse_option(option: str) -> tuple[str, str]:
         return ALL_MISSING, AUTO
     uri, sign, text = option.rpartition("=")
     if not sign or not uri.strip():
-        raise UserError(
-            f"--stand-in: expected URI=SHAPE, such as model://barrel=cylinder:0.3,1.0, or auto; found '{option}'"
-        )
+        example = "model://barrel=cylinder:0.3,1.0"
+        raise UserError(f"--stand-in: expected URI=SHAPE, such as {example}, or auto; found '{option}'")
     uri, text = uri.strip(), text.strip()
     parse_stand_in(text, "--stand-in")
     parse_stand_ins({uri: text})
@@ -82,7 +73,10 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     sizes = _numbers(words, SIZES[kind], f"{where}: {kind}")
     if min(sizes) <= 0:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
-    shape = _shape(kind, sizes)
+    kinds: dict[str, Callable[..., Shape]] = {"cylinder": Cylinder, "sphere": Sphere, "capsule": Capsule}
+    shape = kinds[kind](*sizes) if kind in kinds else Box(vector(sizes))
+    if kind == "ellipsoid":
+        shape = Ellipsoid(vector(size / 2 for size in sizes))
     above = (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
     return Placed(shape, Pose(vector(_numbers(center, "x,y,z", f"{where}: the centre after @") if at else above)))
 
@@ -92,22 +86,9 @@ def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
         values = tuple(float(word) for word in text.split(","))
     except ValueError:
         values = ()
-    if len(values) != names.count(",") + 1 or not all(map(math.isfinite, values)) or max(map(abs, values)) > LARGEST:
+    if len(values) != names.count(",") + 1 or not all(abs(value) <= LARGEST for value in values):
         raise UserError(f"{where}: expected {names} in m, found '{text[:60]}'")
     return values
-
-
-def _shape(kind: str, sizes: tuple[float, ...]) -> Shape:
-    match kind:
-        case "box":
-            return Box(vector(sizes))
-        case "cylinder":
-            return Cylinder(*sizes)
-        case "sphere":
-            return Sphere(*sizes)
-        case "capsule":
-            return Capsule(*sizes)
-    return Ellipsoid(vector(size / 2 for size in sizes))
 
 
 def matching(stand_ins: Mapping[str, StandIn], uri: str) -> str | None:
