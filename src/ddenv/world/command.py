@@ -37,7 +37,12 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
     if scenario.oracle is None:
         return ()
     if scenario.oracle.command is None:
-        _check_module(scenario.oracle.program.partition(":")[0], _existing(scenario))
+        folder, name = _existing(scenario), scenario.oracle.program.partition(":")[0]
+        top = name.partition(".")[0]
+        # Nothing of it is imported.
+        if not top or not (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None):
+            hint = nearest(top, [file.stem for file in folder.glob("*.py")])
+            raise UserError(f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}")
         return ()
     try:
         words = shlex.split(scenario.oracle.command)
@@ -65,15 +70,6 @@ def _existing(scenario: Scenario) -> Path:
         key = "folder" if scenario.oracle is None or scenario.oracle.folder is None else "oracle.folder"
         raise UserError(f"{key}: there is no folder {folder} to start the simulator in")
     return folder
-
-
-def _check_module(name: str, folder: Path) -> None:
-    """Raises UserError if a module is neither in `folder` nor installed. Nothing of it is imported."""
-    top = name.partition(".")[0]
-    brought = top and (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None)
-    if not brought:
-        hint = nearest(top, [file.stem for file in folder.glob("*.py")])
-        raise UserError(f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}")
 
 
 def _program(word: str, folder: Path) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -105,28 +104,20 @@ def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) ->
     except ValidationError as error:
         raise _wrong(where, *complaint(error.errors()[0], Scenario), named) from None
     # Not the model's own matter: a run is shown also where the package that brought its schemas is missing.
-    for key, value, check in (
-        ("algorithm", scenario.reduction.algorithm, partial(schemas.check, "algorithm")),
-        ("pair", scenario.reduction.pair, schemas.split_pair),
+    known = {kind: list(schemas.names(kind)) for kind in ("algorithm", "partitioning", "prioritization")}
+    pairs = f"{', '.join(known['partitioning'])}, then '/', then one of {', '.join(known['prioritization'])}"
+    for key, value, names, allowed in (
+        ("algorithm", scenario.reduction.algorithm, known["algorithm"], ", ".join(known["algorithm"])),
+        ("pair", scenario.reduction.pair, list(schemas.pairs()), pairs),
     ):
-        try:
-            check(value)
-        except UserError:
-            raise _wrong(where, f"reduction.{key}", _of_schemas(key, value), named) from None
+        if value not in names:
+            words = f"{_shown(value)} is not allowed{nearest(value[:100], names)}; use one of {allowed}"
+            raise _wrong(where, f"reduction.{key}", words, named)
     return scenario
 
 
 def _wrong(where: str, key: str, words: str, named: Mapping[str, str]) -> UserError:
     return UserError(f"{named[key]}: {words}" if key in named else f"{where}: {key}: {words}")
-
-
-def _of_schemas(key: str, value: str) -> str:
-    """What is allowed in place of a name that no schema has."""
-    known, allowed = schemas.names("algorithm"), ", ".join(schemas.names("algorithm"))
-    if key == "pair":
-        parts = (", ".join(schemas.names(kind)) for kind in ("partitioning", "prioritization"))
-        known, allowed = schemas.pairs(), ", then '/', then one of ".join(parts)
-    return f"{_shown(value)} is not allowed{nearest(value[:100], known)}; use one of {allowed}"
 
 
 def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
