@@ -84,13 +84,6 @@ def test_a_folder_that_is_not_there_is_told(tmp_path):
         command_words(gone)
 
 
-def test_it_is_told_before_a_run_is_written(tmp_path):
-    scenario = wall(oracle=Oracle(command="./gone.sh"))
-    with pytest.raises(UserError, match=r"^oracle.command: .*gone.sh"):
-        create_run(scenario, tmp_path / "run.ddenv")
-    assert not list(tmp_path.iterdir())
-
-
 def test_the_module_of_a_simulator_in_python_has_to_be_there_and_is_not_imported(tmp_path):
     (tmp_path / "mine.py").write_text("raise SystemExit('imported')")
     (tmp_path / "native.cpython-311-x86_64-linux-gnu.so").write_bytes(b"")

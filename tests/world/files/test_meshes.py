@@ -226,12 +226,6 @@ def test_a_mesh_of_too_many_triangles_is_refused_in_a_line(tmp_path, monkeypatch
         mesh_of(tmp_path / f"a.{suffix}", ball.export(file_type=suffix), convex=True)
 
 
-def test_large_file_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(meshes, "MESH_LIMIT", 100)
-    with pytest.raises(Unusable, match="the maximum is"):
-        mesh_of(tmp_path / "a.stl", BOX.export(file_type="stl"))
-
-
 def run(text: str, seed: str = "0") -> str:
     """What a new process prints."""
     environment = {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONHASHSEED": seed}

@@ -102,11 +102,6 @@ def test_old_joint_axes_are_in_the_frame_of_the_model(read):
     assert read(named.format(""), "1.9").models[0].joints[0].axis == pytest.approx((1, 0, 0))
 
 
-def test_booleans_of_attributes_are_read_in_any_case(read):
-    model = read("<model name='m'><pose degrees='True'>0 0 0 0 0 90</pose><link name='a'/></model>").models[0]
-    assert model.pose.yaw() == pytest.approx(math.pi / 2)
-
-
 def test_the_old_frame_attribute_means_nothing_in_new_files(read):
     two = "<link name='a'><pose>3 0 0 0 0 0</pose></link><link name='b'><pose frame='a'>1 0 0 0 0 0</pose></link>"
     world = read(f"<model name='m'><static>1</static>{two}</model>", "1.8")

@@ -3,10 +3,7 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.files.resources import Resources
 from ddenv.world.model import Cylinder
-from ddenv.world.scenario import Reading
-from ddenv.world.sdf.read import parse_world
 from tests.world.sdf.conftest import BOX, world_text
 
 TOP = f"<pose>0 0 5 0 0 0</pose><static>1</static><link name='top'>{BOX}</link>"
@@ -37,32 +34,11 @@ def test_a_model_is_found_in_the_model_path(read, table):
     assert second.links[0].inertia is not None
 
 
-@pytest.mark.parametrize("variable", ["GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH"])
-def test_gazebos_variables_are_known(read, table, monkeypatch, variable):
-    monkeypatch.setenv(variable, f"/nowhere:{table}")
-    assert read(included()).models[0].name == "table"
-
-
 def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table):
     text = TABLE.replace("<link", "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame><link")
     (table / "table" / "model.sdf").write_text(text)
     world = read(included("<placement_frame>foot</placement_frame><pose>1 0 0 0 0 0</pose>"), model_path=(table,))
     assert world.models[0].pose.position == (1, 0, 1)
-
-
-def test_an_included_model_goes_with_its_include(read, table):
-    text = world_text(included() + "<model name='m'><link name='l'/></model>")
-    world = read(included() + "<model name='m'><link name='l'/></model>", model_path=(table,))
-    start, end = world.model("table").spans[0]
-    assert text[start:end].decode() == included()
-
-
-def test_what_was_included_can_be_read_again_without_the_files(read, table, tmp_path):
-    text = world_text(included())
-    world = read(included(), model_path=(table,))
-    (table / "table" / "model.sdf").unlink()
-    again = parse_world(text, tmp_path / "here.sdf", Reading(model_path=(table,)), Resources(world.resources))
-    assert again.models == world.models
 
 
 def test_models_in_models_become_one(read, table):
@@ -126,20 +102,6 @@ def test_models_of_one_name_are_told_apart_by_their_place(read):
     assert all("used 3 times" in note.why for note in world.notes if "name" in note.why)
 
 
-def test_words_that_are_not_known_are_noted(read):
-    world = read("<model name='m'><link name='l'><colision name='c'/></link></model>")
-    (note,) = (note for note in world.notes if note.kind == "ignored")
-    assert note.what == "<colision>"
-    assert "unknown element of SDF" in note.why
-
-
-def test_plugins_and_sensors_are_noted(read):
-    world = read(
-        "<plugin name='p' filename='f'/><model name='m'><static>1</static><link name='l'><sensor name='s'/></link></model>"
-    )
-    assert {note.what for note in world.notes} == {"<plugin>", "<sensor>"}
-
-
 def test_a_ground_that_could_move_does_not(read):
     plane = "<collision name='c'><geometry><plane/></geometry></collision>"
     world = read(f"<model name='g'><link name='l'>{plane}</link></model>")
@@ -191,6 +153,9 @@ def test_a_static_model_may_have_no_link(read):
 
 
 SILENT = {
+    "a misspelt collision": "<colision name='c'/>",
+    "a sensor": "<sensor name='s'/>",
+    "a plugin": "<plugin name='p' filename='f'/>",
     "a misspelt limit": "<joint name='j' type='revolute'>{ends}<axis><xyz>0 0 1</xyz><limits/></axis></joint>",
     "a limit outside its axis": "<joint name='j' type='fixed'>{ends}<limit/></joint>",
     "two axes": "<joint name='j' type='revolute'>{ends}<axis/><axis/></joint>",

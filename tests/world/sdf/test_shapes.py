@@ -142,6 +142,9 @@ def test_the_smaller_friction_counts(read):
     world = read(model("<box><size>1 1 1</size></box>", surface))
     assert world.models[0].collisions[0].mu == 0.2
     assert "0.3 and 0.2" in world.notes[0].why
+    # One alone does not hide the other.
+    alone = "<surface><friction><ode><mu>50</mu></ode></friction></surface>"
+    assert read(model("<box><size>1 1 1</size></box>", alone)).models[0].collisions[0].mu == 1
     bullet = "<surface><friction><bullet><friction>0.4</friction></bullet></friction></surface>"
     assert read(model("<box><size>1 1 1</size></box>", bullet)).models[0].collisions[0].mu == 0.4
 
@@ -170,18 +173,8 @@ def test_visuals_keep_their_colours(read, material, color):
     assert world.models[0].links[0].visuals[0].color == color
 
 
-def test_one_coefficient_of_friction_alone_does_not_hide_the_other(read):
-    surface = "<surface><friction><ode><mu>50</mu></ode></friction></surface>"
-    assert read(model("<box><size>1 1 1</size></box>", surface)).models[0].collisions[0].mu == 1
-
-
 def test_a_cone_stands_on_its_base(read):
     shape = shape_of(read(model("<cone><radius>1</radius><length>3</length></cone>", "", "collision")))
     solid = trimesh.Trimesh(shape.vertices, shape.faces)
     assert solid.is_watertight and solid.volume == pytest.approx(np.pi, rel=0.01)
     assert shape.vertices[:, 2].max() == 1.5
-
-
-def test_a_hull_in_place_of_a_mesh_is_noted(read, tmp_path):
-    trimesh.creation.box((1, 1, 1)).export(tmp_path / "a.obj")
-    assert [note.why for note in read(model("<mesh><uri>a.obj</uri></mesh>")).notes] == ["'a.obj' by its convex hull"]
