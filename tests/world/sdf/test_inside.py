@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF
 from ddenv.world.scenario import Reading
-from ddenv.world.sdf import copied
+from ddenv.world.sdf import inside
 from ddenv.world.sdf.read import disk_of, parse_world, read_world
 from ddenv.world.write import without
 
@@ -169,7 +169,7 @@ def test_what_cannot_be_copied_stays_whole_and_is_noted(read, models):
 
 
 def test_a_large_file_is_not_copied_again_and_again(read, models, monkeypatch):
-    monkeypatch.setattr(copied, "MOST_COPIED", 2000)
+    monkeypatch.setattr(inside, "MOST_COPIED", 2000)
     world = read(
         "".join(include("model://hut", f"<name>{name}</name>") for name in "abc"), model_path=models, inside=True
     )

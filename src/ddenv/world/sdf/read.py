@@ -20,9 +20,8 @@ from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
-from ddenv.world.sdf.copied import has_includes, with_copies
 from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.inside import opened
+from ddenv.world.sdf.inside import has_includes, opened, with_copies
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
