@@ -159,10 +159,10 @@ def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
     these = f"joints of '{robot.name}' that turn are {', '.join(turning)}" if turning else "none of its joints turns"
     for side, names in (("left", wheels.left), ("right", wheels.right)):
         for name in names:
-            if name in others:
-                raise UserError(f"robot.wheels.{side}: '{name}' is a {others[name]} joint that does not turn; {these}")
+            why = f"there is no joint '{name}'{nearest(name, turning)}"
+            why = f"'{name}' is a {others[name]} joint that does not turn" if name in others else why
             if name not in turning:
-                raise UserError(f"robot.wheels.{side}: there is no joint '{name}'{nearest(name, turning)}; {these}")
+                raise UserError(f"robot.wheels.{side}: {why}; {these}")
     name, times = Counter([*wheels.left, *wheels.right]).most_common(1)[0]
     if times > 1:
         both = "on both sides" if name in wheels.left and name in wheels.right else "twice"

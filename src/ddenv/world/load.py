@@ -123,26 +123,22 @@ def _wrong(where: str, key: str, words: str, named: Mapping[str, str]) -> UserEr
 def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     """One of pydantic's errors in our words: the key; then what is wrong with its value, and what is allowed."""
     location = [str(part) for part in error["loc"]]
-    key = ".".join(location)
-    if error["type"] == "extra_forbidden":
+    key, kind, found = ".".join(location), error["type"], _shown(error["input"])
+    if kind == "extra_forbidden":
         shorthands = [one.name for one in SETTINGS.values() if not one.stored and [one.section] == location[:-1]]
         known = sorted([*_section(model, location[:-1]).model_fields, *shorthands])
         return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
-    if error["type"] == "as_printed":
+    if kind == "as_printed":
         return f"{key}.as_printed", str(error["msg"])
-    if error["type"] == "missing":
+    if kind == "missing":
         return key, "is missing"
-    context = error.get("ctx", {})
-    if error["type"] == "literal_error":
-        allowed = context["expected"].replace("'", "").replace(" or ", ", ")
-        near = nearest(str(error["input"]), allowed.split(", "))
-        return key, f"{_shown(error['input'])} is not allowed{near}; use one of {allowed}"
-    if error["type"] in PLAINLY:
-        return key, f"{PLAINLY[error['type']]}, found {_shown(error['input'])}"
-    if error["type"] == "string_pattern_mismatch" and key == "controller.use":
-        return key, f"expected straight, costmap or module:Class, found {_shown(error['input'])}"
-    message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
-    return key, f"{message.replace('input should', 'should')}, found {_shown(error['input'])}"
+    if kind == "literal_error":
+        allowed = error["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
+        return key, f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}"
+    if kind == "string_pattern_mismatch" and key == "controller.use":
+        return key, f"expected straight, costmap or module:Class, found {found}"
+    plain = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
+    return key, f"{PLAINLY.get(kind, plain.replace('input should', 'should'))}, found {found}"
 
 
 def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:

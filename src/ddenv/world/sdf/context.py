@@ -100,8 +100,7 @@ class Context:
     def note_unused(self, root: Element) -> None:
         """Notes the stand-ins that nothing asked for: probably typing errors."""
         # `auto` asks for nothing as long as nothing is missing.
-        asked = {uri for uri, stand_in in self.stand_ins.items() if stand_in != AUTO}
-        for uri in sorted(asked - self.used):
+        for uri in sorted(uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used):
             self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
 
     def complain_of_missing(self) -> None:
@@ -109,10 +108,9 @@ class Context:
         if not self.missing:
             return
         (_, first), *others = self.missing.items()
-        names = ", ".join(f"'{uri[:100]}'" for uri, _ in others[:5])
         more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-        message = f"{first}; also missing: {names}{more}" if others else str(first)
-        raise MissingFiles(message, list(self.missing))
+        also = f"; also missing: {', '.join(repr(uri[:100]) for uri, _ in others[:5])}{more}" if others else ""
+        raise MissingFiles(f"{first}{also}", list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore

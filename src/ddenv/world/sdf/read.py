@@ -120,6 +120,12 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
         if has_includes(part) and model.static and model.name not in world.anchors and len(model.collisions) > 1
     }
     reading = context.reading.model_copy(update={"inside": False})
+
+    def solid(model: Model) -> list[Collision]:
+        """What can be touched of a model. A mesh and its copy differ in their origin alone."""
+        box = Box((0.0, 0.0, 0.0))
+        return [replace(one, shape=box) if isinstance(one.shape, Mesh) else one for one in model.collisions]
+
     while parts:
         text = with_copies(world.text, world.path, scope, list(parts.values()), context.resources)
         try:
@@ -127,18 +133,11 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
         except UserError:
             break
         # What was written is read again: only that shows that each model is what it was.
-        wrong = {name for name in parts if _solid(again.model(name)) != _solid(world.model(name))}
+        wrong = {name for name in parts if solid(again.model(name)) != solid(world.model(name))}
         if not wrong:
             return opened(replace(again, notes=world.notes), parse(text, world.path))
         parts = {name: part for name, part in parts.items() if name not in wrong}
     return opened(world, root)
-
-
-def _solid(model: Model) -> list[Collision]:
-    """What can be touched of a model. A mesh and its copy differ in their origin alone."""
-    return [
-        replace(one, shape=Box((0.0, 0.0, 0.0))) if isinstance(one.shape, Mesh) else one for one in model.collisions
-    ]
 
 
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
