@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -34,6 +34,7 @@ from ddenv.world.model import (
     Sphere,
     Visual,
     World,
+    unique_names,
 )
 from ddenv.world.pose import Pose, Vector
 
@@ -211,17 +212,8 @@ def _clean(name: str) -> str:
     return f"{name.strip('_') or 'a'}_" if reserved else name
 
 
-def _unique(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
-    """Clean, unique names; repeated ones get a number."""
-    used, unique = set(taken), []
-    for name in map(_clean, names):
-        own, number = name, 1
-        while own in used:
-            number += 1
-            own = f"{name}_{number}"
-        used.add(own)
-        unique.append(own)
-    return unique
+def _unique(names: Iterable[str], taken: Collection[str] = ()) -> list[str]:
+    return unique_names(list(map(_clean, names)), "_", taken)
 
 
 def obj(mesh: Mesh) -> bytes:

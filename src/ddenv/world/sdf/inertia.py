@@ -47,9 +47,8 @@ def read_inertia(
     if tensor is not None:
         moments = vector(number_or_nan(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
         products = vector(number_or_nan(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
-        rounded = _rounded_up(moments, products)
-        if is_possible(rounded, products):
-            return Inertia(mass, link_pose @ pose, rounded, products)
+        if possible := _possible(moments, products):
+            return Inertia(mass, link_pose @ pose, possible, products)
     said = "no <inertia>"
     if tensor is not None:
         words = (text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
@@ -69,13 +68,14 @@ def read_density(parent: Element, default: float) -> float:
     return density
 
 
-def _rounded_up(moments: Vector, products: Vector) -> Vector:
-    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates."""
+def _possible(moments: Vector, products: Vector) -> Vector | None:
+    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates; None if no body can have them."""
     low, middle, high = _principal(moments, products)
     excess = high - low - middle
-    if not -1e-9 * high < excess < 1e-5 * high:
-        return moments
-    return vector(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
+    if -1e-9 * high < excess < 1e-5 * high:
+        moments = vector(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
+        low, middle, high = _principal(moments, products)
+    return moments if low > LEAST_MOMENT and high <= low + middle else None
 
 
 def _principal(moments: Vector, products: Vector) -> tuple[float, float, float]:
@@ -87,12 +87,6 @@ def _principal(moments: Vector, products: Vector) -> tuple[float, float, float]:
         return math.nan, math.nan, math.nan
     low, middle, high = np.linalg.eigvalsh(tensor).tolist()
     return low, middle, high
-
-
-def is_possible(moments: Vector, products: Vector) -> bool:
-    """Whether a body can have this inertia: principal moments are positive, and none exceeds the sum of the others."""
-    low, middle, high = _principal(moments, products)
-    return bool(low > LEAST_MOMENT and high <= low + middle)
 
 
 def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
@@ -113,10 +107,10 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
     tensor *= factor
     moments = vector(tensor[axis, axis] for axis in range(3))
     products = (float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2]))
-    moments = _rounded_up(moments, products)
-    if not is_possible(moments, products):
+    possible = _possible(moments, products)
+    if possible is None:
         return _ball(link_pose, total * factor)
-    return Inertia(total * factor, Pose(vector(middle)), moments, products)
+    return Inertia(total * factor, Pose(vector(middle)), possible, products)
 
 
 def _ball(link_pose: Pose, mass: float) -> Inertia:

@@ -132,7 +132,7 @@ def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed
         mass = link.find("inertial/pose")
         return Placed(found.stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
     by = [abs(own / usual) for own, usual in zip(lost.scale, found.scale, strict=True)]
-    return scaled(found.stand_in, vector(by))
+    return scaled(found.stand_in, vector(by), lost.element)
 
 
 def can_be_touched(collision: Element, context: Context) -> bool:

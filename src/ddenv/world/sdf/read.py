@@ -15,7 +15,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.world.access import is_directives, read_bytes
 from ddenv.world.files.resources import Resources, on_disk
-from ddenv.world.model import Box, Collision, Mesh, Model, World
+from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
@@ -143,7 +143,7 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
     names = [part.name for part in scope.parts]
     counts, models = Counter(names), []
-    for part, name in zip(scope.parts, unique_names(names), strict=True):
+    for part, name in zip(scope.parts, unique_names(names, " #"), strict=True):
         if name != part.name:
             context.model = name
             context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
@@ -153,18 +153,3 @@ def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tu
     for saved in chain(*state.values()):
         context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
     return tuple(models)
-
-
-def unique_names(names: list[str]) -> list[str]:
-    """`names` with repeated ones made unique: the second `name` becomes `name #2`, the third `name #3`, ..."""
-    taken, unique = set(names), []
-    given: Counter[str] = Counter()
-    for name in names:
-        own, number = name, given[name]
-        while number and own in taken:
-            number += 1
-            own = f"{name} #{number}"
-        given[name] = max(number, 1)
-        taken.add(own)
-        unique.append(own)
-    return unique
