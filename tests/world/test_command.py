@@ -24,9 +24,6 @@ def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path
     assert filled(found, values)[1:] == ["--world=/a {seed}.sdf", "7 seeds", ";", "rm", "$HOME", '{"a": 1}']
     assert has_placeholder(found, "seed")
     assert not has_placeholder(found, "log")
-
-
-def test_a_program_on_the_path_is_found(words):
     assert words("sh -c true")[0].startswith("/")
 
 

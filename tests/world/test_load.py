@@ -24,10 +24,6 @@ def test_every_bundled_scenario_loads():
         assert scenario.robot.model.is_file()
 
 
-def test_file_names_are_relative_to_the_scenario():
-    assert load_scenario(DATA / "wall.yaml").world == DATA / "wall.sdf"
-
-
 WRONG = {
     "typo": ({"goall": {}}, r"goall: unknown key \(did you mean goal\?\); allowed are"),
     "inner typo": ({"reduction": {"iteration": 3}}, r"reduction.iteration: unknown key \(did you mean iterations\?\)"),

@@ -33,10 +33,6 @@ def _line(index):
     return DITCH.text.count(b"\n", 0, index)
 
 
-def test_nothing_removed_changes_no_byte():
-    assert without(DITCH, frozenset()) == DITCH.text
-
-
 def test_models_on_one_line_leave_the_rest_of_it():
     one, two = (f"<model name='{name}'><link name='l'/></model>" for name in "ab")
     world = parse_world(f"<sdf version='1.9'><world name='w'>{one} {two}</world></sdf>".encode(), DATA)

@@ -34,11 +34,16 @@ def test_a_model_is_found_in_the_model_path(read, table):
     assert second.links[0].inertia is not None
 
 
-def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table):
-    text = TABLE.replace("<link", "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame><link")
+@pytest.mark.parametrize(("of_model", "of_include"), [(" placement_frame='foot'", ""), ("", "foot")])
+def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table, of_model, of_include):
+    frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"
+    text = TABLE.replace("<model name='table'>", f"<model name='table'{of_model}>{frame}")
     (table / "table" / "model.sdf").write_text(text)
-    world = read(included("<placement_frame>foot</placement_frame><pose>1 0 0 0 0 0</pose>"), model_path=(table,))
+    placed = f"<placement_frame>{of_include}</placement_frame>" if of_include else ""
+    world = read(included(f"{placed}<pose>1 0 0 0 0 0</pose>"), model_path=(table,))
     assert world.models[0].pose.position == (1, 0, 1)
+    with pytest.raises(UserError, match="a <placement_frame> needs a <pose>"):
+        read(included("<placement_frame>foot</placement_frame>"), model_path=(table,))
 
 
 def test_models_in_models_become_one(read, table):
@@ -74,6 +79,7 @@ def test_a_stand_in_for_a_whole_model(read):
     assert desk.collisions[0].pose.position == (1, 0, 1)
     assert "stand-in cylinder:0.5,2" in world.notes[0].why
     assert read(included(), ignore=("include",)).models == ()
+    assert read("<include merge='true'><uri>model://table</uri></include>", ignore=("include",)).models == ()
 
 
 def test_what_is_wrong_in_an_included_file_is_told_of_that_file(read, table):
@@ -117,26 +123,10 @@ def test_gravity_of_old_and_new_files(read):
     assert not light.gravity
 
 
-def test_an_includes_pose_is_that_of_the_models_own_placement_frame(read, table):
-    frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"
-    text = TABLE.replace("<model name='table'>", f"<model name='table' placement_frame='foot'>{frame}")
-    (table / "table" / "model.sdf").write_text(text)
-    assert read(included("<pose>1 0 0 0 0 0</pose>"), model_path=(table,)).models[0].pose.position == (1, 0, 1)
-    with pytest.raises(UserError, match="a <placement_frame> needs a <pose>"):
-        read(included("<placement_frame>foot</placement_frame>"), model_path=(table,))
-
-
 def test_all_files_that_are_nowhere_are_told_at_once(read):
     mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
     with pytest.raises(UserError, match=r"'model://table' was not found .*; also missing: 'model://lamp/lamp.dae'$"):
         read(included() + included() + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>")
-
-
-def test_a_merged_include_can_be_left_out(read):
-    merged = "<include merge='true'><uri>model://table</uri></include>"
-    with pytest.raises(UserError, match="--ignore include"):
-        read(merged)
-    assert read(merged, ignore=("include",)).models == ()
 
 
 def test_a_stand_in_is_called_as_what_it_replaces(read):

@@ -119,12 +119,6 @@ def test_an_inertia_that_cannot_be_is_worked_out_from_the_shapes_with_a_note(rea
     assert [why in note.why for note in world.notes] == [True]
 
 
-def test_an_inertia_that_can_be_is_kept(read):
-    world = read(moving(MASS))
-    assert world.notes == ()
-    assert world.models[0].links[0].inertia.moments == (1, 1, 1)
-
-
 @pytest.mark.parametrize(("given", "mass"), [("<density>10</density>", 60), ("<mass>7</mass>", 7)])
 def test_automatic_inertia_uses_the_density_or_spreads_a_mass(read, given, mass):
     world = read(moving(f"<inertial auto='true'>{given}</inertial>"), "1.11")
