@@ -96,9 +96,9 @@ def test_unknown_submesh_names_those_that_exist(tmp_path):
     with pytest.raises(Unusable, match=r"has no submesh 'third'; it has 'first', 'second'$"):
         mesh_of(tmp_path / "a.obj", OBJ, submesh="third")
     many = "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "".join(f"o part{i}\nf 1 2 3\n" for i in range(7))
-    with pytest.raises(Unusable, match=r"'part4' and 2 more$"):
+    with pytest.raises(Unusable, match=r"'part4', \.\.\.$"):
         mesh_of(tmp_path / "a.obj", many, submesh="x")
-    with pytest.raises(Unusable, match="its parts have no names"):
+    with pytest.raises(Unusable, match="it has none with a name"):
         mesh_of(tmp_path / "a.stl", BOX.export(file_type="stl"), submesh="x")
 
 

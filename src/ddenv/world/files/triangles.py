@@ -52,11 +52,8 @@ def chosen(parts: Sequence[Part], name: str) -> list[Part]:
         if found := [part for part in parts if part.names[rank : rank + 1] == (name,)]:
             return found
     known = list(dict.fromkeys(part.names[0] for part in parts if part.names and part.names[0]))
-    if not known:
-        raise ValueError(f"has no submesh '{name[:60]}': its parts have no names")
-    more = f" and {len(known) - 5} more" if len(known) > 5 else ""
-    listed = ", ".join(f"'{each[:60]}'" for each in known[:5])
-    raise ValueError(f"has no submesh '{name[:60]}'; it has {listed}{more}")
+    listed = ", ".join(f"'{each[:60]}'" for each in known[:5]) or "none with a name"
+    raise ValueError(f"has no submesh '{name[:60]}'; it has {listed}{', ...' if len(known) > 5 else ''}")
 
 
 def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
