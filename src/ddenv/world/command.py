@@ -88,7 +88,9 @@ def _program(word: str, folder: Path) -> str:
     with suppress(OSError), path.open("rb") as file:
         head = file.read(LONGEST_FIRST_LINE)
     line = head.partition(b"\n")[0]
-    interpreter = os.fsdecode(line[2:].replace(b"\t", b" ").strip(b" ").split(b" ")[0]) if line.startswith(b"#!") else ""
+    interpreter = (
+        os.fsdecode(line[2:].replace(b"\t", b" ").strip(b" ").split(b" ")[0]) if line.startswith(b"#!") else ""
+    )
     # Binary programs contain NUL bytes.
     if b"\0" not in head and not os.access(interpreter, os.X_OK):
         hint = "its first line must name one, as '#!/bin/sh' does, with Unix line endings"

@@ -90,8 +90,8 @@ def _depth(body: Hull, obstacle: Collision) -> float:
     """How deep a body is inside an obstacle, m."""
     if not isinstance(obstacle.shape, Plane):
         return overlap(body, hull(obstacle))
-    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
-    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
+    up = np.array(obstacle.pose.rotate((0.0, 0.0, 1.0)))
+    return float(up @ obstacle.pose.position - (body.vertices @ up).min()) + body.radius
 
 
 # Models at rest in a saved world overlap by millimetres; this is more, m.
@@ -201,11 +201,6 @@ class Hull:
 
     vertices: np.ndarray
     radius: float = 0.0
-
-    def span(self, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest coordinate along each unit vector of `axes`, shape (M, 3)."""
-        along = axes @ self.vertices.T
-        return along.min(axis=1) - self.radius, along.max(axis=1) + self.radius
 
 
 def hull(collision: Collision, place: Pose | None = None) -> Hull:

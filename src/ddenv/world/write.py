@@ -64,10 +64,11 @@ def without(world: World, removed: frozenset[str]) -> bytes:
 
 def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
     """`world` as SDF 1.9, and its meshes by the relative paths of their OBJ files, which lie in the folder `mesh_folder`."""
-    links = [link for model in world.models for link in model.links]
-    shapes = [one.shape for link in links for one in (*link.collisions, *link.visuals)]
-    meshes = dict.fromkeys(shape for shape in shapes if isinstance(shape, Mesh))
-    files = {mesh: f"{mesh_folder}/mesh_{number}.obj" for number, mesh in enumerate(meshes, 1)}
+    files: dict[Mesh, str] = {}
+    for link in (link for model in world.models for link in model.links):
+        for shape in (*(one.shape for one in link.collisions), *(one.shape for one in link.visuals)):
+            if isinstance(shape, Mesh):
+                files.setdefault(shape, f"{mesh_folder}/mesh_{len(files) + 1}.obj")
     ElementTree.register_namespace("drake", DRAKE)
     root = Element("sdf", version="1.9")
     inside = SubElement(root, "world", name=_clean(world.name) or "world")

@@ -56,7 +56,7 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
         static=static,
         links=tuple(builder.links),
         joints=tuple(builder.joints),
-        spans=tuple((one.start, one.end) for one in (part.at, saved and saved.element) if one is not None),
+        spans=tuple((one.start, one.end) for one in (part.at, *([saved.element] if saved else []))),
         line=part.at.line,
         gravity=static or any(pulled),
         self_collide=any(builder.self_collide),
