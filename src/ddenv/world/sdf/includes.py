@@ -117,9 +117,9 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         return root
     except Missing as missing:
         if context.may_guess(uri):
-            found = guess(uri)
-            note(f"a guess, {found.text}: {found.why}")
-            return _stand_in_root(include, found.text, found.stand_in)
+            stand_in, text, why, _ = guess(uri)
+            note(f"a guess, {text}: {why}")
+            return _stand_in_root(include, text, stand_in)
         if context.ignores("include"):
             context.note("ignored", include, f"'{uri}' was not found: {missing}")
             return None

@@ -126,13 +126,13 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
 
 def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed:
     """A shape for a missing mesh whose link has no other visual shape to go by."""
-    found = guess(lost.uri, link)
-    context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {found.text}: {found.why}")
-    if found.at_mass:
+    stand_in, text, why, scale = guess(lost.uri, link)
+    context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {text}: {why}")
+    if scale is None:
         mass = link.find("inertial/pose")
-        return Placed(found.stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
-    by = [abs(own / usual) for own, usual in zip(lost.scale, found.scale, strict=True)]
-    return scaled(found.stand_in, vector(by), lost.element)
+        return Placed(stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
+    by = [abs(own / usual) for own, usual in zip(lost.scale, scale, strict=True)]
+    return scaled(stand_in, vector(by), lost.element)
 
 
 def can_be_touched(collision: Element, context: Context) -> bool:

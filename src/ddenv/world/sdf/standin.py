@@ -102,31 +102,20 @@ DEFAULT_MOMENT = 1.0
 SOME = "box:1,1,1"
 
 
-@dataclass(frozen=True)
-class Guess:
-    """A stand-in, its `text`, and `why` it is this one; `scale` is that of a mesh of this size.
+def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vector | None]:
+    """The shape for a missing model, or for a missing mesh of the `link`: the stand-in, its text, and why it is this one.
 
-    It stands where the mesh would, or with `at_mass` at the link's centre of mass.
+    It stands where the mesh would, and has the size of a mesh of that scale; without a scale, at the link's centre of mass.
     """
-
-    stand_in: Placed
-    text: str
-    why: str
-    scale: Vector
-    at_mass: bool = False
-
-
-def guess(uri: str, link: Element | None = None) -> Guess:
-    """The shape for a missing model, or for a missing mesh of the `link`."""
     text, scale = KNOWN_SIZES.get(model_named(uri), (SOME, ONE))
-    why, at_mass = "the size of Gazebo's model", False
+    why, box = "the size of Gazebo's model", None
     if text == SOME:
         box = None if link is None else _box_of_inertia(link)
-        text, at_mass = box or SOME, box is not None
-        why = "the box that has the link's inertia" if at_mass else "nothing says how large it is"
+        text = box or SOME
+        why = "the box that has the link's inertia" if box else "nothing says how large it is"
     stand_in = parse_stand_in(text, "guess")
     assert isinstance(stand_in, Placed)
-    return Guess(stand_in, text, why, scale, at_mass)
+    return stand_in, text, why, None if box else scale
 
 
 def _box_of_inertia(link: Element) -> str | None:
