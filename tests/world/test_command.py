@@ -30,10 +30,7 @@ def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path
 @pytest.mark.parametrize(
     ("command", "complaint"),
     [
-        (
-            "./run.sh {wrld}",
-            r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, \{seed\} and \{log\}",
-        ),
+        ("./run.sh {wrld}", r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, "),
         ("./run.sh ${HOME}", r"unknown placeholder \{HOME\}"),
         ("./run.sh 'a", "no closing quotation"),
         (" ", "names no program"),
@@ -89,16 +86,10 @@ def test_the_module_of_a_simulator_in_python_has_to_be_there_and_is_not_imported
         assert command_words(wall(folder=tmp_path, oracle=Oracle(use=use))) == ()
     run = tmp_path / "run.ddenv"
     for oracle, said in (
-        (
-            Oracle(use="mime:Mine"),
-            rf"^oracle\.use: there is no module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$",
-        ),
-        (Oracle(use=".mine:Mine"), r"^oracle\.use: there is no module '\.mine' in "),
-        (
-            Oracle(use="mine:Mine", folder=tmp_path / "no"),
-            rf"^oracle\.folder: there is no folder {tmp_path}/no to start the ",
-        ),
+        (Oracle(use="mime:Mine"), rf"module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$"),
+        (Oracle(use=".mine:Mine"), r"module '\.mine' in "),
+        (Oracle(use="mine:Mine", folder=tmp_path / "no"), f"folder {tmp_path}/no to start the "),
     ):
-        with pytest.raises(UserError, match=said):
+        with pytest.raises(UserError, match=rf"^oracle\.(use|folder): there is no {said}"):
             create_run(wall(folder=tmp_path, oracle=oracle), run)
         assert not run.exists()
