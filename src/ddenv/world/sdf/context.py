@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
-from ddenv.world.access import MissingFiles, Unusable
+from ddenv.world.access import MissingFiles
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
@@ -127,16 +126,6 @@ class Context:
         """Whether the user wants a guessed shape for `uri`, which is missing."""
         key = matching(self.stand_ins, uri)
         return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
-
-    def root(self, element: Element, uri: str, convert: Callable[[bytes, Path, Context], Element]) -> Element:
-        """The `<sdf>` that `convert` makes of the file that `element` includes. Raises Missing, and UserError for another file."""
-        try:
-            path, text = self.resources.sdf(uri, element.source.parent)
-        except Unusable as error:
-            raise complain(element, f"'{uri[:200]}' cannot be included: {error}") from None
-        if path not in self.files:
-            self.files[path] = convert(text, path, self)
-        return self.files[path]
 
 
 def sdf_root(text: bytes, path: Path) -> Element:

@@ -9,7 +9,7 @@ from pathlib import Path
 from ddenv.schemas import nearest
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.context import Context, version
-from ddenv.world.sdf.includes import Part, parts
+from ddenv.world.sdf.includes import Part, included
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 
 # Maximum distance from the origin of a frame, m: larger numbers lose their millimetres.
@@ -25,7 +25,13 @@ class Scope:
         self, element: Element, files: tuple[Path, ...], context: Context, scopes: dict[int, Scope] | None = None
     ) -> None:
         self.element = element
-        self.parts = parts(element, files, context)
+        # The models directly inside, in the file's order.
+        self.parts: list[Part] = []
+        for child in element:
+            if child.tag == "model":
+                self.parts.append(Part(child, child, name_of(child), files))
+            elif child.tag == "include" and (part := included(child, files, context)) is not None:
+                self.parts.append(part)
         self._context = context
         self._poses: dict[str, Pose] = {}
         # All scopes inside the outermost one, by the `id` of their element.
@@ -77,9 +83,7 @@ class Scope:
         if isinstance(thing, Part):
             element, holder, default = thing.pose, thing.at, ""
         else:
-            element, holder, default = thing.find("pose"), thing, ""
-            if thing.tag != "link":
-                default = text_of(thing.find("child")) if thing.tag == "joint" else _attached(thing)
+            element, holder, default = thing.find("pose"), thing, _carrier(thing)
         local = HERE if element is None else pose_of(element)
         local = self._by_placement_frame(thing, local) if isinstance(thing, Part) else local
         return _named_in(element) or default, local, holder if element is None else element
@@ -125,7 +129,7 @@ class Scope:
                 return self.inside(thing).canonical and f"{name}::{self.inside(thing).canonical}"
             if thing.tag == "link":
                 return name
-            name = text_of(thing.find("child")) if thing.tag == "joint" else _attached(thing)
+            name = _carrier(thing)
         return self.canonical
 
     @cached_property
@@ -142,14 +146,15 @@ class Scope:
     def references(self) -> set[str]:
         """The names that poses and frames directly inside this world refer to."""
         frames = self.element.findall("frame")
-        named = [_attached(frame) for frame in frames]
+        named = [_carrier(frame) for frame in frames]
         named += [_named_in(holder.find("pose")) for holder in (*frames, *(part.at for part in self.parts))]
         # A model's name may itself hold colons.
         return {name for each in named for name in (each, each.split("::", 1)[0]) if name}
 
 
-def _attached(frame: Element) -> str:
-    return (frame.get("attached_to") or "").strip()
+def _carrier(thing: Element) -> str:
+    """What a joint or a frame is fixed to; empty for a link."""
+    return text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
 
 
 def shown(names: list[str]) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ddenv.world.access import Missing
+from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
@@ -44,19 +44,6 @@ class Part:
         """The frame inside the model that the pose places; empty for the model's own."""
         given = "" if self.at is self.element else text_of(self.at.find("placement_frame"))
         return given or (self.element.get("placement_frame") or "").strip()
-
-
-def parts(element: Element, files: tuple[Path, ...], context: Context) -> list[Part]:
-    """The models directly inside a `<model>` or `<world>`, in the file's order. Raises UserError."""
-    found = []
-    for child in element:
-        if child.tag == "model":
-            found.append(Part(child, child, name_of(child), files))
-        elif child.tag == "include":
-            part = included(child, files, context)
-            if part is not None:
-                found.append(part)
-    return found
 
 
 def included(include: Element, files: tuple[Path, ...], context: Context) -> Part | None:
@@ -111,10 +98,15 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         note(f"the stand-in {given[0]}")
         return _stand_in_root(include, *given)
     try:
-        root = context.root(include, uri, root_of)
+        path, text = context.resources.sdf(uri, include.source.parent)
+        if path not in context.files:
+            context.files[path] = root_of(text, path, context)
+        root = context.files[path]
         if root.source.parent == FOLDER and root.find("model") is not None:
             note("the one built into ddenv, which is like Gazebo's")
         return root
+    except Unusable as error:
+        raise complain(include, f"'{uri[:200]}' cannot be included: {error}") from None
     except Missing as missing:
         if context.may_guess(uri):
             stand_in, text, why, _ = guess(uri)
