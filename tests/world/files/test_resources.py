@@ -6,7 +6,7 @@ import pytest
 
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.meshes import pack
-from ddenv.world.files.resources import Resources, on_disk
+from ddenv.world.files.resources import Resources, search_folders
 
 CUBE = "\n".join(
     [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
@@ -26,7 +26,7 @@ def world(tmp_path, no_gazebo):
 
 
 def test_stored_gives_the_same_without_the_files(world):
-    disk = on_disk(world)
+    disk = Resources({}, search_folders((), world))
     ways = [
         {"convex": convex, "center": center, "submesh": name}
         for convex in (False, True)
@@ -70,7 +70,7 @@ def damaged(packed: bytes):
 
 
 def test_damaged_bytes(world):
-    disk = on_disk(world)
+    disk = Resources({}, search_folders((), world))
     disk.mesh("cube.obj", world, convex=True)
     disk.sdf("model://box", world)
     keys = {json.loads(key)[0]: key for key in disk.taken}
@@ -83,7 +83,7 @@ def test_damaged_bytes(world):
 
 
 def test_files_of_one_name_are_told_apart_by_content(world):
-    disk = on_disk(world)
+    disk = Resources({}, search_folders((), world))
     first = disk.mesh("cube.obj", world, convex=True)
     (world / "box" / "cube.obj").write_text(CUBE.replace("2", "3"))
     other = disk.mesh("cube.obj", world / "box", convex=True)

@@ -90,11 +90,6 @@ class Resources:
         return self._last[1]
 
 
-def on_disk(world_folder: Path, model_path: Sequence[Path] = ()) -> Resources:
-    """The files beside a world and in the folders of `model_path`, Gazebo and ROS."""
-    return Resources({}, search_folders(model_path, world_folder))
-
-
 def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
     """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
     try:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import is_directives, read_bytes
-from ddenv.world.files.resources import Resources, on_disk
+from ddenv.world.files.resources import Resources, search_folders
 from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
@@ -76,7 +76,7 @@ def disk_of(path: Path, reading: Reading) -> Resources:
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return on_disk(path.parent, reading.model_path)
+    return Resources({}, search_folders(reading.model_path, path.parent))
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from yaml.nodes import Node
 
+from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
 from ddenv.world.pose import HERE, Pose
@@ -52,8 +54,7 @@ class Fixing:
     own: Frame
     base: Frame
     pose: Pose
-    source: Source
-    node: Node
+    complain: Callable[[str], UserError]
     weld: bool
 
 
@@ -93,7 +94,7 @@ class _Builder:
                 _, pose = source.pose(keys.get("X_PC"), with_base=False)
                 if not child.model:
                     raise source.complain(keys["child"], "the world cannot be welded to a model; make it the parent")
-                self._fix(Fixing(child, parent, pose, source, one.node, weld=True))
+                self._fix(Fixing(child, parent, pose, partial(source.complain, one.node), weld=True))
                 for owner in child.owners:
                     self.spans[owner].append(one.span)
             case "add_collision_filter_group":
@@ -125,8 +126,7 @@ class _Builder:
             return
         part = replace(part, name=name)
         outer = Scope(_element(WORLD, *at), (source.path,), self.context, self.scopes)
-        model = assemble(part, name, outer, None, self.context)
-        model = without_mass(model, part.element)
+        model = without_mass(assemble(part, name, outer, None, self.context), part.element)
         positions = source.pairs(keys["default_joint_positions"]) if "default_joint_positions" in keys else {}
         model, turned = _at_positions(model, positions, source)
         self.models[name], self.elements[name] = model, include
@@ -149,7 +149,7 @@ class _Builder:
                 raise source.complain(value, f"there is no body '{body[:80]}' in '{name[:80]}'")
             base, pose = source.pose(value)
             there = Frame() if base is None else self._frame(base, source)
-            self._fix(Fixing(frame, there, pose, source, value, weld=False))
+            self._fix(Fixing(frame, there, pose, partial(source.complain, value), weld=False))
 
     def _frame(self, node: Node, source: Source) -> Frame:
         """The frame that `node` names. Raises UserError."""
@@ -193,11 +193,11 @@ class _Builder:
         if model.static or any(
             joint.parent == WORLD for joint in model.joints if self.roots[name, joint.child] == key[1]
         ):
-            raise fixing.source.complain(fixing.node, f"'{name[:80]}' is fixed to the world by its own file")
+            raise fixing.complain(f"'{name[:80]}' is fixed to the world by its own file")
         if before is not None and (before.weld or not fixing.weld or before.base.model):
-            raise fixing.source.complain(fixing.node, f"'{name[:80]}' is placed twice")
+            raise fixing.complain(f"'{name[:80]}' is placed twice")
         if not (fixing.weld or fixing.base.model or link == key[1]):
-            raise fixing.source.complain(fixing.node, f"'{link[:80]}' is not free: joints hold it")
+            raise fixing.complain(f"'{link[:80]}' is not free: joints hold it")
         self.fixings[key] = fixing
 
     # Where all of it is.
@@ -212,7 +212,7 @@ class _Builder:
             self.places[key] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
         place = self.places[key]
         if place is None:
-            raise fixing.source.complain(fixing.node, f"the place of '{key[0][:80]}' depends on itself")
+            raise fixing.complain(f"the place of '{key[0][:80]}' depends on itself")
         return place
 
     def _pose(self, frame: Frame) -> Pose:
@@ -248,8 +248,7 @@ class _Builder:
                 joints.append(Joint(f"{at} (weld)", "fixed", base.link, at, self._pose(base)))
             elif base.model and not _holds(self.finish(base.model), base.link):
                 if name in self.carriers:
-                    why = f"'{name[:80]}' is welded to two models that can move"
-                    raise fixing.source.complain(fixing.node, why)
+                    raise fixing.complain(f"'{name[:80]}' is welded to two models that can move")
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
