@@ -109,9 +109,9 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         raise complain(include, f"'{uri[:200]}' cannot be included: {error}") from None
     except Missing as missing:
         if context.may_guess(uri):
-            stand_in, text, why, _ = guess(uri)
-            note(f"a guess, {text}: {why}")
-            return _stand_in_root(include, text, stand_in)
+            stand_in, words, why, _ = guess(uri)
+            note(f"a guess, {words}: {why}")
+            return _stand_in_root(include, words, stand_in)
         if context.ignores("include"):
             context.note("ignored", include, f"'{uri}' was not found: {missing}")
             return None
@@ -119,8 +119,8 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
             f"give its folder with --model-path, a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, "
             "sphere, ...), have one guessed with --stand-in auto, or leave it out with --ignore include"
         )
-        error = complain(include, f"'{uri[:200]}' was not found ({missing}); {remedies}")
-        context.missing.setdefault(uri, error)
+        why = f"'{uri[:200]}' was not found ({missing}); {remedies}"
+        context.missing.setdefault(uri, complain(include, why))
         return None
 
 
