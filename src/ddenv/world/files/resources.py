@@ -173,17 +173,20 @@ def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
     scheme, rest = _split(uri.strip())
     if scheme in ("model", "package"):
         path = _inside(rest)
-        return _first(
-            chain(_of_model(path, folders), _cached(path)), f"looked in {_listed(folders)} and the Fuel cache"
-        )
+        where = f"looked in {_listed(folders)} and the Fuel cache"
+        return _first(chain(_of_model(path, folders), _cached(path)), where)
     if scheme in ("http", "https"):
         return _downloaded(rest, folders)
     if scheme not in ("", "file"):
         raise Unusable(f"scheme '{scheme[:30]}:' is not supported")
     if rest.startswith("/"):
         return _first([Path(os.path.normpath(rest))], "there is no such file")
-    where = f"looked beside the file that names it and in {_listed(folders)}"
-    return _first(_beside(rest, base, folders), where)
+    around = (base, *folders)
+    paths = [Path(os.path.normpath(folder / rest)) for folder in around]
+    staying = [path for path in paths if any(map(_absolute(path).is_relative_to, map(_absolute, around)))]
+    if not staying:
+        raise Unusable(CLIMBS)
+    return _first(staying, f"looked beside the file that names it and in {_listed(folders)}")
 
 
 def _split(uri: str) -> tuple[str, str]:
@@ -222,16 +225,6 @@ def _package(folder: Path) -> str:
         return (xml_root(read(folder / "package.xml", MODEL_CONFIG_LIMIT)).findtext("name") or "").strip()
     except Unusable:
         return ""
-
-
-def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:
-    """`rest` below `base` and each search folder. Raises Unusable if it leaves all of them."""
-    allowed = [_absolute(folder) for folder in (base, *folders)]
-    candidates = [Path(os.path.normpath(folder / rest)) for folder in (base, *folders)]
-    staying = [path for path in candidates if any(_absolute(path).is_relative_to(folder) for folder in allowed)]
-    if not staying:
-        raise Unusable(CLIMBS)
-    yield from staying
 
 
 def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
