@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -35,9 +34,9 @@ ATTRIBUTES = (
 
 
 class Step(NamedTuple):
-    """One change: how, and the numbers and words that say where and to what."""
+    """One change: its kind, and the numbers and words that say where and to what."""
 
-    change: Callable[[Element, Step], None]
+    kind: str
     first: int
     second: int
     value: str
@@ -49,145 +48,113 @@ def elements(root: Element) -> list[Element]:
     return [element for element in root.iter() if isinstance(element.tag, str)]
 
 
-def holders(root: Element) -> list[tuple[Element, Element]]:
-    """All elements but the root, each after the one it is in."""
-    return [(parent, child) for parent in elements(root) for child in parent if isinstance(child.tag, str)]
-
-
 def chosen(options: list, number: int):
     return options[number % len(options)]
 
 
-def delete(root: Element, step: Step) -> None:
-    if pairs := holders(root):
-        parent, child = chosen(pairs, step.first)
-        parent.remove(child)
+def having(root: Element, tag: str) -> Element:
+    """The child `tag` of an element, new if there is none."""
+    child = root.find(tag)
+    return ElementTree.SubElement(root, tag) if child is None else child
 
 
-def duplicate(root: Element, step: Step) -> None:
-    if pairs := holders(root):
-        parent, child = chosen(pairs, step.first)
-        parent.insert(step.second % (len(parent) + 1), copy.deepcopy(child))
+def change_element(root: Element, step: Step) -> None:
+    """Changes in one element, wherever it is."""
+    everything = elements(root)
+    one, other = chosen(everything, step.first), chosen(everything, step.second)
+    match step.kind:
+        case "swap":
+            one.text, other.text = other.text, one.text
+            one.attrib, other.attrib = other.attrib, one.attrib
+        case "rename":
+            one.tag = step.tag
+        case "write an attribute":
+            named = [name for name in one.attrib if step.second % 2]
+            one.set(chosen(named, step.second) if named else step.attribute, step.value)
+        case "add a child":
+            child = ElementTree.SubElement(one, step.tag)
+            child.text = step.value
+            if step.second % 2:
+                child.set("name", step.value)
+        case "copy into":
+            # What stands in one place also stands in another of the same kind.
+            same = [element for element in everything if element.tag == one.tag]
+            chosen(same, step.second).extend(copy.deepcopy(list(one)))
 
 
-def move(root: Element, step: Step) -> None:
-    if pairs := holders(root):
-        parent, child = chosen(pairs, step.first)
-        parent.remove(child)
-        chosen(elements(root), step.second).append(child)
-
-
-def swap(root: Element, step: Step) -> None:
-    """Two elements take each other's text and attributes."""
-    one, other = chosen(elements(root), step.first), chosen(elements(root), step.second)
-    one.text, other.text = other.text, one.text
-    one.attrib, other.attrib = other.attrib, one.attrib
-
-
-def rename(root: Element, step: Step) -> None:
-    chosen(elements(root), step.first).tag = step.tag
-
-
-def write_attribute(root: Element, step: Step) -> None:
-    element = chosen(elements(root), step.first)
-    named = [name for name in element.attrib if step.second % 2]
-    element.set(chosen(named, step.second) if named else step.attribute, step.value)
-
-
-def drop_attribute(root: Element, step: Step) -> None:
-    if named := [element for element in elements(root) if element.attrib]:
-        element = chosen(named, step.first)
-        del element.attrib[chosen(list(element.attrib), step.second)]
-
-
-def write_text(root: Element, step: Step) -> None:
-    leaves = [element for element in elements(root) if not len(element) and (element.text or "").strip()]
-    if leaves:
-        chosen(leaves, step.first).text = step.value
-
-
-def write_one_number(root: Element, step: Step) -> None:
-    leaves = [element for element in elements(root) if len((element.text or "").split()) > 1 and not len(element)]
-    if leaves:
-        element = chosen(leaves, step.first)
-        words = element.text.split()
-        words[step.second % len(words)] = step.value
-        element.text = " ".join(words)
-
-
-def add_child(root: Element, step: Step) -> None:
-    child = ElementTree.SubElement(chosen(elements(root), step.first), step.tag)
-    child.text = step.value
-    if step.second % 2:
-        child.set("name", step.value)
-
-
-def copy_into(root: Element, step: Step) -> None:
-    """What stands in one place also stands in another of the same kind."""
-    one = chosen(elements(root), step.first)
-    same = [element for element in elements(root) if element.tag == one.tag]
-    chosen(same, step.second).extend(copy.deepcopy(list(one)))
-
-
-def wrap(root: Element, step: Step) -> None:
-    """A model in models, up to 12 or up to some hundred deep."""
-    models = [(parent, child) for parent, child in holders(root) if child.tag == "model"]
-    if not models:
+def change_place(root: Element, step: Step) -> None:
+    """Changes of where an element is."""
+    pairs = [(parent, child) for parent in elements(root) for child in parent if isinstance(child.tag, str)]
+    pairs = [pair for pair in pairs if step.kind != "wrap" or pair[1].tag == "model"]
+    if not pairs:
         return
-    parent, child = chosen(models, step.first)
+    parent, child = chosen(pairs, step.first)
+    if step.kind == "duplicate":
+        parent.insert(step.second % (len(parent) + 1), copy.deepcopy(child))
+        return
     place = list(parent).index(child)
     parent.remove(child)
-    for depth in range(1 + step.second % (12 if step.second % 5 else 300)):
-        outer = Element("model", name=f"outer {depth}")
-        outer.append(child)
-        child = outer
-    parent.insert(place, child)
+    if step.kind == "move":
+        chosen(elements(root), step.second).append(child)
+    elif step.kind == "wrap":
+        # A model in models, up to 12 or up to some hundred deep.
+        for depth in range(1 + step.second % (12 if step.second % 5 else 300)):
+            outer = Element("model", name=f"outer {depth}")
+            outer.append(child)
+            child = outer
+        parent.insert(place, child)
 
 
-def name_alike(root: Element, step: Step) -> None:
-    """Two things of one kind get one name."""
-    named = [element for element in elements(root) if element.get("name")]
-    if named:
-        one = chosen(named, step.first)
-        other = chosen([element for element in named if element.tag == one.tag], step.second)
-        other.set("name", one.get("name"))
-
-
-def go_in_a_circle(root: Element, step: Step) -> None:
-    """A few frames or links of one model, each given relative to the next."""
-    scopes = [element for element in elements(root) if element.tag in ("model", "world")]
-    if not scopes:
+def change_chosen(root: Element, step: Step) -> None:
+    """Changes in one of the elements that have something to change."""
+    fit = {
+        "drop an attribute": lambda one: one.attrib,
+        "write text": lambda one: not len(one) and (one.text or "").strip(),
+        "write one number": lambda one: not len(one) and len((one.text or "").split()) > 1,
+        "name alike": lambda one: one.get("name"),
+        "go in a circle": lambda one: one.tag in ("model", "world"),
+        "join anything": lambda one: one.tag == "joint",
+    }[step.kind]
+    fitting = [element for element in elements(root) if fit(element)]
+    if not fitting:
         return
-    scope = chosen(scopes, step.first)
-    things = [child for child in scope if child.tag in ("frame", "link", "model", "joint")]
-    count = min(len(things), 1 + step.second % 4)
-    for number in range(count):
-        following = things[(number + 1) % count].get("name") or step.value
-        pose = things[number].find("pose")
-        pose = ElementTree.SubElement(things[number], "pose") if pose is None else pose
-        pose.set("relative_to", following)
+    one = chosen(fitting, step.first)
+    match step.kind:
+        case "drop an attribute":
+            del one.attrib[chosen(list(one.attrib), step.second)]
+        case "write text":
+            one.text = step.value
+        case "write one number":
+            words = one.text.split()
+            words[step.second % len(words)] = step.value
+            one.text = " ".join(words)
+        case "name alike":
+            chosen([each for each in fitting if each.tag == one.tag], step.second).set("name", one.get("name"))
+        case "go in a circle":
+            # A few frames or links of one model, each given relative to the next.
+            things = [child for child in one if child.tag in ("frame", "link", "model", "joint")]
+            count = min(len(things), 1 + step.second % 4)
+            for number in range(count):
+                following = things[(number + 1) % count].get("name") or step.value
+                having(things[number], "pose").set("relative_to", following)
+        case "join anything":
+            # A joint gets ends that are any names of the file.
+            names = [element.get("name") for element in elements(root) if element.get("name")]
+            for tag, number in (("parent", step.first // 7), ("child", step.second)):
+                having(one, tag).text = chosen([*names, step.value], number)
 
 
-def join_anything(root: Element, step: Step) -> None:
-    """A joint gets ends that are any names of the file."""
-    joints = [element for element in elements(root) if element.tag == "joint"]
-    names = [element.get("name") for element in elements(root) if element.get("name")] or [step.value]
-    if joints:
-        joint = chosen(joints, step.first)
-        for tag, number in (("parent", step.first // 7), ("child", step.second)):
-            child = joint.find(tag)
-            child = ElementTree.SubElement(joint, tag) if child is None else child
-            child.text = chosen([*names, step.value], number)
-
-
-CHANGES = (
-    *(delete, duplicate, move, swap, rename, write_attribute, drop_attribute, write_text, write_text, write_one_number),
-    *(write_one_number, add_child, copy_into, wrap, name_alike, go_in_a_circle, join_anything, join_anything),
-)
+CHANGES = {
+    **dict.fromkeys(("swap", "rename", "write an attribute", "add a child", "copy into"), change_element),
+    **dict.fromkeys(("delete", "duplicate", "move", "wrap"), change_place),
+    **dict.fromkeys(("drop an attribute", "write text", "write one number"), change_chosen),
+    **dict.fromkeys(("name alike", "go in a circle", "join anything"), change_chosen),
+}
+KINDS = [*CHANGES, "write text", "write one number", "join anything"]
 NUMBERS = st.integers(0, 2**16)
 STEPS = st.builds(
     Step,
-    *(st.sampled_from(CHANGES), NUMBERS, NUMBERS, st.sampled_from(VALUES)),
+    *(st.sampled_from(KINDS), NUMBERS, NUMBERS, st.sampled_from(VALUES)),
     *(st.sampled_from(TAGS), st.sampled_from(ATTRIBUTES)),
 )
 
@@ -200,7 +167,7 @@ def tree_of(text: bytes) -> Element:
 def changed(root: Element, steps: list[Step]) -> bytes:
     root = copy.deepcopy(root)
     for step in steps:
-        step.change(root, step)
+        CHANGES[step.kind](root, step)
     return ElementTree.tostring(root, encoding="utf-8")
 
 
@@ -226,11 +193,8 @@ def changed_bytes(text: bytes, change: Bytes) -> bytes:
         case "repeat":
             return text[:end] + text[start:end] + text[end:]
         case "flip":
-            return (
-                text[:start]
-                + bytes([byte ^ (1 << change.second % 8) for byte in text[start : start + 1]])
-                + text[start + 1 :]
-            )
+            flipped = bytes([byte ^ (1 << change.second % 8) for byte in text[start : start + 1]])
+            return text[:start] + flipped + text[start + 1 :]
     return text.replace(b"\n", change.with_)
 
 

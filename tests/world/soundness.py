@@ -72,14 +72,10 @@ def check_world(world: World) -> None:
     ends = [0, *(place for span in spans for place in span), len(world.text)]
     assert ends == sorted(ends), spans
     for model in world.models:
-        check_spans(model, world.text)
+        for (start, end), tags in zip(model.spans, ((b"<model", b"<include"), (b"<model",)), strict=False):
+            assert world.text[start:end].startswith(tags), world.text[start:end]
+            assert world.text[start:end].endswith(b">"), world.text[start:end]
         check_model(model)
-
-
-def check_spans(model: Model, text: bytes) -> None:
-    for (start, end), tags in zip(model.spans, ((b"<model", b"<include"), (b"<model",)), strict=False):
-        assert text[start:end].startswith(tags), text[start:end]
-        assert text[start:end].endswith(b">"), text[start:end]
 
 
 def check_model(model: Model) -> None:
@@ -92,17 +88,19 @@ def check_model(model: Model) -> None:
         check_link(link, model.static)
     for joint in model.joints:
         check_joint(joint, {link.name for link in model.links})
-    check_tree(model)
+    parents = {joint.child: joint.parent for joint in model.joints}
+    assert len(parents) == len(model.joints)
+    for link in parents:
+        for _ in model.links:
+            link = parents.get(link, "world")
+        assert link == "world", "joints close a loop"
 
 
 def check_link(link: Link, static: bool) -> None:
     assert_finite(link)
     for one in (*link.collisions, *link.visuals):
-        check_shape(one.shape)
-    for collision in link.collisions:
-        assert collision.mu >= 0
-        if isinstance(collision.shape, Mesh):
-            check_convex(collision.shape)
+        check_shape(one.shape, convex=one in link.collisions)
+    assert all(collision.mu >= 0 for collision in link.collisions)
     assert (link.inertia is None) == static
     if link.inertia is not None:
         assert link.inertia.mass > 0
@@ -110,21 +108,17 @@ def check_link(link: Link, static: bool) -> None:
         assert spatial_inertia(link.inertia, link.pose).IsPhysicallyValid()
 
 
-def check_shape(shape: Shape) -> None:
+def check_shape(shape: Shape, convex: bool) -> None:
     if isinstance(shape, Mesh):
-        assert len(shape.vertices) >= 3
+        assert len(shape.vertices) >= 3 + convex
         assert np.isfinite(shape.vertices).all()
         assert len(shape.faces) > 0
         assert 0 <= shape.faces.min() <= shape.faces.max() < len(shape.vertices)
+        # Drake refuses hulls of no volume.
+        corners = shape.vertices[shape.faces] - shape.vertices.mean(axis=0)
+        assert not convex or np.linalg.det(corners).sum() > 0
     elif not isinstance(shape, Plane):
         assert all(size > 0 for size in numbers_in(shape)), shape
-
-
-def check_convex(mesh: Mesh) -> None:
-    """Drake refuses hulls of no volume."""
-    corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
-    assert len(mesh.vertices) >= 4
-    assert np.linalg.det(corners).sum() > 0
 
 
 def check_joint(joint: Joint, links: set[str]) -> None:
@@ -137,15 +131,6 @@ def check_joint(joint: Joint, links: set[str]) -> None:
     assert -math.inf <= joint.lower <= joint.upper <= math.inf
     assert joint.lower < math.inf and joint.upper > -math.inf
     assert joint.effort >= 0 and joint.velocity >= 0 and joint.damping >= 0
-
-
-def check_tree(model: Model) -> None:
-    parents = {joint.child: joint.parent for joint in model.joints}
-    assert len(parents) == len(model.joints)
-    for link in parents:
-        for _ in model.links:
-            link = parents.get(link, "world")
-        assert link == "world", "joints close a loop"
 
 
 def unique(names: Iterable[str]) -> bool:

@@ -24,19 +24,13 @@ def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path
     assert filled(found, values)[1:] == ["--world=/a {seed}.sdf", "7 seeds", ";", "rm", "$HOME", '{"a": 1}']
     assert has_placeholder(found, "seed")
     assert not has_placeholder(found, "log")
-
-
-def test_a_program_on_the_path_is_found(words):
     assert words("sh -c true")[0].startswith("/")
 
 
 @pytest.mark.parametrize(
     ("command", "complaint"),
     [
-        (
-            "./run.sh {wrld}",
-            r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, \{seed\} and \{log\}",
-        ),
+        ("./run.sh {wrld}", r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, "),
         ("./run.sh ${HOME}", r"unknown placeholder \{HOME\}"),
         ("./run.sh 'a", "no closing quotation"),
         (" ", "names no program"),
@@ -56,19 +50,20 @@ def test_what_cannot_start_is_told_in_one_line(words, command, complaint):
         words(command)
 
 
-@pytest.mark.parametrize(
-    ("content", "complaint"),
-    [
-        (b"echo hi\n", "its first line does not name an interpreter, as '#!/bin/sh' does"),
-        (b"", "its first line does not name an interpreter"),
-        (b"#!/bin/sh\r\necho hi\r\n", "has Windows line endings"),
-        (b"#! /no/such/python -u\n", ":1: there is no interpreter '/no/such/python'"),
-        (b"#!", ":1: there is no interpreter ''"),
-    ],
-)
-def test_a_script_that_the_system_cannot_start_is_told(words, tmp_path, content, complaint):
+SCRIPTS = {
+    b"echo hi\n": "''",
+    b"": "''",
+    b"#!/bin/sh\r\n": r"'/bin/sh\\r'",
+    b"#! /no/such/python -u\n": "'/no/such/python'",
+}
+
+
+@pytest.mark.parametrize(("content", "interpreter"), SCRIPTS.items())
+def test_a_script_that_the_system_cannot_start_is_told(words, tmp_path, content, interpreter):
     (tmp_path / "run.sh").write_bytes(content)
-    with pytest.raises(UserError, match=f"^oracle.command: .*run.sh:? ?{complaint}"):
+    with pytest.raises(
+        UserError, match=f"^oracle.command: .*run.sh:1: there is no interpreter {interpreter}; its first "
+    ):
         words("./run.sh")
 
 
@@ -84,13 +79,6 @@ def test_a_folder_that_is_not_there_is_told(tmp_path):
         command_words(gone)
 
 
-def test_it_is_told_before_a_run_is_written(tmp_path):
-    scenario = wall(oracle=Oracle(command="./gone.sh"))
-    with pytest.raises(UserError, match=r"^oracle.command: .*gone.sh"):
-        create_run(scenario, tmp_path / "run.ddenv")
-    assert not list(tmp_path.iterdir())
-
-
 def test_the_module_of_a_simulator_in_python_has_to_be_there_and_is_not_imported(tmp_path):
     (tmp_path / "mine.py").write_text("raise SystemExit('imported')")
     (tmp_path / "native.cpython-311-x86_64-linux-gnu.so").write_bytes(b"")
@@ -98,16 +86,10 @@ def test_the_module_of_a_simulator_in_python_has_to_be_there_and_is_not_imported
         assert command_words(wall(folder=tmp_path, oracle=Oracle(use=use))) == ()
     run = tmp_path / "run.ddenv"
     for oracle, said in (
-        (
-            Oracle(use="mime:Mine"),
-            rf"^oracle\.use: there is no module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$",
-        ),
-        (Oracle(use=".mine:Mine"), r"^oracle\.use: there is no module '\.mine' in "),
-        (
-            Oracle(use="mine:Mine", folder=tmp_path / "no"),
-            rf"^oracle\.folder: there is no folder {tmp_path}/no to start the ",
-        ),
+        (Oracle(use="mime:Mine"), rf"module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$"),
+        (Oracle(use=".mine:Mine"), r"module '\.mine' in "),
+        (Oracle(use="mine:Mine", folder=tmp_path / "no"), f"folder {tmp_path}/no to start the "),
     ):
-        with pytest.raises(UserError, match=said):
+        with pytest.raises(UserError, match=rf"^oracle\.(use|folder): there is no {said}"):
             create_run(wall(folder=tmp_path, oracle=oracle), run)
         assert not run.exists()

@@ -29,6 +29,7 @@ def assert_same_in_drake(world, path):
     """Every link of `world` is in the plant of `path`, at its place, with its shapes and its mass."""
     plant, _, context = loaded(path)
     again = read_world(path)
+    assert len(again.elements()) == len(world.elements())
     for model, copy in zip(world.models, again.models, strict=True):
         instance = plant.GetModelInstanceByName(copy.name)
         for link, twin in zip(model.links, copy.links, strict=True):
@@ -57,11 +58,12 @@ def of_text(inside, tmp_path, version="1.6"):
     return parse_world(text.encode(), tmp_path / "in.sdf")
 
 
+AXES = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"
 JOINTS = (
     joint("prismatic", "<axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis>")
     + joint("ball", child="c", name="k")
     + "<link name='d'/>"
-    + joint("universal", "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>", "c", "d", "l")
+    + joint("universal", f"<pose>0 0 0 0.3 0.2 0.5</pose>{AXES}", "c", "d", "l")
 )
 
 
@@ -104,17 +106,3 @@ def test_the_world_itself_is_never_overwritten(tmp_path):
     with pytest.raises(UserError, match="is the world itself"):
         write_converted(read_world(path), tmp_path / "." / "w.sdf")
     assert path.read_bytes() == (DATA / "wall.sdf").read_bytes()
-
-
-def test_the_ground_stays_a_ground(tmp_path):
-    world = read_world(DATA / "wall.sdf")
-    write_converted(world, tmp_path / "clean.sdf")
-    assert read_world(tmp_path / "clean.sdf").elements() == world.elements()
-
-
-def test_turned_universal_joints_keep_their_right_angle(tmp_path):
-    axes = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"
-    bent = joint("universal", f"<pose>0 0 0 0.3 0.2 0.5</pose>{axes}")
-    world = of_text(f"<model name='m'><pose>0 0 0 0.1 0.2 0.3</pose>{LINKS}{bent}</model>", tmp_path)
-    write_converted(world, tmp_path / "clean.sdf")
-    assert_same_in_drake(world, tmp_path / "clean.sdf")

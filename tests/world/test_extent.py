@@ -52,11 +52,8 @@ def test_a_model_is_the_box_around_all_its_shapes_but_planes():
     low, high = model_bounds(model(*boxes, plane))
     assert (low.tolist(), high.tolist()) == ([-0.5, -0.5, -0.5], [4.5, 0.5, 0.5])
     assert center(model(*boxes)) == (2, 0, 0)
-    assert bounds((plane,)) is None
-
-
-def test_a_model_without_shapes_is_where_its_frame_is():
-    assert model_bounds(model()) is None
+    assert bounds((plane,)) is model_bounds(model()) is None
+    # A model without shapes is where its frame is.
     assert center(model()) == (7, 8, 9)
 
 

@@ -56,32 +56,11 @@ def test_entities_are_refused_in_included_files_too(check, tmp_path, entity):
     assert "entities" in refusal(said, path.with_name("bomb.sdf"))
 
 
-@pytest.mark.parametrize("name", ["model.config", "model.sdf"])
-def test_entities_are_refused_in_the_files_of_a_model(check, tmp_path, name):
-    folder = tmp_path / "bomb"
-    folder.mkdir()
-    (folder / name).write_text(f"<!DOCTYPE x [<!ENTITY l0 'ha'>{LAUGHS}]><model>&l9;</model>")
-    said, _ = check(world(include("bomb")))
-    assert "entities" in refusal(said, tmp_path)
-
-
-@pytest.mark.parametrize("entity", ["'ha'", "SYSTEM 'file:///etc/passwd'"])
-def test_entities_are_refused_in_meshes_too(check, tmp_path, entity):
-    (tmp_path / "bomb.dae").write_text(f"<!DOCTYPE x [<!ENTITY l0 {entity}>{LAUGHS}]><COLLADA>&l9;</COLLADA>")
-    assert "entities" in refusal(*check(shape("<mesh><uri>bomb.dae</uri></mesh>")))
-
-
 @pytest.mark.parametrize("suffix", ["dae", "obj", "stl", "gltf", "glb"])
 @pytest.mark.parametrize("content", [b"", b"\0" * 200, b"v 0 0 0\nf 1 2 3\n", b"{" * 5000, b"<a>" * 5000, b"[1e999]"])
 def test_a_mesh_that_is_none_is_refused_where_it_is_named(check, tmp_path, suffix, content):
     (tmp_path / f"mesh.{suffix}").write_bytes(content)
     assert re.match(r":1: /sdf/world/\S+/mesh: ", refusal(*check(shape(f"<mesh><uri>mesh.{suffix}</uri></mesh>"))))
-
-
-@pytest.mark.parametrize("vertex", ["nan 0 0", "inf 0 0", "1e308 0 0", "0 0"])
-def test_a_mesh_with_vertices_nowhere_is_refused_where_it_is_named(check, tmp_path, vertex):
-    (tmp_path / "mesh.obj").write_text(f"v {vertex}\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
-    assert re.match(r":1: /sdf/world/\S+/mesh: ", refusal(*check(shape("<mesh><uri>mesh.obj</uri></mesh>"))))
 
 
 def test_a_gigabyte_is_refused_at_once(tmp_path):
@@ -92,15 +71,6 @@ def test_a_gigabyte_is_refused_at_once(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", [world(include("large.obj")), shape("<mesh><uri>large.obj</uri></mesh>")], ids=["include", "mesh"]
-)
-def test_a_gigabyte_that_is_named_is_refused_at_once(tmp_path, refused, text):
-    with (tmp_path / "large.obj").open("wb") as file:
-        file.truncate(1 << 30)
-    assert "MB" in refused(text, seconds=AT_ONCE)
-
-
-@pytest.mark.parametrize(
     ("name", "words"),
     [
         ("", "is a folder"),
@@ -108,9 +78,11 @@ def test_a_gigabyte_that_is_named_is_refused_at_once(tmp_path, refused, text):
         ("none/none.world", "no such"),
         ("a" * 300, "too long"),
         ("a\nb", "no such"),
+        ("loop.world", "ymbolic links"),
     ],
 )
 def test_a_folder_and_a_file_that_is_missing_are_refused(tmp_path, check_file, name, words):
+    (tmp_path / "loop.world").symlink_to(tmp_path / "loop.world")
     assert words in refusal(check_file(tmp_path / name), tmp_path)
 
 
@@ -126,12 +98,6 @@ def test_a_pipe_is_refused_and_not_waited_on(tmp_path, refused):
     os.mkfifo(tmp_path / "pipe.obj")
     for text in (world(include("pipe.world")), shape("<mesh><uri>pipe.obj</uri></mesh>")):
         refused(text, seconds=AT_ONCE)
-
-
-def test_a_link_that_leads_to_itself_is_refused(tmp_path, check_file):
-    path = tmp_path / "loop.world"
-    path.symlink_to(path)
-    refusal(check_file(path), path)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")

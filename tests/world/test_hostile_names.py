@@ -8,47 +8,15 @@ import pytest
 from tests.tiers import slow
 from tests.world.hostile import LINK, check_bounded, frame, include, model, read_or_refused, refusal, shape, world
 
-URIS = (
-    "../../../../../../etc/passwd",
-    "a/../../../../../../../etc/passwd",
-    "%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd",
-    "..%2f..%2f..%2f..%2fetc/passwd",
-    "file://../../../etc/passwd",
-    "file:///etc/passwd",
-    "file:///dev/zero",
-    "/dev/zero",
-    "/dev/tty",
-    "/proc/self/mem",
-    "model://../../etc/passwd",
-    "model://a/../../../etc",
-    "model://%2e%2e/%2e%2e/etc/passwd",
-    "package://../x",
-    "http://localhost:1/model.sdf",
-    "https://fuel.gazebosim.org/1.0/../models/../../x",
-    "https://fuel.gazebosim.org/1.0/o/models/m/1/files/../../../../x",
-    "ftp://localhost/x",
-    "javascript:alert(1)",
-    "model://",
-    "file://",
-    "..",
-    ".",
-    "/",
-    "~",
-    "~nobody/x",
-    "%00",
-    "a%00b",
-    "%ff%fe",
-    "a" * 5000,
-    "a/" * 5000,
-    "\\\\server\\share",
-    "C:\\Windows\\win.ini",
-    "hostile.world",
-    "./hostile.world",
-    "x/../hostile.world",
-    "&#x9b;31mred",
-    "one&#10;two",
-    "🦊",
-)
+HARMFUL = r"""
+../../../../../../etc/passwd a/../../../../../../../etc/passwd %2e%2e/%2e%2e/%2e%2e/etc/passwd ..%2f..%2f..%2f..%2fetc/passwd
+file://../../../etc/passwd file:///etc/passwd file:///dev/zero /dev/zero /dev/tty /proc/self/mem model://../../etc/passwd
+model://a/../../../etc model://%2e%2e/%2e%2e/etc/passwd package://../x http://localhost:1/model.sdf
+https://fuel.gazebosim.org/1.0/../models/../../x https://fuel.gazebosim.org/1.0/o/models/m/1/files/../../../../x
+ftp://localhost/x javascript:alert(1) model:// file:// .. . / ~ ~nobody/x %00 a%00b %ff%fe \\server\share C:\Windows\win.ini
+hostile.world ./hostile.world x/../hostile.world &#x9b;31mred one&#10;two 🦊
+"""
+URIS = [*HARMFUL.split(), "a" * 5000, "a/" * 5000]
 
 
 @pytest.mark.parametrize("uri", URIS, ids=lambda uri: uri[:40])
@@ -57,14 +25,14 @@ def test_a_uri_that_leads_to_no_model_is_refused(check, uri):
     # The complaint may be about what is wrong inside a file that was found.
     inner = re.match(r"ddenv: (/[^:]*)", said.stderr)
     place = path if inner is None or inner[1] == str(path) else Path(inner[1])
-    refusal(said, place)
+    assert len(refusal(said, place)) < 5000
     assert "root:" not in said.stderr
 
 
 @pytest.mark.parametrize("uri", URIS, ids=lambda uri: uri[:40])
 def test_a_mesh_uri_that_leads_to_no_mesh_is_refused_where_it_stands(check, uri):
     line = refusal(*check(shape(f"<mesh><uri>{uri}</uri></mesh>")))
-    assert re.match(r":1: /sdf/world/\S+/geometry/mesh: ", line), line
+    assert re.match(r":1: /sdf/world/\S+/geometry/mesh: ", line) and len(line) < 5000, line
 
 
 NAMES = (
@@ -108,17 +76,6 @@ def test_a_complaint_stays_readable_however_long_the_names_are(check):
         len(refusal(*check(model(LINK + frame(name, name) + f"<link name='k'><pose relative_to='{name}'/></link>"))))
         < 5000
     )
-
-
-@pytest.mark.parametrize(
-    "inside", [include("{}"), shape("<mesh><uri>{}</uri></mesh>").decode()], ids=["include", "mesh"]
-)
-@pytest.mark.parametrize(
-    "uri", ["model://" + "n" * 100_000, "a/../" * 20_000 + "x", "n" * 100_000 + ":x"], ids=lambda uri: uri[:10]
-)
-def test_a_complaint_stays_readable_however_long_the_uris_are(check, inside, uri):
-    text = inside.format(uri)
-    assert len(refusal(*check(text.encode() if text.startswith("<sdf") else world(text)))) < 5000
 
 
 @pytest.mark.parametrize("encoding", slow(pytest.mark.fuzz, ["ascii", "latin-1"], but=["ascii"]))

@@ -7,6 +7,7 @@ import re
 import shlex
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -37,7 +38,12 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
     if scenario.oracle is None:
         return ()
     if scenario.oracle.command is None:
-        _check_module(scenario.oracle.program.partition(":")[0], _existing(scenario))
+        folder, name = _existing(scenario), scenario.oracle.program.partition(":")[0]
+        top = name.partition(".")[0]
+        # Nothing of it is imported.
+        if not top or not (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None):
+            hint = nearest(top, [file.stem for file in folder.glob("*.py")])
+            raise UserError(f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}")
         return ()
     try:
         words = shlex.split(scenario.oracle.command)
@@ -53,9 +59,7 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
                 f"{KEY}: unknown placeholder {{{name}}}{nearest(name, PLACEHOLDERS)}; "
                 "use {world}, {scenario}, {seed} and {log}; shell variables are not available"
             )
-    program = _program(words[0], _existing(scenario))
-    _check_first_line(program)
-    return program, *words[1:]
+    return _program(words[0], _existing(scenario)), *words[1:]
 
 
 def _existing(scenario: Scenario) -> Path:
@@ -65,15 +69,6 @@ def _existing(scenario: Scenario) -> Path:
         key = "folder" if scenario.oracle is None or scenario.oracle.folder is None else "oracle.folder"
         raise UserError(f"{key}: there is no folder {folder} to start the simulator in")
     return folder
-
-
-def _check_module(name: str, folder: Path) -> None:
-    """Raises UserError if a module is neither in `folder` nor installed. Nothing of it is imported."""
-    top = name.partition(".")[0]
-    brought = top and (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None)
-    if not brought:
-        hint = nearest(top, [file.stem for file in folder.glob("*.py")])
-        raise UserError(f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}")
 
 
 def _program(word: str, folder: Path) -> str:
@@ -88,28 +83,19 @@ def _program(word: str, folder: Path) -> str:
         raise UserError(f"{KEY}: {path}: {why}")
     if not os.access(path, os.X_OK):
         raise UserError(f"{KEY}: {path}: is not executable; use 'chmod +x'")
-    return str(path)
-
-
-def _check_first_line(program: str) -> None:
-    """Raises UserError for a script without a usable interpreter, for which the system would only report a missing file."""
-    try:
-        with Path(program).open("rb") as file:
-            head = file.read(LONGEST_FIRST_LINE)
-    except OSError:
-        # An executable file may be unreadable.
-        return
+    # For a script without a usable interpreter the system would only report a missing file.
+    head = b"\0"
+    with suppress(OSError), path.open("rb") as file:
+        head = file.read(LONGEST_FIRST_LINE)
     line = head.partition(b"\n")[0]
-    if not line.startswith(b"#!"):
-        # Binary programs contain NUL bytes.
-        if b"\0" not in head:
-            raise UserError(f"{KEY}: {program}: its first line does not name an interpreter, as '#!/bin/sh' does")
-        return
-    if line.endswith(b"\r"):
-        raise UserError(f"{KEY}: {program}: has Windows line endings; save it with Unix line endings")
-    interpreter = os.fsdecode((line[2:].split() or [b""])[0])
-    if not os.access(interpreter, os.X_OK):
-        raise UserError(f"{KEY}: {program}:1: there is no interpreter '{interpreter}'")
+    interpreter = (
+        os.fsdecode(line[2:].replace(b"\t", b" ").strip(b" ").split(b" ")[0]) if line.startswith(b"#!") else ""
+    )
+    # Binary programs contain NUL bytes.
+    if b"\0" not in head and not os.access(interpreter, os.X_OK):
+        hint = "its first line must name one, as '#!/bin/sh' does, with Unix line endings"
+        raise UserError(f"{KEY}: {path}:1: there is no interpreter {interpreter!r}; {hint}")
+    return str(path)
 
 
 def _why_no_file(path: Path) -> str:

@@ -82,7 +82,13 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     """
     if robot.static:
         raise UserError(f"robot '{robot.name}': is static and cannot move; remove <static> from its file")
-    sides = _placed(robot) if wheels is None else _named(robot, wheels)
+    if wheels is None:
+        sides = {joint.name: _side(robot, joint) > 0 for joint in robot.joints if _turns(joint)}
+        if set(sides.values()) != {True, False}:
+            why = "expected wheels on both sides: joints that turn, left and right of the model's x axis"
+            raise UserError(f"robot '{robot.name}': {why}; or name them in robot.wheels")
+    else:
+        sides = _named(robot, wheels)
     joints = [joint for joint in robot.joints if joint.name in sides]
     across = [robot.pose.inverse().rotate(joint.axis)[1] for joint in joints]
     for joint, part in zip(joints, across, strict=True):
@@ -146,17 +152,6 @@ def _turns(joint: Joint) -> bool:
     return joint.kind in ("revolute", "continuous") and not is_fixed(joint)
 
 
-def _placed(robot: Model) -> dict[str, bool]:
-    """Every joint that turns about one axis, and whether it lies on the left."""
-    sides = {joint.name: _side(robot, joint) > 0 for joint in robot.joints if _turns(joint)}
-    if set(sides.values()) != {True, False}:
-        raise UserError(
-            f"robot '{robot.name}': expected wheels on both sides: joints that turn, left and right of the model's x axis; "
-            "or name them in robot.wheels"
-        )
-    return sides
-
-
 def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
     """The joints that `wheels` lists, and whether they are listed on the left."""
     turning = [joint.name for joint in robot.joints if _turns(joint)]
@@ -164,10 +159,10 @@ def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
     these = f"joints of '{robot.name}' that turn are {', '.join(turning)}" if turning else "none of its joints turns"
     for side, names in (("left", wheels.left), ("right", wheels.right)):
         for name in names:
-            if name in others:
-                raise UserError(f"robot.wheels.{side}: '{name}' is a {others[name]} joint that does not turn; {these}")
+            why = f"there is no joint '{name}'{nearest(name, turning)}"
+            why = f"'{name}' is a {others[name]} joint that does not turn" if name in others else why
             if name not in turning:
-                raise UserError(f"robot.wheels.{side}: there is no joint '{name}'{nearest(name, turning)}; {these}")
+                raise UserError(f"robot.wheels.{side}: {why}; {these}")
     name, times = Counter([*wheels.left, *wheels.right]).most_common(1)[0]
     if times > 1:
         both = "on both sides" if name in wheels.left and name in wheels.right else "twice"
@@ -183,8 +178,7 @@ def _side(robot: Model, joint: Joint) -> float:
 
 def _radius(robot: Model, joint: Joint) -> float:
     """The radius of the wheel on `joint`, m."""
-    collisions = [collision for link in wheel_links(robot, joint) for collision in link.collisions]
-    radii = [_round(collision, joint.axis) for collision in collisions]
+    radii = [_round(one, joint.axis) for link in wheel_links(robot, joint) for one in link.collisions]
     if not any(radii):
         what = "a cylinder, sphere, capsule, ellipsoid or mesh"
         raise UserError(f"robot '{robot.name}': wheel '{joint.child}' has no round collision: {what}")
@@ -192,15 +186,15 @@ def _radius(robot: Model, joint: Joint) -> float:
 
 
 def _round(collision: Collision, axis: Vector) -> float:
-    """The radius of a wheel that turns about `axis`, m; 0 for a shape that is not round."""
+    """The radius of a wheel that turns about the unit vector `axis`, m; 0 for a shape that is not round."""
+    across = np.eye(3) - np.outer(axis, axis)
     match collision.shape:
         case Cylinder(radius) | Sphere(radius) | Capsule(radius):
             return radius
         case Ellipsoid(radii):
-            turned = _across(axis) @ collision.pose.rotation() * radii
-            return float(np.linalg.norm(turned, ord=2))
+            return float(np.linalg.norm(across @ collision.pose.rotation() * radii, ord=2))
         case Mesh(_, vertices):
-            points = vertices @ collision.pose.rotation().T @ _across(axis)
+            points = vertices @ collision.pose.rotation().T @ across
             apart = points[:, None] - points[None, :]
             return float(np.sqrt((apart**2).sum(axis=2).max())) / 2
     return 0.0

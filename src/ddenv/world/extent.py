@@ -16,6 +16,7 @@ from ddenv.world.model import (
     Collision,
     Cylinder,
     Ellipsoid,
+    Link,
     Mesh,
     Model,
     Plane,
@@ -31,18 +32,11 @@ Bounds = tuple[np.ndarray, np.ndarray]
 def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
     """Lowest and highest corner, each shape (3,), of `shape` at `pose`. A plane has a place but no size."""
     center, rotation = np.array(pose.position), pose.rotation()
-    if isinstance(shape, Mesh):
-        points = shape.vertices @ rotation.T + center
-        return points.min(axis=0), points.max(axis=0)
-    half = _half(shape, rotation)
-    return center - half, center + half
-
-
-def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
-    """Half the size of the box around a shape that is symmetric about its centre."""
     up = np.abs(rotation[:, 2])
-    half: np.ndarray
     match shape:
+        case Mesh(_, vertices):
+            points = vertices @ rotation.T + center
+            return points.min(axis=0), points.max(axis=0)
         case Box(size):
             half = np.abs(rotation) @ np.array(size) / 2
         case Cylinder(radius, length):
@@ -55,9 +49,7 @@ def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
             half = np.full(3, radius)
         case Plane():
             half = np.zeros(3)
-        case _:
-            raise TypeError(type(shape).__name__)
-    return half
+    return center - half, center + half
 
 
 # Sides of the prism that stands for a cylinder, and meridians of the ball that stands for an ellipsoid.
@@ -127,9 +119,7 @@ def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None
 def center(model: Model) -> Vector:
     """The centre of the box around a model, m, which may be far from its frame; the origin of its frame if it fills nothing."""
     box = model_bounds(model)
-    if box is None:
-        return model.pose.position
-    return vector((box[0] + box[1]) / 2)
+    return model.pose.position if box is None else vector((box[0] + box[1]) / 2)
 
 
 def model_bounds(model: Model) -> Bounds | None:
@@ -142,8 +132,18 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
     ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
     if len(ordered) < 3:
         return np.array(ordered).reshape(-1, 2)
-    lower, upper = _chain(ordered), _chain(ordered[::-1])
-    return np.array(lower[:-1] + upper[:-1])
+    corners: list[tuple[float, float]] = []
+    for side in (ordered, ordered[::-1]):
+        chain: list[tuple[float, float]] = []
+        for x, y in side:
+            while len(chain) > 1:
+                (ax, ay), (bx, by) = chain[-2:]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                    break
+                chain.pop()
+            chain.append((x, y))
+        corners += chain[:-1]
+    return np.array(corners)
 
 
 def polygon_area(corners: np.ndarray) -> float:
@@ -152,19 +152,6 @@ def polygon_area(corners: np.ndarray) -> float:
         return 0.0
     x, y = corners.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-
-
-def _chain(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    chain: list[tuple[float, float]] = []
-    for point in points:
-        while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
-            chain.pop()
-        chain.append(point)
-    return chain
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 DEPTH = 1.0  # of a box in place of a plane, m
@@ -186,12 +173,12 @@ def with_ground_boxes(world: World, box: tuple[Vector, Vector] | None, places: I
         return world
     within = product(*zip(*box, strict=True)) if box else ()
     points = np.array([*within, *places], dtype=float).reshape(-1, 3)
-    return replace(world, models=tuple(_boxed(model, points) for model in world.models))
 
+    def boxed(link: Link) -> Link:
+        return replace(link, collisions=tuple(_box(one, points) for one in link.collisions))
 
-def _boxed(model: Model, points: np.ndarray) -> Model:
-    links = (replace(link, collisions=tuple(_box(one, points) for one in link.collisions)) for link in model.links)
-    return replace(model, links=tuple(links))
+    models = (replace(model, links=tuple(map(boxed, model.links))) for model in world.models)
+    return replace(world, models=tuple(models))
 
 
 def _box(collision: Collision, points: np.ndarray) -> Collision:
@@ -199,11 +186,9 @@ def _box(collision: Collision, points: np.ndarray) -> Collision:
         return collision
     back = collision.pose.inverse()
     flat = (points @ back.rotation().T + back.position)[:, :2]
-    if not len(flat) or np.abs(flat).max() <= ENDLESS / 2 - BEYOND:
-        size, middle = (ENDLESS, ENDLESS), (0.0, 0.0)
-    else:
+    low, high = np.zeros(2), np.zeros(2)
+    if len(flat) and np.abs(flat).max() > ENDLESS / 2 - BEYOND:
         low, high = flat.min(axis=0), flat.max(axis=0)
-        size = tuple((np.maximum(high - low, 0.0) + ENDLESS).tolist())
-        middle = tuple(((low + high) / 2).tolist())
-    place = Pose((middle[0], middle[1], -DEPTH / 2))
-    return replace(collision, shape=Box((size[0], size[1], DEPTH)), pose=collision.pose @ place)
+    (width, length), (x, y) = (np.maximum(high - low, 0.0) + ENDLESS).tolist(), ((low + high) / 2).tolist()
+    place = Pose((x, y, -DEPTH / 2))
+    return replace(collision, shape=Box((width, length, DEPTH)), pose=collision.pose @ place)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -105,14 +104,15 @@ def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) ->
     except ValidationError as error:
         raise _wrong(where, *complaint(error.errors()[0], Scenario), named) from None
     # Not the model's own matter: a run is shown also where the package that brought its schemas is missing.
-    for key, value, check in (
-        ("algorithm", scenario.reduction.algorithm, partial(schemas.check, "algorithm")),
-        ("pair", scenario.reduction.pair, schemas.split_pair),
+    known = {kind: list(schemas.names(kind)) for kind in ("algorithm", "partitioning", "prioritization")}
+    pairs = f"{', '.join(known['partitioning'])}, then '/', then one of {', '.join(known['prioritization'])}"
+    for key, value, names, allowed in (
+        ("algorithm", scenario.reduction.algorithm, known["algorithm"], ", ".join(known["algorithm"])),
+        ("pair", scenario.reduction.pair, list(schemas.pairs()), pairs),
     ):
-        try:
-            check(value)
-        except UserError:
-            raise _wrong(where, f"reduction.{key}", _of_schemas(key, value), named) from None
+        if value not in names:
+            words = f"{_shown(value)} is not allowed{nearest(value[:100], names)}; use one of {allowed}"
+            raise _wrong(where, f"reduction.{key}", words, named)
     return scenario
 
 
@@ -120,38 +120,25 @@ def _wrong(where: str, key: str, words: str, named: Mapping[str, str]) -> UserEr
     return UserError(f"{named[key]}: {words}" if key in named else f"{where}: {key}: {words}")
 
 
-def _of_schemas(key: str, value: str) -> str:
-    """What is allowed in place of a name that no schema has."""
-    known, allowed = schemas.names("algorithm"), ", ".join(schemas.names("algorithm"))
-    if key == "pair":
-        parts = (", ".join(schemas.names(kind)) for kind in ("partitioning", "prioritization"))
-        known, allowed = schemas.pairs(), ", then '/', then one of ".join(parts)
-    return f"{_shown(value)} is not allowed{nearest(value[:100], known)}; use one of {allowed}"
-
-
 def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     """One of pydantic's errors in our words: the key; then what is wrong with its value, and what is allowed."""
     location = [str(part) for part in error["loc"]]
-    key = ".".join(location)
-    if error["type"] == "extra_forbidden":
+    key, kind, found = ".".join(location), error["type"], _shown(error["input"])
+    if kind == "extra_forbidden":
         shorthands = [one.name for one in SETTINGS.values() if not one.stored and [one.section] == location[:-1]]
         known = sorted([*_section(model, location[:-1]).model_fields, *shorthands])
         return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
-    if error["type"] == "as_printed":
+    if kind == "as_printed":
         return f"{key}.as_printed", str(error["msg"])
-    if error["type"] == "missing":
+    if kind == "missing":
         return key, "is missing"
-    context = error.get("ctx", {})
-    if error["type"] == "literal_error":
-        allowed = context["expected"].replace("'", "").replace(" or ", ", ")
-        near = nearest(str(error["input"]), allowed.split(", "))
-        return key, f"{_shown(error['input'])} is not allowed{near}; use one of {allowed}"
-    if error["type"] in PLAINLY:
-        return key, f"{PLAINLY[error['type']]}, found {_shown(error['input'])}"
-    if error["type"] == "string_pattern_mismatch" and key == "controller.use":
-        return key, f"expected straight, costmap or module:Class, found {_shown(error['input'])}"
-    message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
-    return key, f"{message.replace('input should', 'should')}, found {_shown(error['input'])}"
+    if kind == "literal_error":
+        allowed = error["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
+        return key, f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}"
+    if kind == "string_pattern_mismatch" and key == "controller.use":
+        return key, f"expected straight, costmap or module:Class, found {found}"
+    plain = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
+    return key, f"{PLAINLY.get(kind, plain.replace('input should', 'should'))}, found {found}"
 
 
 def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:

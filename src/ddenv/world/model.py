@@ -6,7 +6,8 @@ Poses are absolute (in the world frame), lengths in m, masses in kg, angles in r
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -272,3 +273,17 @@ def is_ground(model: Model) -> bool:
     shown = any(isinstance(visual.shape, Plane) for link in model.links for visual in link.visuals)
     boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
     return any(min(size[:2]) >= ENDLESS for size in boxes)
+
+
+def unique_names(names: Sequence[str], sign: str, others: Collection[str] = ()) -> list[str]:
+    """`names` with repeated ones made unique, also among `others`: with the `sign` " #" the second `name` becomes `name #2`, ..."""
+    given, taken, unique = Counter(others), {*names, *others}, []
+    for name in names:
+        own, number = name, given[name]
+        while number and own in taken:
+            number += 1
+            own = f"{name}{sign}{number}"
+        given[name] = max(number, 1)
+        taken.add(own)
+        unique.append(own)
+    return unique

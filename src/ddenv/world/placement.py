@@ -29,13 +29,12 @@ def spawn_pose(spawn: Spawn) -> Pose:
 
 def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
     """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground; it names a free place nearby."""
-    if (found := stands_inside(world, robot, spawn)) is None:
-        return
-    why, place = found
-    free = "move the spawn"
-    if place is not None:
-        free = f"free nearby: --spawn={place.x:g},{place.y:g},{place.z:g},{place.yaw:g}"
-    raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {free}")
+    if found := stands_inside(world, robot, spawn):
+        why, free = found
+        hint = (
+            "move the spawn" if free is None else f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
+        )
+        raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {hint}")
 
 
 def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn | None] | None:
@@ -91,8 +90,8 @@ def _depth(body: Hull, obstacle: Collision) -> float:
     """How deep a body is inside an obstacle, m."""
     if not isinstance(obstacle.shape, Plane):
         return overlap(body, hull(obstacle))
-    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
-    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
+    up = np.array(obstacle.pose.rotate((0.0, 0.0, 1.0)))
+    return float(up @ obstacle.pose.position - (body.vertices @ up).min()) + body.radius
 
 
 # Models at rest in a saved world overlap by millimetres; this is more, m.
@@ -119,18 +118,15 @@ def notes_on_start(
     height = drop(world, robot, spawn)
     if height > DROP:
         yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
-    if goal is not None and (blocker := _blocker(world, np.array([*goal, spawn.z]))):
+    # Planes and meshes may be ground.
+    solid = (
+        (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, (Plane, Mesh))
+    )
+    place = Hull(np.array([[*(goal or ()), spawn.z]]))
+    blocker = next((model.name for model, one in solid if goal and _depth(place, one) > TOLERANCE), None)
+    if blocker is not None:
         yield "goal", f"at the height of the start, the goal lies inside {blocker}; move the goal"
     yield from note_inside(world)
-
-
-def _blocker(world: World, point: np.ndarray) -> str | None:
-    """The first model that a point (3,), m, is inside of. Planes and meshes, which may be ground, do not count."""
-    for model in world.models:
-        for one in model.collisions:
-            if not isinstance(one.shape, (Plane, Mesh)) and _depth(Hull(point[None]), one) > TOLERANCE:
-                return model.name
-    return None
 
 
 def note_inside(world: World) -> Iterator[tuple[str, str]]:
@@ -139,10 +135,8 @@ def note_inside(world: World) -> Iterator[tuple[str, str]]:
     if pairs:
         deepest = max(pairs, key=lambda pair: pair.depth)
         more = f", and {count(len(pairs) - 1, 'more pair')}" if len(pairs) > 1 else ""
-        yield (
-            "inside",
-            f"{deepest.name} starts {deepest.depth:.2f} m inside {deepest.other}{more}: they push each other apart",
-        )
+        start = f"{deepest.name} starts {deepest.depth:.2f} m inside {deepest.other}"
+        yield "inside", f"{start}{more}: they push each other apart"
 
 
 def inside(world: World) -> list[Inside]:
@@ -207,11 +201,6 @@ class Hull:
 
     vertices: np.ndarray
     radius: float = 0.0
-
-    def span(self, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest coordinate along each unit vector of `axes`, shape (M, 3)."""
-        along = axes @ self.vertices.T
-        return along.min(axis=1) - self.radius, along.max(axis=1) + self.radius
 
 
 def hull(collision: Collision, place: Pose | None = None) -> Hull:

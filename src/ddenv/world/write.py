@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -25,7 +25,6 @@ from ddenv.world.model import (
     Collision,
     Cylinder,
     Ellipsoid,
-    Inertia,
     Joint,
     Link,
     Mesh,
@@ -35,8 +34,9 @@ from ddenv.world.model import (
     Sphere,
     Visual,
     World,
+    unique_names,
 )
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, Vector
 
 DRAKE = "http://drake.mit.edu"
 _LINE_START = re.compile(rb"(\r\n|\n|\r)[ \t]*\Z")
@@ -62,27 +62,23 @@ def without(world: World, removed: frozenset[str]) -> bytes:
     return b"".join(kept)
 
 
-# Gives a mesh the relative path of its file.
-Files = Callable[[Mesh], str]
-
-
 def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
     """`world` as SDF 1.9, and its meshes by the relative paths of their OBJ files, which lie in the folder `mesh_folder`."""
-    names: dict[Mesh, str] = {}
-
-    def file(mesh: Mesh) -> str:
-        return names.setdefault(mesh, f"{mesh_folder}/mesh_{len(names) + 1}.obj")
-
+    files: dict[Mesh, str] = {}
+    for link in (link for model in world.models for link in model.links):
+        for shape in (*(one.shape for one in link.collisions), *(one.shape for one in link.visuals)):
+            if isinstance(shape, Mesh):
+                files.setdefault(shape, f"{mesh_folder}/mesh_{len(files) + 1}.obj")
     ElementTree.register_namespace("drake", DRAKE)
     root = Element("sdf", version="1.9")
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
     unique = _unique(model.name for model in world.models)
     for name, model in zip(unique, with_ground_boxes(world, corners(world)).models, strict=True):
-        _model(inside, name, model, file)
+        _model(SubElement(inside, "model", name=name), model, files)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    return text, {name: mesh for mesh, name in names.items()}
+    return text, {name: mesh for mesh, name in files.items()}
 
 
 def write_converted(world: World, path: Path) -> list[Path]:
@@ -102,39 +98,58 @@ def write_converted(world: World, path: Path) -> list[Path]:
     return list(files)
 
 
-def _model(parent: Element, name: str, model: Model, file: Files) -> None:
-    element = SubElement(parent, "model", name=name)
-    if model.static:
-        SubElement(element, "static").text = "true"
-    if model.self_collide:
-        SubElement(element, "self_collide").text = "true"
+def _model(element: Element, model: Model, files: Mapping[Mesh, str]) -> None:
+    for tag, said in (("static", model.static), ("self_collide", model.self_collide)):
+        if said:
+            SubElement(element, tag).text = "true"
     _pose(element, model.pose)
     names = dict(zip((link.name for link in model.links), _unique(link.name for link in model.links), strict=True))
     for link in model.links:
-        _link(element, names[link.name], link, model, file)
+        _link(SubElement(element, "link", name=names[link.name]), link, model, files)
     joint_names = _unique((joint.name for joint in model.joints), taken=names.values())
     poses = {link.name: link.pose for link in model.links}
     for joint_name, joint in zip(joint_names, model.joints, strict=True):
-        _joint(element, joint_name, joint, model, poses[joint.child], names)
+        held = SubElement(element, "joint", name=joint_name, type=joint.kind)
+        _pose(held, poses[joint.child].inverse() @ joint.pose)
+        SubElement(held, "parent").text = names.get(joint.parent, joint.parent)
+        SubElement(held, "child").text = names[joint.child]
+        for tag, axis in (("axis", joint.axis), ("axis2", joint.axis2)):
+            if axis is not None and joint.kind not in ("fixed", "ball"):
+                _axis(SubElement(held, tag), axis, joint)
 
 
-def _link(parent: Element, name: str, link: Link, model: Model, file: Files) -> None:
-    element = SubElement(parent, "link", name=name)
+def _link(element: Element, link: Link, model: Model, files: Mapping[Mesh, str]) -> None:
+    back = link.pose.inverse()
     _pose(element, model.pose.inverse() @ link.pose)
     if not model.gravity:
         SubElement(element, "gravity").text = "false"
     if link.inertia is not None:
-        _inertia(element, link.inertia, link.pose)
-    back = link.pose.inverse()
+        inertial = SubElement(element, "inertial")
+        _pose(inertial, back @ link.inertia.pose)
+        SubElement(inertial, "mass").text = repr(link.inertia.mass)
+        tensor = SubElement(inertial, "inertia")
+        values = (*link.inertia.moments, *link.inertia.products)
+        for tag, value in zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), values, strict=True):
+            SubElement(tensor, tag).text = repr(value)
     shown: tuple[Collision | Visual, ...] = (*link.collisions, *link.visuals)
     for one, own in zip(shown, _unique(one.name for one in shown), strict=True):
-        _shown(element, own, one, back, file)
+        _shown(element, own, one, back, files)
 
 
-def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file: Files) -> None:
+def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, files: Mapping[Mesh, str]) -> None:
     element = SubElement(parent, "collision" if isinstance(one, Collision) else "visual", name=name)
     _pose(element, back @ one.pose)
-    _geometry(element, one.shape, file)
+    geometry = SubElement(element, "geometry")
+    if isinstance(one.shape, Mesh):
+        mesh = SubElement(geometry, "mesh")
+        SubElement(mesh, "uri").text = files[one.shape]
+        if isinstance(one, Collision):
+            SubElement(mesh, f"{{{DRAKE}}}declare_convex")
+    else:
+        kind, sizes = primitive(one.shape)
+        shape = SubElement(geometry, kind)
+        for tag, values in sizes.items():
+            SubElement(shape, tag).text = _numbers(values)
     if isinstance(one, Collision):
         friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
         for tag in ("mu", "mu2"):
@@ -145,18 +160,16 @@ def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file
             SubElement(material, tag).text = _numbers(one.color)
 
 
-def _geometry(parent: Element, shape: Shape, file: Files) -> None:
-    geometry = SubElement(parent, "geometry")
-    if not isinstance(shape, Mesh):
-        kind, sizes = primitive(shape)
-        element = SubElement(geometry, kind)
-        for name, values in sizes.items():
-            SubElement(element, name).text = _numbers(values)
-        return
-    element = SubElement(geometry, "mesh")
-    SubElement(element, "uri").text = file(shape)
-    if parent.tag == "collision":
-        SubElement(element, f"{{{DRAKE}}}declare_convex")
+def _axis(holder: Element, axis: Vector, joint: Joint) -> None:
+    SubElement(holder, "xyz").text = _numbers(joint.pose.inverse().rotate(axis))
+    limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
+    if any(map(math.isfinite, limits.values())):
+        limit = SubElement(holder, "limit")
+        for tag, value in limits.items():
+            if math.isfinite(value):
+                SubElement(limit, tag).text = repr(value)
+    if joint.damping:
+        SubElement(SubElement(holder, "dynamics"), "damping").text = repr(joint.damping)
 
 
 def primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
@@ -175,41 +188,6 @@ def primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
         case Plane(size):
             return "plane", {"normal": (0.0, 0.0, 1.0), "size": size}
     raise TypeError(type(shape).__name__)
-
-
-def _inertia(parent: Element, inertia: Inertia, link_pose: Pose) -> None:
-    element = SubElement(parent, "inertial")
-    _pose(element, link_pose.inverse() @ inertia.pose)
-    SubElement(element, "mass").text = repr(inertia.mass)
-    tensor = SubElement(element, "inertia")
-    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    for name, value in zip(names, (*inertia.moments, *inertia.products), strict=True):
-        SubElement(tensor, name).text = repr(value)
-
-
-def _joint(parent: Element, name: str, joint: Joint, model: Model, child_pose: Pose, names: dict[str, str]) -> None:
-    element = SubElement(parent, "joint", name=name, type=joint.kind)
-    _pose(element, child_pose.inverse() @ joint.pose)
-    SubElement(element, "parent").text = names.get(joint.parent, joint.parent)
-    SubElement(element, "child").text = names[joint.child]
-    if joint.kind in ("fixed", "ball"):
-        return
-    for tag, axis in (("axis", joint.axis), ("axis2", joint.axis2)):
-        if axis is not None:
-            holder = SubElement(element, tag)
-            SubElement(holder, "xyz").text = _numbers(joint.pose.inverse().rotate(axis))
-            _limits(holder, joint)
-
-
-def _limits(holder: Element, joint: Joint) -> None:
-    limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
-    finite = {tag: value for tag, value in limits.items() if math.isfinite(value)}
-    if finite:
-        limit = SubElement(holder, "limit")
-        for tag, value in finite.items():
-            SubElement(limit, tag).text = repr(value)
-    if joint.damping:
-        SubElement(SubElement(holder, "dynamics"), "damping").text = repr(joint.damping)
 
 
 def _pose(parent: Element, pose: Pose) -> None:
@@ -235,17 +213,8 @@ def _clean(name: str) -> str:
     return f"{name.strip('_') or 'a'}_" if reserved else name
 
 
-def _unique(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
-    """Clean, unique names; repeated ones get a number."""
-    used, unique = set(taken), []
-    for name in map(_clean, names):
-        own, number = name, 1
-        while own in used:
-            number += 1
-            own = f"{name}_{number}"
-        used.add(own)
-        unique.append(own)
-    return unique
+def _unique(names: Iterable[str], taken: Collection[str] = ()) -> list[str]:
+    return unique_names(list(map(_clean, names)), "_", taken)
 
 
 def obj(mesh: Mesh) -> bytes:

@@ -67,30 +67,22 @@ def test_strip_keeps_its_side(tmp_path):
 BOMB = "<!DOCTYPE x [<!ENTITY a 'aaaa'><!ENTITY b '&a;&a;&a;'>]>"
 OUTSIDE = "<!DOCTYPE x [<!ENTITY a SYSTEM 'file:///etc/passwd'>]>"
 CHAIN = "".join(f"<node id='n{i}'>" + f"<instance_node url='#n{i + 1}'/>" * 10 + "</node>" for i in range(20))
+
+
+def triangles(inside, offset=0, tag="triangles"):
+    return dae(shapes=f"<{tag}><input semantic='VERTEX' source='#v' offset='{offset}'/>{inside}</{tag}>")
+
+
 HOSTILE_DAE = {
     "bomb": (dae(head=BOMB, asset="&b;"), "DOCTYPE is not allowed"),
     "outside": (dae(head=OUTSIDE, asset="&a;"), "DOCTYPE is not allowed"),
     "circle": (dae(nodes="<node><instance_node url='#circle'/></node>"), "nested too deeply"),
     "multiplied": (dae(nodes=CHAIN), "places its geometries too often"),
     "deep": ("<COLLADA>" + "<a>" * 100_000 + "</a>" * 100_000 + "</COLLADA>", "has no scene|nested"),
-    "vcount": (
-        dae(
-            shapes="<polylist><input semantic='VERTEX' source='#v' offset='0'/><vcount>2000000000</vcount><p>0 1 2</p></polylist>"
-        ),
-        "<vcount> does not match",
-    ),
-    "offset": (
-        dae(shapes="<triangles><input semantic='VERTEX' source='#v' offset='2000000000'/><p>0</p></triangles>"),
-        "not a valid DAE",
-    ),
-    "indices": (
-        dae(shapes="<triangles><input semantic='VERTEX' source='#v' offset='0'/><p>0 1 9</p></triangles>"),
-        "go beyond the limits",
-    ),
-    "negative": (
-        dae(shapes="<triangles><input semantic='VERTEX' source='#v' offset='0'/><p>0 1 -1</p></triangles>"),
-        "negative index",
-    ),
+    "vcount": (triangles("<vcount>2000000000</vcount><p>0 1 2</p>", tag="polylist"), "<vcount> does not match"),
+    "offset": (triangles("<p>0</p>", 2_000_000_000), "not a valid DAE"),
+    "indices": (triangles("<p>0 1 9</p>"), "go beyond the limits"),
+    "negative": (triangles("<p>0 1 -1</p>"), "negative index"),
     "gaps": (dae().replace('count="4" stride="3"', 'count="4" stride="4"'), "stored with gaps"),
     "nan": (dae(positions="nan 0 0 1 0 0 0 2 0 0 0 3"), "not finite"),
     "far": (dae(positions="2e6 0 0 1 0 0 0 2 0 0 0 3"), "farther than 1000000 m"),

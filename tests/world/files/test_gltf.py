@@ -41,19 +41,6 @@ def test_gltf_nodes_with_a_camera_or_lines_keep_what_is_below(tmp_path):
         assert bounds(mesh_of(tmp_path / "a.gltf", text)) == [[5, 0, 0], [6, 2, 3]]
 
 
-def test_gltf_strip_keeps_its_side(tmp_path):
-    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dtype="<f4").tobytes()
-    (tmp_path / "a.bin").write_bytes(points)
-    text, _ = gltf(
-        "a.bin",
-        meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}]}],
-        accessors=accessor()[:1],
-        bufferViews=views()[:1],
-    )
-    mesh = mesh_of(tmp_path / "a.gltf", text)
-    assert (solid(mesh).face_normals[:, 2] == 1).all() and len(mesh.faces) == 2
-
-
 def test_gltf_buffer_beside_it_and_glb(tmp_path):
     text, data = gltf("more%20data/a.bin")
     (tmp_path / "more data").mkdir()
@@ -69,14 +56,19 @@ def test_gltf_buffer_beside_it_and_glb(tmp_path):
     assert bounds(mesh_of(tmp_path / "a.glb", scene.export(file_type="glb"), submesh="box10"))[0] == [10, 0, 0]
 
 
-@pytest.mark.parametrize("mode", [4, 5])
-def test_gltf_modes_without_indices(tmp_path, mode):
-    meshes_ = [
-        {"primitives": [{"attributes": {"POSITION": 0}, "mode": mode}, {"attributes": {"POSITION": 0}, "mode": 1}]}
-    ]
-    accessors = [{"bufferView": 0, "componentType": 5126, "count": 3 if mode == 4 else 4, "type": "VEC3"}]
-    text, _ = gltf(meshes=meshes_, accessors=accessors)
-    assert len(mesh_of(tmp_path / "a.gltf", text).faces) == (1 if mode == 4 else 2)
+@pytest.mark.parametrize(("mode", "corners"), [(4, 3), (5, 4)])
+def test_gltf_modes_without_indices(tmp_path, mode, corners):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dtype="<f4").tobytes()
+    (tmp_path / "a.bin").write_bytes(points)
+    primitives = [{"attributes": {"POSITION": 0}, "mode": each} for each in (mode, 1)]
+    text, _ = gltf(
+        "a.bin",
+        meshes=[{"primitives": primitives}],
+        accessors=accessor(count=corners)[:1],
+        bufferViews=views()[:1],
+    )
+    mesh = mesh_of(tmp_path / "a.gltf", text)
+    assert (solid(mesh).face_normals[:, 2] == 1).all() and len(mesh.faces) == corners - 2
 
 
 def accessor(**changes):

@@ -38,14 +38,14 @@ v 0 0 0
 v 1 0 0
 v 0 1 0
 g left side
-f -3/1/1 -2//2 -1
+  f\t-3/1/1 -2//2  -1 # counted back
 o second
 g right
 v 0 0 5 0.1 0.2 0.3
 v 1 0 5
 v 1 1 5
-v 0 1 5
-v 0 2 \\
+v 0.5 2 5
+v 0 1 \\
   5
 f -5 -4 -3 -2 -1
 l 1 2
@@ -58,30 +58,11 @@ def test_obj_counts_back_from_the_face_and_fans(tmp_path):
     assert first.vertices.tolist() == [[0, 0, 0], [0, 1, 0], [1, 0, 0]]
     second = mesh_of(tmp_path / "a.obj", OBJ, submesh="second")
     assert len(second.faces) == 3
+    assert (solid(second).face_normals[:, 2] == 1).all()
     assert bounds(second) == [[0, 0, 5], [1, 2, 5]]
     assert mesh_of(tmp_path / "a.obj", OBJ, submesh="left side").vertices.tolist() == first.vertices.tolist()
     assert bounds(mesh_of(tmp_path / "a.obj", OBJ, submesh="right", center=True)) == [[-0.5, -1, 0], [0.5, 1, 0]]
     assert len(mesh_of(tmp_path / "a.obj", OBJ).faces) == 4
-
-
-@pytest.mark.parametrize(
-    ("faces", "count"),
-    [
-        ("\tf  1\t2 3\n  f 1 3 4", 2),
-        ("vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 5 6", 5),
-        ("vn 0 0 1\nf 1//1 2//1 3//1 4//1 # four\nf 1 3 4", 3),
-        ("f 1 2 3 4 5\nf 2 3 4 5 6", 6),
-        ("f -6 -5 -4\nv 9 9 9\nf -7 -6 -5", 2),
-    ],
-)
-def test_obj_faces_in_all_their_forms(tmp_path, faces, count):
-    """All are pieces of one convex polygon that is seen from above."""
-    corners = "v 0 0 0\n v 1\t0 0\nv 2 1 0\nv 2 2 0\nv 1 3 0\nv 0 2 0"
-    (tmp_path / "a.obj").write_text(f"{corners}\n{faces}")
-    (part,) = read_parts(tmp_path / "a.obj")
-    assert len(part.faces) == count
-    assert (solid(part).face_normals[:, 2] == 1).all()
-    assert part.vertices.max() <= 3
 
 
 def test_obj_names_are_kept_apart(tmp_path):
@@ -96,9 +77,9 @@ def test_unknown_submesh_names_those_that_exist(tmp_path):
     with pytest.raises(Unusable, match=r"has no submesh 'third'; it has 'first', 'second'$"):
         mesh_of(tmp_path / "a.obj", OBJ, submesh="third")
     many = "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "".join(f"o part{i}\nf 1 2 3\n" for i in range(7))
-    with pytest.raises(Unusable, match=r"'part4' and 2 more$"):
+    with pytest.raises(Unusable, match=r"'part4', \.\.\.$"):
         mesh_of(tmp_path / "a.obj", many, submesh="x")
-    with pytest.raises(Unusable, match="its parts have no names"):
+    with pytest.raises(Unusable, match="it has none with a name"):
         mesh_of(tmp_path / "a.stl", BOX.export(file_type="stl"), submesh="x")
 
 
@@ -120,7 +101,7 @@ def test_text_stl_in_another_encoding_and_of_several_solids(tmp_path):
         ("", "no triangles"),
         ("v 0 0 0\n", "no triangles"),
         ("v 0 0\nf 1 1 1", "fewer than three numbers"),
-        ("v 0 0 0\nf 1 2 3", "out of bounds"),
+        ("v 0 0 0\nf 1 2 3", "does not exist"),
         ("v 0 0 0\nf 1 0 1", "refers to the vertex 0"),
         ("v 0 0 0\nf 1 -2 1", "vertex -2"),
         ("v 0 0 x\n", "no triangles|could not be read to its end"),
@@ -196,17 +177,6 @@ def test_flat_meshes_get_a_thin_hull(tmp_path, points, volume):
     assert solid(mesh).volume == pytest.approx(volume, rel=1e-6)
 
 
-def test_large_visual_becomes_its_hull(tmp_path, monkeypatch):
-    monkeypatch.setattr(meshes, "MOST_DRAWN", 100)
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    mesh = mesh_of(tmp_path / "a.stl", ball.export(file_type="stl"))
-    assert len(mesh.vertices) <= 256
-    assert mesh.simplified
-    assert not mesh_of(tmp_path / "b.stl", BOX.export(file_type="stl")).simplified
-    stored = meshes.unpack("a", meshes.pack(mesh.vertices, mesh.faces, simplified=True))
-    assert stored.simplified
-
-
 def test_the_hull_of_many_points_keeps_their_extent(monkeypatch):
     ball = np.random.default_rng(1).normal(size=(3000, 3))
     monkeypatch.setattr(meshes, "MANY_POINTS", 1000)
@@ -224,12 +194,6 @@ def test_a_mesh_of_too_many_triangles_is_refused_in_a_line(tmp_path, monkeypatch
     monkeypatch.setattr("ddenv.world.files.triangles.MOST_FACES", 1000)
     with pytest.raises(Unusable, match=r"has 0\.0 million triangles; the maximum is 0\.001 million: simplify it"):
         mesh_of(tmp_path / f"a.{suffix}", ball.export(file_type=suffix), convex=True)
-
-
-def test_large_file_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(meshes, "MESH_LIMIT", 100)
-    with pytest.raises(Unusable, match="the maximum is"):
-        mesh_of(tmp_path / "a.stl", BOX.export(file_type="stl"))
 
 
 def run(text: str, seed: str = "0") -> str:

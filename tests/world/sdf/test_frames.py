@@ -66,10 +66,13 @@ def test_links_are_where_drake_has_them(read, inside):
     assert count == inside.count("<link ")
 
 
-def test_frame_attributes_of_old_files_mean_the_same(read):
-    inside = f"<model name='m'><link name='a'><pose frame=''>1 0 0 0 0 0</pose>{BOX}</link>"
-    old = read(inside + "<link name='b'><pose frame='a'>1 0 0 0 0 0</pose></link></model>", "1.5")
-    assert old.models[0].links[1].pose.position == (2, 0, 0)
+def test_frame_attributes_mean_the_same_in_old_files_and_nothing_in_new_ones(read):
+    inside = f"<model name='m'><static>1</static><link name='a'><pose frame=''>1 0 0 0 0 0</pose>{BOX}</link>"
+    inside += "<link name='b'><pose frame='a'>1 0 0 0 0 0</pose></link></model>"
+    assert read(inside, "1.5").models[0].links[1].pose.position == (2, 0, 0)
+    new = read(inside, "1.8")
+    assert new.models[0].links[1].pose.position == (1, 0, 0)
+    assert "has no effect since SDF 1.7" in new.notes[0].why
 
 
 def test_collisions_follow_frames_of_their_model(read):
@@ -100,18 +103,6 @@ def test_old_joint_axes_are_in_the_frame_of_the_model(read):
     assert read(inside.format(across), "1.6").models[0].joints[0].axis == pytest.approx((1, 0, 0))
     named = inside.replace("<xyz>", "<xyz expressed_in='a'>")
     assert read(named.format(""), "1.9").models[0].joints[0].axis == pytest.approx((1, 0, 0))
-
-
-def test_booleans_of_attributes_are_read_in_any_case(read):
-    model = read("<model name='m'><pose degrees='True'>0 0 0 0 0 90</pose><link name='a'/></model>").models[0]
-    assert model.pose.yaw() == pytest.approx(math.pi / 2)
-
-
-def test_the_old_frame_attribute_means_nothing_in_new_files(read):
-    two = "<link name='a'><pose>3 0 0 0 0 0</pose></link><link name='b'><pose frame='a'>1 0 0 0 0 0</pose></link>"
-    world = read(f"<model name='m'><static>1</static>{two}</model>", "1.8")
-    assert world.models[0].links[1].pose.position == (1, 0, 0)
-    assert "has no effect since SDF 1.7" in world.notes[0].why
 
 
 def test_rows_of_frames_may_be_long(read):

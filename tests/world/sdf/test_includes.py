@@ -3,10 +3,7 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.files.resources import Resources
 from ddenv.world.model import Cylinder
-from ddenv.world.scenario import Reading
-from ddenv.world.sdf.read import parse_world
 from tests.world.sdf.conftest import BOX, world_text
 
 TOP = f"<pose>0 0 5 0 0 0</pose><static>1</static><link name='top'>{BOX}</link>"
@@ -37,32 +34,16 @@ def test_a_model_is_found_in_the_model_path(read, table):
     assert second.links[0].inertia is not None
 
 
-@pytest.mark.parametrize("variable", ["GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH"])
-def test_gazebos_variables_are_known(read, table, monkeypatch, variable):
-    monkeypatch.setenv(variable, f"/nowhere:{table}")
-    assert read(included()).models[0].name == "table"
-
-
-def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table):
-    text = TABLE.replace("<link", "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame><link")
+@pytest.mark.parametrize(("of_model", "of_include"), [(" placement_frame='foot'", ""), ("", "foot")])
+def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table, of_model, of_include):
+    frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"
+    text = TABLE.replace("<model name='table'>", f"<model name='table'{of_model}>{frame}")
     (table / "table" / "model.sdf").write_text(text)
-    world = read(included("<placement_frame>foot</placement_frame><pose>1 0 0 0 0 0</pose>"), model_path=(table,))
+    placed = f"<placement_frame>{of_include}</placement_frame>" if of_include else ""
+    world = read(included(f"{placed}<pose>1 0 0 0 0 0</pose>"), model_path=(table,))
     assert world.models[0].pose.position == (1, 0, 1)
-
-
-def test_an_included_model_goes_with_its_include(read, table):
-    text = world_text(included() + "<model name='m'><link name='l'/></model>")
-    world = read(included() + "<model name='m'><link name='l'/></model>", model_path=(table,))
-    start, end = world.model("table").spans[0]
-    assert text[start:end].decode() == included()
-
-
-def test_what_was_included_can_be_read_again_without_the_files(read, table, tmp_path):
-    text = world_text(included())
-    world = read(included(), model_path=(table,))
-    (table / "table" / "model.sdf").unlink()
-    again = parse_world(text, tmp_path / "here.sdf", Reading(model_path=(table,)), Resources(world.resources))
-    assert again.models == world.models
+    with pytest.raises(UserError, match="a <placement_frame> needs a <pose>"):
+        read(included("<placement_frame>foot</placement_frame>"), model_path=(table,))
 
 
 def test_models_in_models_become_one(read, table):
@@ -98,6 +79,7 @@ def test_a_stand_in_for_a_whole_model(read):
     assert desk.collisions[0].pose.position == (1, 0, 1)
     assert "stand-in cylinder:0.5,2" in world.notes[0].why
     assert read(included(), ignore=("include",)).models == ()
+    assert read("<include merge='true'><uri>model://table</uri></include>", ignore=("include",)).models == ()
 
 
 def test_what_is_wrong_in_an_included_file_is_told_of_that_file(read, table):
@@ -126,20 +108,6 @@ def test_models_of_one_name_are_told_apart_by_their_place(read):
     assert all("used 3 times" in note.why for note in world.notes if "name" in note.why)
 
 
-def test_words_that_are_not_known_are_noted(read):
-    world = read("<model name='m'><link name='l'><colision name='c'/></link></model>")
-    (note,) = (note for note in world.notes if note.kind == "ignored")
-    assert note.what == "<colision>"
-    assert "unknown element of SDF" in note.why
-
-
-def test_plugins_and_sensors_are_noted(read):
-    world = read(
-        "<plugin name='p' filename='f'/><model name='m'><static>1</static><link name='l'><sensor name='s'/></link></model>"
-    )
-    assert {note.what for note in world.notes} == {"<plugin>", "<sensor>"}
-
-
 def test_a_ground_that_could_move_does_not(read):
     plane = "<collision name='c'><geometry><plane/></geometry></collision>"
     world = read(f"<model name='g'><link name='l'>{plane}</link></model>")
@@ -155,26 +123,10 @@ def test_gravity_of_old_and_new_files(read):
     assert not light.gravity
 
 
-def test_an_includes_pose_is_that_of_the_models_own_placement_frame(read, table):
-    frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"
-    text = TABLE.replace("<model name='table'>", f"<model name='table' placement_frame='foot'>{frame}")
-    (table / "table" / "model.sdf").write_text(text)
-    assert read(included("<pose>1 0 0 0 0 0</pose>"), model_path=(table,)).models[0].pose.position == (1, 0, 1)
-    with pytest.raises(UserError, match="a <placement_frame> needs a <pose>"):
-        read(included("<placement_frame>foot</placement_frame>"), model_path=(table,))
-
-
 def test_all_files_that_are_nowhere_are_told_at_once(read):
     mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
     with pytest.raises(UserError, match=r"'model://table' was not found .*; also missing: 'model://lamp/lamp.dae'$"):
         read(included() + included() + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>")
-
-
-def test_a_merged_include_can_be_left_out(read):
-    merged = "<include merge='true'><uri>model://table</uri></include>"
-    with pytest.raises(UserError, match="--ignore include"):
-        read(merged)
-    assert read(merged, ignore=("include",)).models == ()
 
 
 def test_a_stand_in_is_called_as_what_it_replaces(read):
@@ -191,6 +143,9 @@ def test_a_static_model_may_have_no_link(read):
 
 
 SILENT = {
+    "a misspelt collision": "<colision name='c'/>",
+    "a sensor": "<sensor name='s'/>",
+    "a plugin": "<plugin name='p' filename='f'/>",
     "a misspelt limit": "<joint name='j' type='revolute'>{ends}<axis><xyz>0 0 1</xyz><limits/></axis></joint>",
     "a limit outside its axis": "<joint name='j' type='fixed'>{ends}<limit/></joint>",
     "two axes": "<joint name='j' type='revolute'>{ends}<axis/><axis/></joint>",

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF
 from ddenv.world.scenario import Reading
-from ddenv.world.sdf import copied
+from ddenv.world.sdf import inside
 from ddenv.world.sdf.read import disk_of, parse_world, read_world
 from ddenv.world.write import without
 
@@ -36,11 +36,6 @@ def test_parts_are_named_by_model_link_and_collision_and_have_the_nearest_visual
     assert world.elements() == ("house/walls/a", "house/walls/b", "house/shed/roof")
     assert [[one.name for one in model.links[0].visuals] for model in world.models] == [["a_shown"], ["b_shown"], []]
     assert world.elements(frozenset({"house"})) == ()
-
-
-def test_the_parts_of_a_model_have_its_shapes_in_their_order(read):
-    (whole,), parts = read(house(ROOMS)).models, read(house(ROOMS), inside=True).models
-    assert whole.collisions == tuple(one for part in parts for one in part.collisions)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +164,7 @@ def test_what_cannot_be_copied_stays_whole_and_is_noted(read, models):
 
 
 def test_a_large_file_is_not_copied_again_and_again(read, models, monkeypatch):
-    monkeypatch.setattr(copied, "MOST_COPIED", 2000)
+    monkeypatch.setattr(inside, "MOST_COPIED", 2000)
     world = read(
         "".join(include("model://hut", f"<name>{name}</name>") for name in "abc"), model_path=models, inside=True
     )

@@ -78,12 +78,6 @@ def _extruded(outline, height):
     return trimesh.Trimesh(np.vstack([low, low + np.array([0, 0, height])]), faces, process=False)
 
 
-def test_a_mesh_that_is_nowhere_is_not_drawn(read):
-    world = read(model("<mesh><uri>model://no/a.dae</uri></mesh>", tag="visual"))
-    assert world.models[0].links[0].visuals == ()
-    assert "'model://no/a.dae' is not drawn" in world.notes[0].why
-
-
 def test_a_collision_mesh_that_is_nowhere_is_refused_with_all_remedies(read):
     with pytest.raises(UserError) as caught:
         read(model("<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>"))
@@ -115,44 +109,47 @@ def test_the_box_around_the_other_shapes_of_a_link_can_stand_in(read, kind):
     assert found.pose.position == (0, 0, 1)
 
 
-def test_a_visual_that_is_too_fine_is_drawn_as_its_hull(read, tmp_path, monkeypatch):
+def touched(inside):
+    return model(CUBE, f"<surface><contact>{inside}</contact></surface>")
+
+
+CUBE = "<box><size>1 1 1</size></box>"
+NOTED = {
+    "a mesh that is nowhere is not drawn": (
+        model("<mesh><uri>model://no/a.dae</uri></mesh>", tag="visual"),
+        "'model://no/a.dae' is not drawn",
+    ),
+    "a visual that is too fine is drawn as its hull": (
+        model("<mesh><uri>a.obj</uri></mesh>", tag="visual"),
+        "'a.obj' by its convex hull, since it is too fine to be drawn",
+    ),
+    "a heightmap is ignored": (model("<heightmap><uri>file://hills.png</uri></heightmap>"), "left out by --ignore"),
+    "an image is ignored": (model("<image><uri>file://hills.png</uri></image>"), "left out by --ignore"),
+    "a bitmask of nothing": (touched("<collide_bitmask>0x00</collide_bitmask>"), "lets nothing touch it"),
+    "no contact": (touched("<collide_without_contact>1</collide_without_contact>"), "it collides without contact"),
+}
+
+
+@pytest.mark.parametrize(("text", "why"), NOTED.values(), ids=NOTED)
+def test_what_is_left_out_or_replaced_is_noted(read, tmp_path, monkeypatch, text, why):
     monkeypatch.setattr("ddenv.world.files.meshes.MOST_DRAWN", 3)
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n")
-    world = read(model("<mesh><uri>a.obj</uri></mesh>", tag="visual"))
-    assert world.notes[0].why == "'a.obj' by its convex hull, since it is too fine to be drawn"
-
-
-def test_a_stand_in_that_nothing_asks_for_is_noted(read):
-    world = read(model("<box><size>1 1 1</size></box>"), stand_ins={"model://bariel": "sphere:1"})
-    assert "stand-in for 'model://bariel' is not used" in world.notes[0].why
-
-
-@pytest.mark.parametrize("tag", ["heightmap", "image"])
-def test_grounds_that_cannot_be_simulated_are_refused_unless_ignored(read, tag):
-    text = model(f"<{tag}><uri>file://hills.png</uri></{tag}>")
-    with pytest.raises(UserError, match=rf"geometry/{tag}: a {tag} is not supported.*--ignore {tag}"):
-        read(text)
-    world = read(text, ignore=(tag,))
+    world = read(text, ignore=("heightmap", "image"), stand_ins={"model://bariel": "sphere:1"})
     assert world.models[0].collisions == ()
-    assert world.notes[0].kind == "ignored"
+    assert why in world.notes[0].why
+    assert "stand-in for 'model://bariel' is not used" in world.notes[-1].why
 
 
 def test_the_smaller_friction_counts(read):
     surface = "<surface><friction><ode><mu>0.3</mu><mu2>0.2</mu2></ode></friction></surface>"
-    world = read(model("<box><size>1 1 1</size></box>", surface))
+    world = read(model(CUBE, surface))
     assert world.models[0].collisions[0].mu == 0.2
     assert "0.3 and 0.2" in world.notes[0].why
+    # One alone does not hide the other.
+    alone = "<surface><friction><ode><mu>50</mu></ode></friction></surface>"
+    assert read(model(CUBE, alone)).models[0].collisions[0].mu == 1
     bullet = "<surface><friction><bullet><friction>0.4</friction></bullet></friction></surface>"
-    assert read(model("<box><size>1 1 1</size></box>", bullet)).models[0].collisions[0].mu == 0.4
-
-
-@pytest.mark.parametrize(
-    "contact", ["<collide_bitmask>0x00</collide_bitmask>", "<collide_without_contact>1</collide_without_contact>"]
-)
-def test_what_nothing_can_touch_is_left_out(read, contact):
-    world = read(model("<box><size>1 1 1</size></box>", f"<surface><contact>{contact}</contact></surface>"))
-    assert world.models[0].collisions == ()
-    assert world.notes[0].kind == "ignored"
+    assert read(model(CUBE, bullet)).models[0].collisions[0].mu == 0.4
 
 
 COLORS = {
@@ -166,13 +163,8 @@ COLORS = {
 
 @pytest.mark.parametrize(("material", "color"), COLORS.items())
 def test_visuals_keep_their_colours(read, material, color):
-    world = read(model("<box><size>1 1 1</size></box>", material, "visual"))
+    world = read(model(CUBE, material, "visual"))
     assert world.models[0].links[0].visuals[0].color == color
-
-
-def test_one_coefficient_of_friction_alone_does_not_hide_the_other(read):
-    surface = "<surface><friction><ode><mu>50</mu></ode></friction></surface>"
-    assert read(model("<box><size>1 1 1</size></box>", surface)).models[0].collisions[0].mu == 1
 
 
 def test_a_cone_stands_on_its_base(read):
@@ -180,8 +172,3 @@ def test_a_cone_stands_on_its_base(read):
     solid = trimesh.Trimesh(shape.vertices, shape.faces)
     assert solid.is_watertight and solid.volume == pytest.approx(np.pi, rel=0.01)
     assert shape.vertices[:, 2].max() == 1.5
-
-
-def test_a_hull_in_place_of_a_mesh_is_noted(read, tmp_path):
-    trimesh.creation.box((1, 1, 1)).export(tmp_path / "a.obj")
-    assert [note.why for note in read(model("<mesh><uri>a.obj</uri></mesh>")).notes] == ["'a.obj' by its convex hull"]

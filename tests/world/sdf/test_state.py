@@ -55,9 +55,10 @@ def test_models_of_one_name_take_their_entries_in_order(read):
     assert [(model.name, model.pose.position[0]) for model in world.models] == [("m", 1), ("m #2", 2)]
 
 
-def test_entries_without_a_model_are_noted(read):
-    world = read(MODEL + state("<model name='ghost'/><light name='sun'><pose>0 0 0 0 0 0</pose></light>"), "1.6")
-    assert [note.why for note in world.notes] == ["the world has no model 'ghost'"]
+def test_entries_for_what_is_not_there_are_noted(read):
+    saved = "<model name='m'><link name='lnik'><pose>1 1 1 0 0 0</pose></link><model name='no'/></model><model name='ghost'/>"
+    told = [note.why for note in read(MODEL + state(saved + "<light name='sun'/>"), "1.6").notes]
+    assert told == ["the model has no 'lnik'", "the model has no 'no'", "the world has no model 'ghost'"]
 
 
 @pytest.mark.parametrize(
@@ -83,9 +84,3 @@ def test_what_moved_when_it_was_saved_begins_at_rest(read):
 def test_a_model_that_was_only_turned_is_noted(read):
     saved = "<model name='m'><pose>9 9 9 0 0 0</pose><link name='l'><pose>10 9 9 0 0 1</pose></link></model>"
     assert [note.detail for note in read(MODEL + state(saved), "1.6").notes] == ["turned"]
-
-
-def test_entries_for_links_that_are_not_there_are_noted(read):
-    saved = "<model name='m'><link name='lnik'><pose>1 1 1 0 0 0</pose></link><model name='no'/></model>"
-    told = [note.why for note in read(MODEL + state(saved), "1.6").notes]
-    assert told == ["the model has no 'lnik'", "the model has no 'no'"]

@@ -144,38 +144,31 @@ def test_a_mesh_that_is_nowhere_may_be_stood_in_for():
     assert model.collisions[0].shape == Cylinder(0.3, 1.0)
 
 
-A, B = link("a", BODY), link("b", WHEEL)
+A, B, J = link("a", BODY), link("b", WHEEL), joint("j", "fixed", "a", "b")
+
+
+def moving(kind: str, inside: str = "", child: str = "b") -> tuple[str, str, str]:
+    return A, B, joint("j", kind, "a", child, inside)
+
+
 REFUSED = {
     "no link": ((), r":2: /robot\[@name='cart'\]: has no <link>"),
     "two roots": ((A, B), "expected one link that is not the child of a joint, found a, b"),
     "loop": (
-        (A, B, joint("j", "fixed", "a", "b"), joint("k", "fixed", "b", "a")),
+        (A, B, J, joint("k", "fixed", "b", "a")),
         "expected one link that is not the child of a joint, but joints close a loop",
     ),
     "two parents": (
-        (
-            link("c", WHEEL),
-            A,
-            B,
-            joint("j", "fixed", "a", "b"),
-            joint("k", "fixed", "c", "b"),
-            joint("l", "fixed", "a", "c"),
-        ),
+        (link("c", WHEEL), A, B, J, joint("k", "fixed", "c", "b"), joint("l", "fixed", "a", "c")),
         "link 'b' is the child of two joints",
     ),
-    "planar": (
-        (A, B, joint("j", "planar", "a", "b")),
-        r":5: .*/joint\[@name='j'\]: joint type 'planar' is not supported",
-    ),
-    "floating": ((A, B, joint("j", "floating", "a", "b")), "joint type 'floating' is not supported"),
-    "unknown link": ((A, B, joint("j", "fixed", "a", "bb")), r"/child: there is no link 'bb' \(did you mean b\?\)"),
+    "planar": (moving("planar"), r":5: .*/joint\[@name='j'\]: joint type 'planar' is not supported"),
+    "floating": (moving("floating"), "joint type 'floating' is not supported"),
+    "unknown link": (moving("fixed", child="bb"), r"/child: there is no link 'bb' \(did you mean b\?\)"),
     "no end": ((A, B, '<joint name="j" type="fixed"><parent link="a"/></joint>'), "has no <child>"),
-    "no limit": ((A, B, joint("j", "revolute", "a", "b")), "a revolute joint needs a <limit>"),
-    "axis": ((A, B, joint("j", "continuous", "a", "b", '<axis xyz="0 1"/>')), "xyz must be three numbers, found '0 1'"),
-    "origin": (
-        (A, B, joint("j", "fixed", "a", "b", '<origin xyz="0 1 up"/>')),
-        "expected 6 finite numbers, found '0 1 up",
-    ),
+    "no limit": (moving("revolute"), "a revolute joint needs a <limit>"),
+    "axis": (moving("continuous", '<axis xyz="0 1"/>'), "xyz must be three numbers, found '0 1'"),
+    "origin": (moving("fixed", '<origin xyz="0 1 up"/>'), "expected 6 finite numbers, found '0 1 up"),
     "mass": ((link("a", '<inertial><mass value="5 kg"/></inertial>'),), "expected one finite number, found '5 kg'"),
     "size": ((link("a", BODY + shape('<box size="1 2"/>')),), "/box/size: expected 3 finite numbers, found '1 2'"),
     "negative": ((link("a", BODY + shape('<sphere radius="-1"/>')),), "sizes must be from 1e-06"),

@@ -29,7 +29,14 @@ def read_dae(data: bytes) -> list[Part]:
     import trimesh
     from trimesh.exchange.dae import load_collada
 
-    root = _parse(data)
+    try:
+        root = xml_root(data)
+    except Unusable as error:
+        raise ValueError(str(error)) from None
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "COLLADA":
+        raise ValueError(f"its root is <{root.tag[:60]}>, not <COLLADA>")
     known = {id: element for element in root.iter() if (id := element.get("id"))}
     instance = root.find("scene/instance_visual_scene")
     scene = None if instance is None else _target(instance, known)
@@ -45,36 +52,18 @@ def read_dae(data: bytes) -> list[Part]:
     loaded = load_collada(  # type: ignore[no-untyped-call]  # trimesh
         BytesIO(_document(nodes, [geometry for _, geometry in places])), ignore_broken=False
     )
-    metres, meshes = _metres(root), []
+    unit, meshes = root.find("asset/unit"), []
+    try:
+        metres = float("1" if unit is None else unit.get("meter", "1"))
+    except ValueError:
+        metres = 1.0
     for place in loaded["graph"]:
         shape = loaded["geometry"][place["geometry"]]
         mesh = trimesh.Trimesh(shape["vertices"], shape["faces"], process=False)
         mesh.apply_transform(place["matrix"])
-        mesh.apply_scale(metres)  # type: ignore[no-untyped-call]  # trimesh
+        mesh.apply_scale(metres if math.isfinite(metres) and metres > 0 else 1.0)  # type: ignore[no-untyped-call]  # trimesh
         meshes.append((places[int(place["geometry"].partition("_")[0])][0], mesh))
     return parts_of(meshes)
-
-
-def _parse(data: bytes) -> Element:
-    try:
-        root = xml_root(data)
-    except Unusable as error:
-        raise ValueError(str(error)) from None
-    for element in root.iter():
-        element.tag = element.tag.rpartition("}")[2]
-    if root.tag != "COLLADA":
-        raise ValueError(f"its root is <{root.tag[:60]}>, not <COLLADA>")
-    return root
-
-
-def _metres(root: Element) -> float:
-    """The length of one unit of the file, m; 1 if that is missing or nonsense."""
-    unit = root.find("asset/unit")
-    try:
-        metres = float("1" if unit is None else unit.get("meter", "1"))
-    except ValueError:
-        return 1.0
-    return metres if math.isfinite(metres) and metres > 0 else 1.0
 
 
 def _repair(geometry: Element, known: dict[str, Element]) -> None:
@@ -130,7 +119,11 @@ def _placed(
     for each in node:
         target = each if each.tag == "node" else _target(each, known)
         if each.tag == "rotate":
-            copy.append(_rotation(each))
+            # About a unit axis, as pycollada needs it; an axis of length zero turns nothing.
+            *axis, angle = (float(word) for word in (each.text or "").split())
+            length = math.hypot(*axis)
+            values = [*(value / length for value in axis), angle % 360] if length else [0.0] * 4
+            SubElement(copy, "rotate").text = " ".join(map(repr, values))
         elif each.tag in TRANSFORMS:
             copy.append(each)
         elif target is not None and target.tag == "node":
@@ -138,16 +131,6 @@ def _placed(
         elif target is not None and target.tag == "geometry":
             SubElement(copy, "instance_geometry", url=f"#{len(places)}")
             places.append(((name, target.get("name", ""), target.get("id", ""), node.get("id", "")), target))
-    return copy
-
-
-def _rotation(element: Element) -> Element:
-    """A rotation about a unit axis, as pycollada needs it; an axis of length zero turns nothing."""
-    *axis, angle = (float(word) for word in (element.text or "").split())
-    length = math.hypot(*axis)
-    values = [*(value / length for value in axis), angle % 360] if length else [0.0] * 4
-    copy = Element("rotate")
-    copy.text = " ".join(map(repr, values))
     return copy
 
 

@@ -87,10 +87,17 @@ def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
     used = {
         number for mesh in meshes for each in mesh for number in (*each["attributes"].values(), each.get("indices"))
     }
+    # A node without the mesh if that has no triangles: trimesh would lose the transform for all nodes below.
+    placing = [
+        {"name": str(number)}
+        | {key: node[key] for key in _PLACE if key in node}
+        | ({"mesh": node["mesh"]} if "mesh" in node and meshes[node["mesh"]] else {})
+        for number, node in enumerate(nodes)
+    ]
     return {
         "asset": {"version": header["asset"]["version"]},
         "scenes": [{"nodes": _roots(header)}],
-        "nodes": [_node(number, node, meshes) for number, node in enumerate(nodes)],
+        "nodes": placing,
         "meshes": [{"primitives": mesh} for mesh in meshes],
         "accessors": [each if number in used else _NOTHING for number, each in enumerate(accessors)],
         "bufferViews": views,
@@ -132,9 +139,3 @@ def _roots(header: dict[str, Any]) -> list[int]:
     if len(set(listed)) < len(listed) or not set(listed) <= {*range(len(nodes))} or len(nodes) > MOST_PARTS:
         raise ValueError("its nodes do not form a tree")
     return roots
-
-
-def _node(number: int, node: dict[str, Any], meshes: list[list[dict[str, Any]]]) -> dict[str, Any]:
-    """A node without the mesh if that has no triangles: trimesh would lose the transform for all nodes below."""
-    mesh = {"mesh": node["mesh"]} if "mesh" in node and meshes[node["mesh"]] else {}
-    return {"name": str(number), **{key: node[key] for key in _PLACE if key in node}, **mesh}

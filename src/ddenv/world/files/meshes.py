@@ -11,13 +11,10 @@ fans or compressed, sparse or quantized meshes. A text .stl is read up to its la
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import math
 import struct
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +24,7 @@ from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
 from ddenv.world.files.triangles import Part, check_count, chosen, joined, read_obj, read_stl
 from ddenv.world.model import Mesh
+from ddenv.world.pose import Vector
 
 SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
 MESH_LIMIT = 200_000_000  # bytes of a file
@@ -45,8 +43,12 @@ def read_parts(path: Path) -> list[Part]:
     if suffix not in SUFFIXES:
         raise Unusable(f"meshes of type '{suffix[:20]}' are not supported; use one of {', '.join(SUFFIXES)}")
     data = read(path, MESH_LIMIT)
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
-        with _quiet():
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            # Of older numpy versions, about numbers that are half read.
+            warnings.filterwarnings("error", message="string or file could not be read")
             plain = {".obj": read_obj, ".stl": read_stl, ".dae": read_dae}.get(suffix)
             return read_gltf(data, path.parent, MESH_LIMIT) if plain is None else plain(data)
     except Unusable:
@@ -63,22 +65,12 @@ def read_parts(path: Path) -> list[Part]:
     raise Unusable(f"is not a valid {suffix[1:].upper()} file: {_line(reason)}") from None
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silences the libraries, and turns the warning of older numpy versions about half-read numbers into an error."""
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        warnings.filterwarnings("error", message="string or file could not be read")
-        yield
-
-
 def _line(text: str) -> str:
     text = " ".join(text.split())
     return text if len(text) <= 200 else text[:199] + "…"
 
 
-def build(parts: list[Part], *, submesh: str = "", center: bool = False, convex: bool) -> bytes:
+def build(parts: list[Part], submesh: str = "", center: bool = False, convex: bool = False) -> bytes:
     """The mesh of all `parts`, or of those called `submesh`, packed.
 
     `center` moves the middle of its bounding box to the origin. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is
@@ -129,9 +121,8 @@ def unpack(name: str, packed: bytes) -> Mesh:
 
     Its `origin` is `name` with a digest of its content, which distinguishes files of one name.
     """
-    size, count, triangles = (0, 0, 0)
-    if len(packed) >= _HEADER.size and packed.startswith((_MAGIC, _MAGIC_HULL)):
-        _, size, count, triangles = _HEADER.unpack_from(packed)
+    known = len(packed) >= _HEADER.size and packed.startswith((_MAGIC, _MAGIC_HULL))
+    _, size, count, triangles = _HEADER.unpack_from(packed) if known else (b"", 0, 0, 0)
     start = _HEADER.size + 3 * size * count
     if size not in (4, 8) or len(packed) != start + 12 * triangles:
         raise Unusable("its stored mesh is damaged")
@@ -144,11 +135,6 @@ def unpack(name: str, packed: bytes) -> Mesh:
     vertices.flags.writeable = faces.flags.writeable = False
     digest = hashlib.blake2b(packed, digest_size=8).hexdigest()
     return Mesh(f"{name} {digest}", vertices, faces, packed.startswith(_MAGIC_HULL))
-
-
-def origin(uri: str, submesh: str, center: bool, convex: bool) -> str:
-    """The `origin` of a mesh without the digest of its content."""
-    return json.dumps([uri, submesh, center, convex])
 
 
 # Maximum number of vertices: a finer hull only makes every time step slower.
@@ -169,7 +155,11 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     if len(points) > MANY_POINTS:
         points = points[_extremes(points)]
-    points = _thickened(np.unique(points, axis=0))
+    points = np.unique(points, axis=0)
+    size = math.dist(points.min(axis=0), points.max(axis=0))
+    thickness = max(THICKNESS, THICKNESS_RATIO * size)
+    for axis in _thin_axes(points, THIN_RATIO * size):
+        points = np.concatenate([points - thickness / 2 * axis, points + thickness / 2 * axis])
     chosen, faces = _qhull(points)
     if len(chosen) > MOST_VERTICES:
         points = points[chosen][_extremes(points[chosen])]
@@ -197,13 +187,18 @@ def _unit(points: np.ndarray) -> np.ndarray:
     """`points` stretched to the cube from -1 to 1, which suits Qhull's tolerances; a hull stays a hull."""
     low, high = points.min(axis=0), points.max(axis=0)
     half = np.where(high > low, (high - low) / 2, 1.0)
-    stretched: np.ndarray = (points - (low + high) / 2) / half
-    return stretched
+    return np.asarray((points - (low + high) / 2) / half)
 
 
 def _extremes(points: np.ndarray) -> np.ndarray:
-    """Indices of the extreme points in `MOST_VERTICES` evenly spread directions, including the axes."""
-    points, directions = _unit(points), _directions(MOST_VERTICES)
+    """Indices of the extreme points in `MOST_VERTICES` directions: a spiral on the sphere, and the axes, for the bounding box."""
+    points = _unit(points)
+    directions: list[Vector] = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    turn, rest = math.pi * (3 - math.sqrt(5)), MOST_VERTICES - len(directions)
+    for number in range(rest):
+        height = 1 - (2 * number + 1) / rest
+        ring = math.sqrt(1 - height * height)
+        directions.append((ring * math.cos(turn * number), ring * math.sin(turn * number), height))
     best, places = [-math.inf] * len(directions), [0] * len(directions)
     # In chunks that stay in the processor's cache.
     for start in range(0, len(points), CHUNK):
@@ -214,27 +209,6 @@ def _extremes(points: np.ndarray) -> np.ndarray:
             if along[place] > best[number]:
                 best[number], places[number] = float(along[place]), start + place
     return np.unique(places)
-
-
-def _directions(count: int) -> list[tuple[float, float, float]]:
-    """The six axis directions, which preserve the bounding box, and a spiral of points on the sphere."""
-    axes = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
-    turn = math.pi * (3 - math.sqrt(5))
-    rest = count - len(axes)
-    heights = [1 - (2 * i + 1) / rest for i in range(rest)]
-    rings = [math.sqrt(1 - z * z) for z in heights]
-    return axes + [
-        (r * math.cos(turn * i), r * math.sin(turn * i), z) for i, (r, z) in enumerate(zip(rings, heights, strict=True))
-    ]
-
-
-def _thickened(points: np.ndarray) -> np.ndarray:
-    """`points`; if they lie in one plane, line or place, copies of them on both sides of it."""
-    size = math.dist(points.min(axis=0), points.max(axis=0))
-    thickness = max(THICKNESS, THICKNESS_RATIO * size)
-    for axis in _thin_axes(points, THIN_RATIO * size):
-        points = np.concatenate([points - thickness / 2 * axis, points + thickness / 2 * axis])
-    return points
 
 
 def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
@@ -260,12 +234,10 @@ def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
     return [normal] if heights.max() - heights.min() <= limit else []
 
 
-def _along(points: np.ndarray, direction: np.ndarray | tuple[float, float, float]) -> np.ndarray:
+def _along(points: np.ndarray, direction: np.ndarray | Vector) -> np.ndarray:
     # Without BLAS, whose sums may differ between machines.
-    along: np.ndarray = points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2]
-    return along
+    return np.asarray(points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2])
 
 
 def _length(offsets: np.ndarray) -> np.ndarray:
-    lengths: np.ndarray = np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2 + offsets[:, 2] ** 2)
-    return lengths
+    return np.asarray(np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2 + offsets[:, 2] ** 2))

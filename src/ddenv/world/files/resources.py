@@ -12,10 +12,11 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 from ddenv.world.access import Missing, Unusable, is_folder, read, reason, without_tilde, xml_root
-from ddenv.world.files.meshes import build, origin, read_parts, unpack
+from ddenv.world.files.meshes import build, read_parts, unpack
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
 
@@ -44,7 +45,7 @@ class Resources:
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         """Path and content of an SDF file, given by its own URI or by its model's folder."""
         self.asked[uri, base] = None
-        key = _key("sdf", uri, str(base))
+        key = json.dumps(["sdf", uri, str(base)])
         if key not in self._files:
             path, end, text = self._bytes(key, lambda folders: _sdf(uri, base, folders)).partition(b"\0")
             if not end or not path:
@@ -55,22 +56,19 @@ class Resources:
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
         """A mesh file in m, or its part called `submesh`; `center` moves the middle of its bounding box to the origin."""
         self.asked[uri, base] = None
-        key = _key("mesh", uri, str(base), submesh, center, convex)
+        way: list[Any] = [submesh, center, convex]
+        key = json.dumps(["mesh", uri, str(base), *way])
         if key not in self._meshes:
-            packed = self._bytes(
-                key,
-                lambda folders: build(
-                    self._parts(find(uri, base, folders)), submesh=submesh, center=center, convex=convex
-                ),
-            )
-            self._meshes[key] = unpack(origin(uri, submesh, center, convex), packed)
+            packed = self._bytes(key, lambda folders: build(self._parts(find(uri, base, folders)), *way))
+            self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
         return self._meshes[key]
 
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
         """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
-        old = _key("mesh", uri, folder)[:-1]
-        taken = {key: content for key, content in self.taken.items() if key.startswith(f"{old},")}
-        self.taken |= {_key("mesh", new, new_folder)[:-1] + key[len(old) :]: taken[key] for key in taken}
+        for key, content in list(self.taken.items()):
+            kind, *names, submesh, center, convex = [*json.loads(key), "", False, False][:6]
+            if [kind, *names] == ["mesh", uri, folder]:
+                self.taken[json.dumps([kind, new, new_folder, submesh, center, convex])] = content
 
     def _bytes(self, key: str, ask: Callable[[Sequence[Path]], bytes]) -> bytes:
         if key in self._failed:
@@ -88,14 +86,8 @@ class Resources:
 
     def _parts(self, path: Path) -> list[Part]:
         if self._last is None or self._last[0] != path:
-            self._last = None
-            self._last = (path, read_parts(path))
+            self._last = path, read_parts(path)
         return self._last[1]
-
-
-def on_disk(world_folder: Path, model_path: Sequence[Path] = ()) -> Resources:
-    """The files beside a world and in the folders of `model_path`, Gazebo and ROS."""
-    return Resources({}, search_folders(model_path, world_folder))
 
 
 def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
@@ -105,16 +97,11 @@ def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
         path = model_file(path) if is_folder(path) else path
         text = read(path, SDF_LIMIT)
     except Missing:
-        found = built_in(uri)
-        if found is None:
+        name = model_named(uri)
+        if name not in _TEXTS:
             raise
-        path, text = found
+        path, text = FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
     return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
-
-
-def _key(*request: str | bool) -> str:
-    """The name under which a run file stores the answer to a request."""
-    return json.dumps(request)
 
 
 # In place of a folder: messages name it.
@@ -130,13 +117,6 @@ _TEXTS = {
         "<material><script><name>Gazebo/Grey</name></script></material></visual></link></model>"
     ),
 }
-
-
-def built_in(uri: str) -> tuple[Path, bytes] | None:
-    """A name in place of a path, and the SDF text, of the built-in model that `uri` names; None if there is none."""
-    name = model_named(uri)
-    text = _TEXTS.get(name)
-    return None if text is None else (FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{text}</sdf>".encode())
 
 
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
@@ -193,17 +173,20 @@ def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
     scheme, rest = _split(uri.strip())
     if scheme in ("model", "package"):
         path = _inside(rest)
-        return _first(
-            chain(_of_model(path, folders), _cached(path)), f"looked in {_listed(folders)} and the Fuel cache"
-        )
+        where = f"looked in {_listed(folders)} and the Fuel cache"
+        return _first(chain(_of_model(path, folders), _cached(path)), where)
     if scheme in ("http", "https"):
         return _downloaded(rest, folders)
     if scheme not in ("", "file"):
         raise Unusable(f"scheme '{scheme[:30]}:' is not supported")
     if rest.startswith("/"):
         return _first([Path(os.path.normpath(rest))], "there is no such file")
-    where = f"looked beside the file that names it and in {_listed(folders)}"
-    return _first(_beside(rest, base, folders), where)
+    around = (base, *folders)
+    paths = [Path(os.path.normpath(folder / rest)) for folder in around]
+    staying = [path for path in paths if any(map(_absolute(path).is_relative_to, map(_absolute, around)))]
+    if not staying:
+        raise Unusable(CLIMBS)
+    return _first(staying, f"looked beside the file that names it and in {_listed(folders)}")
 
 
 def _split(uri: str) -> tuple[str, str]:
@@ -244,16 +227,6 @@ def _package(folder: Path) -> str:
         return ""
 
 
-def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:
-    """`rest` below `base` and each search folder. Raises Unusable if it leaves all of them."""
-    allowed = [_absolute(folder) for folder in (base, *folders)]
-    candidates = [Path(os.path.normpath(folder / rest)) for folder in (base, *folders)]
-    staying = [path for path in candidates if any(_absolute(path).is_relative_to(folder) for folder in allowed)]
-    if not staying:
-        raise Unusable(CLIMBS)
-    yield from staying
-
-
 def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
     """`rest` is HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE]: a model that was downloaded from Fuel before."""
     words = rest.split("/")
@@ -264,16 +237,12 @@ def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
     owner, name, tail = words[2], words[4], words[5:]
     version = tail.pop(0) if tail and tail[0] != "files" else ""
     path = _inside("/".join(tail[1:] if tail[:1] == ["files"] else tail))
-    models = (*in_cache(owner, name, version), *of_name(name, tuple(folders)))
+    cached = [host / owner.lower() / "models" / name.lower() for host in _caches()]
+    # "tip" is the newest.
+    versions = [cache / version for cache in cached] if version.isdecimal() else chain(*map(_newest, cached))
+    models = (*versions, *of_name(name, folders))
     where = f"looked in the Fuel cache and in {_listed(folders)}; nothing is downloaded"
     return _first((model / path for model in models), where)
-
-
-def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
-    """Folders where the Fuel cache may hold the model: `version`, or the newest if that is empty or "tip"."""
-    for host in _caches():
-        folder = host / owner.lower() / "models" / name.lower()
-        yield from [folder / version] if version.isdecimal() else _newest(folder)
 
 
 def _cached(path: str) -> Iterator[Path]:
@@ -281,7 +250,7 @@ def _cached(path: str) -> Iterator[Path]:
     name, _, rest = path.partition(os.sep)
     for host in _caches():
         for owner in sorted(folders_of(host), key=lambda each: each != GAZEBO):
-            models = of_name(name, (host / owner / "models",))
+            models = of_name(name, [host / owner / "models"])
             yield from (version / rest for model in models for version in _newest(model))
 
 
@@ -298,7 +267,7 @@ def _newest(folder: Path) -> list[Path]:
     return [folder / max(versions, key=int)] if versions else []
 
 
-def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
+def of_name(name: str, folders: Sequence[Path]) -> Iterator[Path]:
     """Folders called `name` in any of `folders`; then those that differ only in case, or in `_` for a space."""
     for folder in folders:
         yield folder / name
@@ -353,34 +322,20 @@ def model_file(folder: Path) -> Path:
     Raises Unusable for an invalid model.config, and Missing if there is no SDF file.
     """
     try:
-        config = _first([folder / "model.config"], "")
+        text = read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT)
     except Missing:
         return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
-    name = _configured(read(config, MODEL_CONFIG_LIMIT))
-    if not name:
-        return _first(
-            [folder / "model.sdf"], f"model.config names no file for SDF {'.'.join(map(str, NEWEST_SDF))} or older"
-        )
+    name = ""
     try:
-        path = _inside(name)
-    except Unusable as error:
-        raise Unusable(f"model.config: <sdf> {error}") from None
-    return _first([folder / path], f"model.config names '{name[:60]}', which does not exist")
-
-
-def _configured(text: bytes) -> str:
-    """The file that a model.config names for the newest supported SDF version; empty if there is none."""
-    try:
-        root = xml_root(text)
+        newest = (-1, -1)
+        for element in xml_root(text).findall("sdf"):
+            # As numbers, since 1.12 is newer than 1.9.
+            match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", element.get("version", ""))
+            version = (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
+            if newest < version <= NEWEST_SDF and (own := (element.text or "").strip()):
+                newest, name = version, _inside(own)
     except Unusable as error:
         raise Unusable(f"model.config: {error}") from None
-    entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]
-    # `max` takes the first of two entries for one version.
-    usable = [entry for entry in entries if entry[0] <= NEWEST_SDF and entry[1] and "\0" not in entry[1]]
-    return max(usable, key=lambda entry: entry[0], default=((), ""))[1]
-
-
-def _version(text: str) -> tuple[int, ...]:
-    """The version as numbers, since 1.12 is newer than 1.9; (0, 0) for anything else."""
-    match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", text)
-    return (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
+    if not name:
+        return _first([folder / "model.sdf"], "model.config names no file for SDF 1.12 or older")
+    return _first([folder / name], f"model.config names '{name[:60]}', which does not exist")

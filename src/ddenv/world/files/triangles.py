@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,15 +27,15 @@ class Part:
     faces: np.ndarray
 
 
-def parts_of(meshes: Iterable[tuple[tuple[str, ...], object]]) -> list[Part]:
+def parts_of(meshes: Iterable[tuple[tuple[str, ...], Any]]) -> list[Part]:
     """The parts among pairs of names and what trimesh loaded; point clouds and empty meshes are dropped. Raises ValueError."""
-    return [_part(names, mesh) for names, mesh in meshes if len(getattr(mesh, "faces", ()))]
+    found = [(names, mesh) for names, mesh in meshes if len(getattr(mesh, "faces", ()))]
+    return [_part(names, mesh.vertices.view(np.ndarray), mesh.faces) for names, mesh in found]
 
 
-def _part(names: tuple[str, ...], mesh: Any) -> Part:
+def _part(names: tuple[str, ...], vertices: np.ndarray, faces: np.ndarray) -> Part:
     """A part with only the vertices that its faces use, since many parts may share one long list. Raises ValueError."""
-    vertices = mesh.vertices.view(np.ndarray)
-    used, places = np.unique(mesh.faces, return_inverse=True)
+    used, places = np.unique(faces, return_inverse=True)
     # trimesh does not check this, and numpy counts negative numbers from the end.
     if not 0 <= used[0] <= used[-1] < len(vertices):
         raise ValueError("a face refers to a vertex that does not exist")
@@ -51,11 +52,8 @@ def chosen(parts: Sequence[Part], name: str) -> list[Part]:
         if found := [part for part in parts if part.names[rank : rank + 1] == (name,)]:
             return found
     known = list(dict.fromkeys(part.names[0] for part in parts if part.names and part.names[0]))
-    if not known:
-        raise ValueError(f"has no submesh '{name[:60]}': its parts have no names")
-    more = f" and {len(known) - 5} more" if len(known) > 5 else ""
-    listed = ", ".join(f"'{each[:60]}'" for each in known[:5])
-    raise ValueError(f"has no submesh '{name[:60]}'; it has {listed}{more}")
+    listed = ", ".join(f"'{each[:60]}'" for each in known[:5]) or "none with a name"
+    raise ValueError(f"has no submesh '{name[:60]}'; it has {listed}{', ...' if len(known) > 5 else ''}")
 
 
 def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
@@ -78,54 +76,33 @@ def check_count(faces: int) -> None:
 
 
 def read_obj(data: bytes) -> list[Part]:
-    """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises ValueError, IndexError."""
-    import trimesh
+    """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises ValueError.
 
-    check_count(data.count(b"\nf "))
-    text, names = _plain(data.decode("utf-8", errors="replace"))
-    scene = trimesh.load_scene(BytesIO(text.encode()), "obj", process=False, skip_materials=True, split_objects=True)
-    if not names:
-        return []
-    return parts_of((names[number], scene.geometry[str(number)]) for number in range(len(names)))
-
-
-def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
-    """An OBJ file with only vertices and faces, in objects called 0, 1, ..., and the original names of these objects.
-
-    trimesh silently misreads negative indices, the index 0, white space other than single blanks, and corners with and
-    without `/` in one object; and it joins the names of object and group.
+    Not by trimesh: it misreads negative indices, the index 0 and white space, and joins the names of object and group.
     """
-    vertices: list[str] = []
-    objects: dict[tuple[str, ...], list[str]] = {}
+    check_count(data.count(b"\nf "))
+    vertices: list[list[str]] = []
+    objects: dict[tuple[str, ...], list[tuple[int, int, int]]] = {}
     name, group = "", ""
-    for line in text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
+    for line in data.decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
         word, *rest = line.partition("#")[0].split() or [""]
         if word == "v":
-            vertices.append("v " + " ".join(rest[:3]))
+            vertices.append(rest[:3])
         elif word == "f" and len(rest) > 2:
-            heads = [corner.partition("/")[0] for corner in rest]
-            # Plain positive numbers, as almost all are, need no look at each.
-            digits = "".join(heads)
-            if not (digits.isascii() and digits.isdecimal() and all(heads)) or any(head[0] == "0" for head in heads):
-                heads = [str(_counted(head, len(vertices))) for head in heads]
-            corners = " ".join(heads)
+            numbers = [int(corner.partition("/")[0]) for corner in rest]
+            # Negative numbers count back from the last vertex before the face.
+            first, *others = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
+            if 0 in numbers or min(first, *others) < 0:
+                raise ValueError(f"a face refers to the vertex {min(numbers)}, which does not exist")
             # Without objects, groups serve as objects.
-            objects.setdefault((name, group) if name else (group,), []).append("f " + corners)
+            faces = objects.setdefault((name, group) if name else (group,), [])
+            faces += [(first, second, third) for second, third in pairwise(others)]
         elif word == "o":
             name, group = " ".join(rest), ""
         elif word == "g":
             group = " ".join(rest)
-    faces = [line for number, lines in enumerate(objects.values()) for line in (f"o {number}", *lines)]
-    return "\n".join([*vertices, *faces]), list(objects)
-
-
-def _counted(corner: str, vertices: int) -> int:
-    """The 1-based index of a corner's vertex; negative ones count back from the last of the `vertices` before the face."""
-    number = int(corner)
-    counted = number if number > 0 else vertices + 1 + number
-    if number == 0 or counted < 1:
-        raise ValueError(f"a face refers to the vertex {number}, which does not exist")
-    return counted
+    points = np.array(vertices, dtype=float) if objects else np.zeros((0, 3))
+    return [_part(names, points, np.array(faces)) for names, faces in objects.items()]
 
 
 def read_stl(data: bytes) -> list[Part]:

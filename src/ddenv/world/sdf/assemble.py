@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from ddenv.world.model import Joint, Link, Model, is_ground
 from ddenv.world.pose import ONE, Pose, Vector, vector
@@ -27,10 +27,10 @@ class Saved:
     """The entry of one model in `<state>`; poses are in the world frame."""
 
     element: Element
-    pose: Pose | None = None
-    scale: Vector = ONE
-    links: dict[str, Pose] = field(default_factory=dict)
-    models: dict[str, Saved] = field(default_factory=dict)
+    pose: Pose | None
+    scale: Vector
+    links: dict[str, Pose]
+    models: dict[str, Saved]
 
 
 def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: Context) -> Model:
@@ -42,26 +42,39 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
     builder = _Builder(static, context)
     builder.add(Spot(outer.inside(part), nominal, actual), saved)
     if not builder.links:
-        builder.links.append(_nothing(part.element, actual, static, context))
+        # Only a static model may have none, for example if it only holds a plugin.
+        if not static:
+            raise complain(part.element, "has no <link>")
+        context.note("ignored", part.element, "it has no <link>: nothing can touch it")
+        builder.links.append(Link("link", actual, None, (), ()))
     if saved is not None:
         _note_move(list(builder.poses.values()), saved, context)
-    spans = [(one.start, one.end) for one in (part.at, None if saved is None else saved.element) if one is not None]
+    pulled = [truth(link, "gravity", True) for link in builder.elements]
     model = Model(
         name=name,
         pose=actual,
         static=static,
         links=tuple(builder.links),
         joints=tuple(builder.joints),
-        spans=tuple(spans),
+        spans=tuple((one.start, one.end) for one in (part.at, *([saved.element] if saved else []))),
         line=part.at.line,
-        gravity=static or any(truth(link, "gravity", True) for link in builder.elements),
+        gravity=static or any(pulled),
         self_collide=any(builder.self_collide),
     )
     if static:
         return model
     check_tree(builder.joints, part.element)
-    _note_differences(builder, part.element, context)
-    return _held(model, part.element, context) if is_ground(model) else model
+    # These settings differ between links, but are simulated for the model as a whole.
+    if any(pulled) and not all(pulled):
+        light = next(builder.elements[pulled.index(False)].iter("gravity"))
+        context.note("ignored", light, "gravity acts on all links of a model or on none")
+    if any(builder.self_collide) and not all(builder.self_collide):
+        context.note("replaced", part.element, "self-collision of some links by self-collision of all links")
+    if not is_ground(model):
+        return model
+    context.note("replaced", part.element, "static, since an infinite plane does not move")
+    links = tuple(replace(link, inertia=None) for link in model.links)
+    return replace(model, static=True, links=links, joints=())
 
 
 class _Builder:
@@ -71,8 +84,7 @@ class _Builder:
     """
 
     def __init__(self, static: bool, context: Context) -> None:
-        self.static = static
-        self.context = context
+        self.static, self.context = static, context
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.elements: list[Element] = []
@@ -111,14 +123,10 @@ class _Builder:
         if name in self.poses:
             raise complain(element, "this link name is used twice; give each link of the model its own name")
         local = spot.scope.place(element)
-        pose = LinkPose(spot.nominal @ local, spot.actual @ local)
-        if saved is not None and own in saved.links:
-            pose = LinkPose(pose.nominal, saved.links[own])
-        self.poses[name] = pose
+        there = spot.actual @ local if saved is None else saved.links.get(own, spot.actual @ local)
+        self.poses[name] = LinkPose(spot.nominal @ local, there)
         self.elements.append(element)
-        at, scale, moving = pose.actual, spot.scale, not self.static
-        link = read_link(element, spot.scope, self.context, name=name, pose=at, local=local, scale=scale, moving=moving)
-        self.links.append(link)
+        self.links.append(read_link(element, spot, self.context, there, local, moving=not self.static))
 
     def _add_part(self, part: Part, spot: Spot, outer: Saved | None) -> None:
         local = spot.scope.placed(part)
@@ -139,43 +147,15 @@ def _is_static(part: Part) -> bool:
     return truth(part.element, "static", False) if part.static is None else part.static
 
 
-def _nothing(element: Element, pose: Pose, static: bool, context: Context) -> Link:
-    """The link of a model without links: only a static model may have none, for example if it only holds a plugin."""
-    if not static:
-        raise complain(element, "has no <link>")
-    context.note("ignored", element, "it has no <link>: nothing can touch it")
-    return Link("link", pose, None, (), ())
-
-
-def _held(model: Model, element: Element, context: Context) -> Model:
-    """`model`, a ground that the file calls dynamic, made static, as simulators do."""
-    context.note("replaced", element, "static, since an infinite plane does not move")
-    links = tuple(replace(link, inertia=None) for link in model.links)
-    return replace(model, static=True, links=links, joints=())
-
-
 def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
-    distances = [math.dist(pose.nominal.position, pose.actual.position) for pose in poses]
+    farthest = max((math.dist(pose.nominal.position, pose.actual.position) for pose in poses), default=0.0)
     turns = [math.hypot(*(pose.nominal.inverse() @ pose.actual).quaternion[1:]) for pose in poses]
-    farthest = max(distances, default=0.0)
-    if farthest > MOVED:
-        context.note("replaced", saved.element, "its own <pose> by the one in <state>", f"{farthest:.2f} m away")
-    elif max(turns, default=0.0) > MOVED:
-        context.note("replaced", saved.element, "its own <pose> by the one in <state>", "turned")
+    if farthest > MOVED or max(turns, default=0.0) > MOVED:
+        how = f"{farthest:.2f} m away" if farthest > MOVED else "turned"
+        context.note("replaced", saved.element, "its own <pose> by the one in <state>", how)
     if saved.scale != ONE:
         scale = " ".join(f"{part:g}" for part in saved.scale)
         context.note("replaced", saved.element, f"its sizes by those with <scale> {scale}")
-
-
-def _note_differences(builder: _Builder, element: Element, context: Context) -> None:
-    """Notes settings that differ between links, but are simulated for the model as a whole."""
-    pulled = [truth(link, "gravity", True) for link in builder.elements]
-    if any(pulled) and not all(pulled):
-        light = builder.elements[pulled.index(False)].find("gravity")
-        assert light is not None
-        context.note("ignored", light, "gravity acts on all links of a model or on none")
-    if any(builder.self_collide) and not all(builder.self_collide):
-        context.note("replaced", element, "self-collision of some links by self-collision of all links")
 
 
 def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
@@ -197,29 +177,17 @@ def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
 
 def _saved(model: Element, context: Context) -> Saved:
     scale = model.find("scale")
-    return Saved(
-        element=model,
-        pose=_pose(model),
-        scale=ONE if scale is None else _scale(scale),
-        links={name_of(link): pose for link in model.findall("link") if (pose := _still(link, context)) is not None},
-        models={name_of(inner): _saved(inner, context) for inner in model.findall("model")},
-    )
-
-
-def _still(link: Element, context: Context) -> Pose | None:
-    velocity = link.find("velocity")
-    if velocity is not None and any(abs(part) > STILL for part in floats(velocity)):
-        context.note("ignored", velocity, "every run starts at rest")
-    return _pose(link)
+    factors = ONE if scale is None else vector(numbers(scale, 3))
+    if scale is not None and (min(factors) < 1e-6 or max(factors) > 1e6):
+        raise complain(scale, f"a scale must be from 1e-06 to 1e+06, found '{text_of(scale)[:60]}'")
+    for velocity in model.findall("link/velocity"):
+        if any(abs(part) > STILL for part in floats(velocity)):
+            context.note("ignored", velocity, "every run starts at rest")
+    links = {name_of(link): pose for link in model.findall("link") if (pose := _pose(link)) is not None}
+    models = {name_of(inner): _saved(inner, context) for inner in model.findall("model")}
+    return Saved(model, _pose(model), factors, links, models)
 
 
 def _pose(holder: Element) -> Pose | None:
     element = holder.find("pose")
     return None if element is None or not text_of(element) else pose_of(element)
-
-
-def _scale(element: Element) -> Vector:
-    values = numbers(element, 3)
-    if min(values) < 1e-6 or max(values) > 1e6:
-        raise complain(element, f"a scale must be from 1e-06 to 1e+06, found '{text_of(element)[:60]}'")
-    return vector(values)

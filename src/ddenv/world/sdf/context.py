@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
-from ddenv.world.access import MissingFiles, Unusable
+from ddenv.world.access import MissingFiles
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
@@ -77,7 +76,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `files` the parsed files. `canonical` has the link that a model's own frame is attached to, by the `id` of its `<model>`.
+    lists, `files` the parsed files.
     """
 
     resources: Resources
@@ -89,7 +88,6 @@ class Context:
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
-    canonical: dict[int, str | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)
@@ -101,8 +99,7 @@ class Context:
     def note_unused(self, root: Element) -> None:
         """Notes the stand-ins that nothing asked for: probably typing errors."""
         # `auto` asks for nothing as long as nothing is missing.
-        asked = {uri for uri, stand_in in self.stand_ins.items() if stand_in != AUTO}
-        for uri in sorted(asked - self.used):
+        for uri in sorted(uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used):
             self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
 
     def complain_of_missing(self) -> None:
@@ -110,10 +107,9 @@ class Context:
         if not self.missing:
             return
         (_, first), *others = self.missing.items()
-        names = ", ".join(f"'{uri[:100]}'" for uri, _ in others[:5])
         more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-        message = f"{first}; also missing: {names}{more}" if others else str(first)
-        raise MissingFiles(message, list(self.missing))
+        also = f"; also missing: {', '.join(repr(uri[:100]) for uri, _ in others[:5])}{more}" if others else ""
+        raise MissingFiles(f"{first}{also}", list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
@@ -130,16 +126,6 @@ class Context:
         """Whether the user wants a guessed shape for `uri`, which is missing."""
         key = matching(self.stand_ins, uri)
         return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
-
-    def root(self, element: Element, uri: str, convert: Callable[[bytes, Path, Context], Element]) -> Element:
-        """The `<sdf>` that `convert` makes of the file that `element` includes. Raises Missing, and UserError for another file."""
-        try:
-            path, text = self.resources.sdf(uri, element.source.parent)
-        except Unusable as error:
-            raise complain(element, f"'{uri[:200]}' cannot be included: {error}") from None
-        if path not in self.files:
-            self.files[path] = convert(text, path, self)
-        return self.files[path]
 
 
 def sdf_root(text: bytes, path: Path) -> Element:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,11 @@ class Source:
         """`name` with the namespace before it; `world` has none."""
         return name if name == WORLD or not self.namespace else f"{self.namespace}::{name}"
 
+    def inner(self, keys: Mapping[str, Node]) -> str:
+        """The namespace that `model_namespace` of a directive says. Raises UserError."""
+        own = keys.get("model_namespace")
+        return self.namespace if own is None else self.scoped(self.text_of(own))
+
     def bytes_of(self, span: Span) -> Span:
         """Byte positions in the encoded text for positions in the text."""
         if self.text.isascii():
@@ -95,7 +100,7 @@ class Source:
                 near = nearest(key[:80], known)
                 raise self.complain(node, f"{what}: unknown key '{key[:80]}'{near}; allowed are {', '.join(known)}")
         for key in keys:
-            if key.startswith("*") and key[1:] not in found:
+            if key[0] == "*" and key[1:] not in found:
                 raise self.complain(node, f"{what}: {key[1:]} is missing")
         return found
 
@@ -107,20 +112,20 @@ class Source:
 
     def numbers(self, node: Node, count: int) -> tuple[float, ...]:
         """A list of `count` finite numbers. Raises UserError."""
-        found = [self.number(item) for item in self.items(node)]
-        if len(found) != count:
-            raise self.complain(node, f"expected {count} numbers, found {len(found)}")
-        return tuple(found)
+        items = self.items(node)
+        if len(items) != count:
+            raise self.complain(node, f"expected {count} numbers, found {len(items)}")
+        return tuple(map(self.number, items))
 
     def number(self, node: Node) -> float:
         """A finite number. Raises UserError."""
+        said = node.value if isinstance(node, ScalarNode) else "something else"
         try:
-            number = float(node.value) if isinstance(node, ScalarNode) and "_" not in node.value else math.nan
+            number = math.nan if "_" in said else float(said)
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            said = node.value[:60] if isinstance(node, ScalarNode) else "something else"
-            raise self.complain(node, f"expected a finite number, found {said!r}")
+            raise self.complain(node, f"expected a finite number, found {said[:60]!r}")
         return number
 
     def pose(self, node: Node | None, *, with_base: bool = True) -> tuple[Node | None, Pose]:
@@ -164,22 +169,6 @@ class Directive:
     source: Source
     span: Span
 
-    @property
-    def line(self) -> int:
-        return int(self.node.start_mark.line) + 1
-
-
-@dataclass
-class Opened:
-    """The directives of a file and of all that it opens, in order. `flat` is one text for all of them, if others were opened.
-
-    `files` are the parsed ones: the items with their places, and whether commas separate them.
-    """
-
-    directives: list[Directive] = field(default_factory=list)
-    flat: bytes | None = None
-    files: dict[Path, list[tuple[Node, Span, bool]]] = field(default_factory=dict)
-
 
 class _Loader(yaml.SafeLoader):
     """Composes nodes; an alias could stand for endless text, and without its anchor it stands for nothing."""
@@ -191,75 +180,23 @@ class _Loader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-def opened(text: bytes, path: Path, context: Context) -> Opened:
-    """The directives in `text`, the content of `path`. Raises UserError with file and line."""
-    found = Opened()
-    pieces = _open(Source(path, _decoded(text, path)), (path,), context, found)
-    if any(one.kind == "add_directives" for one in found.directives):
-        found.flat = _joined(text.decode(), pieces)
-    return found
+def opened(text: bytes, path: Path, context: Context) -> tuple[list[Directive], bytes | None]:
+    """The directives in `text`, the content of `path`, and of all that they open, in order; one text for all of them, if others
+    were opened. Raises UserError with file and line.
+    """
+    found: list[Directive] = []
+    pieces = _open(_source(text, path), (path,), context, found)
+    if all(one.kind != "add_directives" for one in found):
+        return found, None
+    flat = text.decode()
+    for (start, end), piece in reversed(pieces):
+        flat = flat[:start] + piece + flat[end:]
+    return found, flat.encode()
 
 
-def _open(source: Source, files: tuple[Path, ...], context: Context, found: Opened) -> list[tuple[Span, str]]:
+def _open(source: Source, files: tuple[Path, ...], context: Context, found: list[Directive]) -> list[tuple[Span, str]]:
     """Adds the directives of `source` to `found`; returns what to write in place of each `add_directives` of the outermost file."""
     pieces = []
-    if source.path not in found.files:
-        found.files[source.path] = list(_nodes(source))
-    for node, (start, end), in_flow in found.files[source.path]:
-        if len(source.pairs(node)) != 1:
-            raise source.complain(node, f"expected one directive: {', '.join(KEYS)}")
-        ((kind, value),) = source.pairs(node).items()
-        if kind not in KEYS:
-            raise source.complain(node, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KEYS))}")
-        one = Directive(kind, source.keys(value, kind, KEYS[kind]), node, source, source.bytes_of((start, end)))
-        if len(found.directives) >= MOST:
-            raise source.complain(node, f"more than {MOST} directives")
-        found.directives.append(one)
-        if kind == "add_directives":
-            first = len(found.directives)
-            inner = _inner(one, files, context)
-            _open(inner, (*files, inner.path), context, found)
-            if len(files) > 1:
-                continue
-            texts = [_flat(each) for each in found.directives[first:] if each.kind != "add_directives"]
-            new_line = "\n" + " " * (start - source.text.rfind("\n", 0, start) - 1)
-            block = new_line.join(f"- {each}" for each in texts)
-            pieces.append(((start, end), "".join(f"{each}, " for each in texts) if in_flow else block))
-    return pieces
-
-
-def _file(one: Directive, context: Context) -> tuple[Path, bytes]:
-    """Path and content of the directives that `one` opens. Raises UserError."""
-    node = one.keys["file"]
-    uri = one.source.text_of(node)
-    try:
-        return context.resources.sdf(uri, one.source.path.parent)
-    except Missing as missing:
-        why = f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path"
-        raise one.source.complain(node, why) from None
-    except Unusable as error:
-        raise one.source.complain(node, f"'{uri[:200]}' cannot be opened: {error}") from None
-
-
-def _inner(one: Directive, files: tuple[Path, ...], context: Context) -> Source:
-    path, text = _file(one, context)
-    if path in files:
-        chain = " opens ".join(each.name for each in (*files[files.index(path) :], path))
-        raise one.source.complain(one.keys["file"], f"add_directives form a cycle: {chain}")
-    own = one.keys.get("model_namespace")
-    namespace = one.source.namespace if own is None else one.source.scoped(one.source.text_of(own))
-    return Source(path, _decoded(text, path), namespace)
-
-
-def _decoded(text: bytes, path: Path) -> str:
-    try:
-        return text.decode()
-    except UnicodeDecodeError:
-        raise UserError(f"{path}: cannot be decoded; save it as UTF-8") from None
-
-
-def _nodes(source: Source) -> Iterator[tuple[Node, Span, bool]]:
-    """The items of `directives:` with their places in the text, and whether they are separated by commas."""
     try:
         root = _Loader(source.text).get_single_node()
     except (yaml.YAMLError, ValueError) as error:
@@ -268,8 +205,50 @@ def _nodes(source: Source) -> Iterator[tuple[Node, Span, bool]]:
         raise UserError(f"{source.path}: the file is empty; expected directives")
     listed: Any = source.keys(root, "file", ("*directives",))["directives"]
     source.items(listed)
-    for node, span in spans_of(source, listed):
-        yield node, span, bool(listed.flow_style)
+    for node, (start, end) in spans_of(source, listed):
+        if len(source.pairs(node)) != 1:
+            raise source.complain(node, f"expected one directive: {', '.join(KEYS)}")
+        ((kind, value),) = source.pairs(node).items()
+        if kind not in KEYS:
+            raise source.complain(node, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KEYS))}")
+        one = Directive(kind, source.keys(value, kind, KEYS[kind]), node, source, source.bytes_of((start, end)))
+        if len(found) >= MOST:
+            raise source.complain(node, f"more than {MOST} directives")
+        found.append(one)
+        if kind == "add_directives":
+            first = len(found)
+            inner = _inner(one, files, context)
+            _open(inner, (*files, inner.path), context, found)
+            if len(files) == 1:
+                texts = [_flat(each) for each in found[first:] if each.kind != "add_directives"]
+                new_line = "\n" + " " * (start - source.text.rfind("\n", 0, start) - 1)
+                block = new_line.join(f"- {each}" for each in texts)
+                pieces.append(((start, end), "".join(f"{each}, " for each in texts) if listed.flow_style else block))
+    return pieces
+
+
+def _inner(one: Directive, files: tuple[Path, ...], context: Context) -> Source:
+    """The directives that `one` opens. Raises UserError."""
+    node, source = one.keys["file"], one.source
+    uri = source.text_of(node)
+    try:
+        path, text = context.resources.sdf(uri, source.path.parent)
+    except Missing as missing:
+        why = f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path"
+        raise source.complain(node, why) from None
+    except Unusable as error:
+        raise source.complain(node, f"'{uri[:200]}' cannot be opened: {error}") from None
+    if path in files:
+        chain = " opens ".join(each.name for each in (*files[files.index(path) :], path))
+        raise source.complain(node, f"add_directives form a cycle: {chain}")
+    return _source(text, path, source.inner(one.keys))
+
+
+def _source(text: bytes, path: Path, namespace: str = "") -> Source:
+    try:
+        return Source(path, text.decode(), namespace)
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: cannot be decoded; save it as UTF-8") from None
 
 
 def spans_of(source: Source, listed: Any) -> list[tuple[Any, Span]]:
@@ -298,48 +277,35 @@ def _end(node: Any) -> int:
     return _end(last[1] if isinstance(node, MappingNode) else last)
 
 
-def _joined(text: str, pieces: list[tuple[Span, str]]) -> bytes:
-    for (start, end), piece in reversed(pieces):
-        text = text[:start] + piece + text[end:]
-    return text.encode()
-
-
 def _flat(one: Directive) -> str:
     """A directive on one line, its names as seen from the outermost file."""
     node, source = deepcopy(one.node), one.source
     keys = source.pairs(source.pairs(node)[one.kind])
-    for named in _names(one.kind, keys, source):
-        named.value = source.scoped(named.value)
+    groups = [
+        node for key in ("member_groups", "ignored_collision_filter_groups") if key in keys for node in keys[key].value
+    ]
+    named = [*groups, *(keys["members"].value if "members" in keys else ())]
+    named += [keys[key] for key in ("parent", "child") if key in keys]
+    # A frame of the world is in no namespace.
+    if "name" in keys and (one.kind != "add_frame" or "::" in keys["name"].value):
+        named.append(keys["name"])
+    poses = [keys["X_PF"]] if "X_PF" in keys else []
+    poses += source.pairs(keys["default_free_body_pose"]).values() if "default_free_body_pose" in keys else ()
+    named += [base for pose in poses if (base := source.pairs(pose).get("base_frame")) is not None]
+    for each in named:
+        each.value = source.scoped(each.value)
     if one.kind == "add_collision_filter_group":
         # Drake takes no scopes in the names of groups.
-        lists = [keys[key].value for key in ("member_groups", "ignored_collision_filter_groups") if key in keys]
-        for group in (keys["name"], *chain(*lists)):
+        for group in (keys["name"], *groups):
             group.value = group.value.replace("::", ".")
     if one.kind == "add_model" and "://" not in keys["file"].value:
         keys["file"].value = f"file://{(source.path.parent / keys['file'].value).absolute()}"
-    return _on_one_line(node)
-
-
-def _names(kind: str, keys: dict[str, Node], source: Source) -> Iterator[Node]:
-    """The names in a directive that are seen from the namespace of its file."""
-    listed = [keys[key] for key in ("members", "member_groups", "ignored_collision_filter_groups") if key in keys]
-    yield from (node for each in listed for node in each.value)
-    # A frame of the world is in no namespace.
-    if "name" in keys and (kind != "add_frame" or "::" in keys["name"].value):
-        yield keys["name"]
-    yield from (keys[key] for key in ("parent", "child") if key in keys)
-    poses = [keys["X_PF"]] if "X_PF" in keys else []
-    poses += source.pairs(keys["default_free_body_pose"]).values() if "default_free_body_pose" in keys else ()
-    yield from (base for pose in poses if (base := source.pairs(pose).get("base_frame")) is not None)
-
-
-def _on_one_line(node: Any) -> str:
-    left = [node]
+    left: list[Any] = [node]
     while left:
         each = left.pop()
         if isinstance(each, ScalarNode):
             each.style = "'" if each.style in ("|", ">") else each.style
             continue
         each.flow_style = True
-        left += [one for pair in each.value for one in pair] if isinstance(each, MappingNode) else each.value
+        left += chain(*each.value) if isinstance(each, MappingNode) else each.value
     return str(yaml.serialize(node, Dumper=yaml.SafeDumper, width=math.inf, allow_unicode=True)).strip()

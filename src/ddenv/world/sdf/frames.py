@@ -9,7 +9,7 @@ from pathlib import Path
 from ddenv.schemas import nearest
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.context import Context, version
-from ddenv.world.sdf.includes import Part, parts
+from ddenv.world.sdf.includes import Part, included
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 
 # Maximum distance from the origin of a frame, m: larger numbers lose their millimetres.
@@ -22,14 +22,16 @@ class Scope:
     """The frames inside one `<model>` or `<world>`; all poses are relative to its own frame."""
 
     def __init__(
-        self,
-        element: Element,
-        files: tuple[Path, ...],
-        context: Context,
-        scopes: dict[int, Scope] | None = None,
+        self, element: Element, files: tuple[Path, ...], context: Context, scopes: dict[int, Scope] | None = None
     ) -> None:
         self.element = element
-        self.parts = parts(element, files, context)
+        # The models directly inside, in the file's order.
+        self.parts: list[Part] = []
+        for child in element:
+            if child.tag == "model":
+                self.parts.append(Part(child, child, name_of(child), files))
+            elif child.tag == "include" and (part := included(child, files, context)) is not None:
+                self.parts.append(part)
         self._context = context
         self._poses: dict[str, Pose] = {}
         # All scopes inside the outermost one, by the `id` of their element.
@@ -55,19 +57,36 @@ class Scope:
     def pose(self, name: str, asker: Element) -> Pose:
         """The pose of the frame called `name`; errors point at `asker`. Raises UserError."""
         # A loop, since chains of frames may be longer than Python's stack.
-        chain: dict[str, Element | Part] = {}
+        chain: dict[str, Pose] = {}
         at, asked_by = name, asker
         while not (at in OWN or at in self._poses or (at == WORLD and self.element.tag != "model")):
             if at in chain:
-                names = [*chain, at][list(chain).index(at) :]
-                raise complain(asker, f"the frames form a cycle: {shown(names)}")
-            chain[at] = self._find(at, asked_by)
-            at, asked_by = self._base(at, chain[at])
+                raise complain(asker, f"the frames form a cycle: {shown([*list(chain)[list(chain).index(at) :], at])}")
+            base, chain[at], asked_by = self._step(at, asked_by)
+            at = base
         pose = self._poses.get(at, HERE)
-        for each, thing in reversed(chain.items()):
-            pose = pose @ self._local(each, thing, asker)
+        for each, local in reversed(chain.items()):
+            pose = pose @ local
             self._poses[each] = pose
         return pose
+
+    def _step(self, name: str, asker: Element) -> tuple[str, Pose, Element]:
+        """The frame that `name` is placed relative to, its pose in that, and the element that says so. Raises UserError."""
+        thing = self.named.get(name)
+        if thing is None:
+            first, _, rest = name.partition("::")
+            if rest and isinstance(part := self.named.get(first), Part):
+                return first, self.inside(part).pose(rest, asker), asker
+            # A nearest match among thousands of names would take longer than reading the file.
+            hint = nearest(name[:80], [each[:80] for each in list(self.named)[:500]])
+            raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
+        if isinstance(thing, Part):
+            element, holder, default = thing.pose, thing.at, ""
+        else:
+            element, holder, default = thing.find("pose"), thing, _carrier(thing)
+        local = HERE if element is None else pose_of(element)
+        local = self._by_placement_frame(thing, local) if isinstance(thing, Part) else local
+        return _named_in(element) or default, local, holder if element is None else element
 
     def place(self, holder: Element, default: str = "") -> Pose:
         """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it names one."""
@@ -85,50 +104,57 @@ class Scope:
             self._context.note("ignored", element, "the attribute 'frame' has no effect since SDF 1.7; use relative_to")
         return local if base in OWN else self.pose(base, holder if element is None else element) @ local
 
-    def _find(self, name: str, asker: Element) -> Element | Part:
-        """The thing called `name`; for `a::b` inside a part, the part `a`. Raises UserError."""
-        thing = self.named.get(name)
-        if thing is not None:
-            return thing
-        first = self.named.get(name.split("::", 1)[0]) if "::" in name else None
-        if isinstance(first, Part):
-            return first
-        # A nearest match among thousands of names would take longer than reading the file.
-        hint = nearest(name[:80], [each[:80] for each in list(self.named)[:500]])
-        raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
-
-    def _base(self, name: str, thing: Element | Part) -> tuple[str, Element]:
-        """The frame that `thing` is placed relative to, and the element that says so; for `a::b` this is `a`."""
-        if isinstance(thing, Part):
-            element, holder = thing.pose, thing.at
-            base = _named_in(element) if name == thing.name else thing.name
-        else:
-            element, holder = thing.find("pose"), thing
-            default = {"joint": text_of(thing.find("child")), "frame": (thing.get("attached_to") or "").strip()}
-            base = _named_in(element) or default.get(thing.tag, "")
-        return base, holder if element is None else element
-
-    def _local(self, name: str, thing: Element | Part, asker: Element) -> Pose:
-        """The pose of `thing` in its base frame."""
-        if isinstance(thing, Part) and name != thing.name:
-            return self.inside(thing).pose(name.split("::", 1)[1], asker)
-        element = thing.pose if isinstance(thing, Part) else thing.find("pose")
-        pose = HERE if element is None else pose_of(element)
-        return self._by_placement_frame(thing, pose) if isinstance(thing, Part) else pose
-
     def _by_placement_frame(self, part: Part, pose: Pose) -> Pose:
         """The pose of `part`, if `pose` is that of its placement frame."""
         frame = part.placement_frame
         return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
 
+    def link(self, name: str, asker: Element) -> str | None:
+        """The link that the frame `name` of this model is attached to, such as `link` or `inner::link`; None if there is none.
+
+        Errors point at `asker`. Raises UserError.
+        """
+        seen: dict[str, None] = {}
+        while name not in OWN:
+            if name in seen:
+                raise complain(asker, f"the attachments of frames form a cycle: {shown([*seen, name])}")
+            seen[name] = None
+            thing = self.named.get(name)
+            first, _, rest = name.partition("::")
+            if thing is None:
+                thing = self.named.get(first) if rest else None
+                link = self.inside(thing).link(rest, asker) if isinstance(thing, Part) else None
+                return link and f"{first}::{link}"
+            if isinstance(thing, Part):
+                return self.inside(thing).canonical and f"{name}::{self.inside(thing).canonical}"
+            if thing.tag == "link":
+                return name
+            name = _carrier(thing)
+        return self.canonical
+
+    @cached_property
+    def canonical(self) -> str | None:
+        """The link that a model's own frame is attached to: its `canonical_link`, else its first link."""
+        named, first = self.element.get("canonical_link"), self.element.find("link")
+        if named:
+            return None if named in OWN else self.link(named, self.element)
+        if first is not None:
+            return name_of(first)
+        links = ((part.name, self.inside(part).canonical) for part in self.parts)
+        return next((f"{name}::{link}" for name, link in links if link is not None), None)
+
     def references(self) -> set[str]:
         """The names that poses and frames directly inside this world refer to."""
-        holders = [*self.element.findall("frame"), *(part.at for part in self.parts)]
-        named = [holder.get("attached_to") or "" for holder in holders]
-        for pose in (holder.find("pose") for holder in holders):
-            named.append(_named_in(pose))
+        frames = self.element.findall("frame")
+        named = [_carrier(frame) for frame in frames]
+        named += [_named_in(holder.find("pose")) for holder in (*frames, *(part.at for part in self.parts))]
         # A model's name may itself hold colons.
         return {name for each in named for name in (each, each.split("::", 1)[0]) if name}
+
+
+def _carrier(thing: Element) -> str:
+    """What a joint or a frame is fixed to; empty for a link."""
+    return text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
 
 
 def shown(names: list[str]) -> str:
@@ -146,7 +172,11 @@ def pose_of(element: Element) -> Pose:
         raise complain(element, f"rotation_format '{form[:40]}' is unknown; use euler_rpy or quat_xyzw")
     if form == "quat_xyzw":
         x, y, z, *turn = numbers(element, 7)
-        pose = Pose((x, y, z), _unit(element, (turn[3], turn[0], turn[1], turn[2])))
+        length = math.hypot(*turn)
+        if not 1e-9 < length < 1e9:
+            raise complain(element, "the quaternion has no usable length")
+        i, j, k, w = (part / length for part in turn)
+        pose = Pose((x, y, z), (w, i, j, k))
     else:
         x, y, z, *angles = numbers(element, 6)
         scale = math.pi / 180 if (element.get("degrees") or "").strip().lower() in ("1", "true") else 1.0
@@ -154,14 +184,6 @@ def pose_of(element: Element) -> Pose:
     if max(abs(x), abs(y), abs(z)) > FARTHEST:
         raise complain(element, f"is farther than {FARTHEST:g} m away")
     return pose
-
-
-def _unit(element: Element, quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    length = math.hypot(*quaternion)
-    if not 1e-9 < length < 1e9:
-        raise complain(element, "the quaternion has no usable length")
-    w, x, y, z = (part / length for part in quaternion)
-    return w, x, y, z
 
 
 def _named_in(pose: Element | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,14 +13,16 @@ from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
 from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import ONE, Pose, Vector, vector
+from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
-from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, truth
+from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
+from ddenv.world.write import primitive
 
 SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
+RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 
 @dataclass(frozen=True)
@@ -52,61 +55,49 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "mesh":
             return _mesh(element, parent, context, scale)
         case "polyline":
-            return Placed(_checked(_scaled(read_polyline(geometry, context), scale), element))
-        case "plane":
-            return _plane(element)
+            return Placed(_scaled(read_polyline(geometry, context), scale, element))
         case "empty":
             return None
-        case "heightmap" | "image":
-            _leave_out(element, parent, context)
+        case "heightmap" | "image" as tag:
+            seen = parent.tag == "visual"
+            if not seen and not context.ignores(tag):
+                raise refuse(element, f"a {tag} is not supported: nothing would collide with it")
+            why = f"a {tag} is not drawn" if seen else "left out by --ignore: nothing collides with it"
+            context.note("ignored", element, why)
             return None
-    return Placed(_primitive(element, scale))
+        case "plane":
+            size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", 2)
+            return Placed(Plane((size[0], size[1])), _turned(element.find("normal")))
+    return Placed(_scaled(_primitive(element), scale, element))
 
 
-def _primitive(element: Element, scale: Vector) -> Shape:
+def _primitive(element: Element) -> Shape:
     match element.tag:
         case "box":
-            return Box(vector(_sizes(element, "size", scale)))
+            return Box(vector(_sizes(element, "size", 3)))
         case "ellipsoid":
-            return Ellipsoid(vector(_sizes(element, "radii", scale)))
+            return Ellipsoid(vector(_sizes(element, "radii", 3)))
         case "sphere":
-            return Sphere(*_sizes(element, "radius", (max(scale),)))
+            return Sphere(*_sizes(element, "radius", 1))
         case "cylinder" | "capsule" | "cone" as tag:
-            (radius,), (length,) = _sizes(element, "radius", (max(scale[:2]),)), _sizes(element, "length", scale[2:])
             kinds: dict[str, Callable[[float, float], Shape]] = {"cylinder": Cylinder, "capsule": Capsule, "cone": cone}
-            return kinds[tag](radius, length)
+            return kinds[tag](*_sizes(element, "radius", 1), *_sizes(element, "length", 1))
     raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
 
 
-def _plane(element: Element) -> Placed:
-    x, y = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
-    normal = element.find("normal")
+def _turned(normal: Element | None) -> Pose:
+    """The shortest rotation from the z axis to a `<normal>`."""
     if normal is None:
-        return Placed(Plane((x, y)))
+        return HERE
     direction = np.array(numbers(normal, 3))
     length = float(np.linalg.norm(direction))
     if not 1e-9 < length < 1e9:
         raise complain(normal, "the normal has no usable length")
-    return Placed(Plane((x, y)), _turn_up_to(direction / length))
-
-
-def _turn_up_to(direction: np.ndarray) -> Pose:
-    """The shortest rotation from the z axis to a unit vector."""
-    x, y, z = (float(part) for part in direction)
+    x, y, z = (direction / length).tolist()
     if z < -1 + 1e-12:
         return Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
-    w = np.sqrt((1 + z) / 2)
-    return Pose((0.0, 0.0, 0.0), (float(w), float(-y / (2 * w)), float(x / (2 * w)), 0.0))
-
-
-def _leave_out(element: Element, parent: Element, context: Context) -> None:
-    """Notes a shape that is not supported. Raises UserError if the robot could collide with it."""
-    if parent.tag == "visual":
-        context.note("ignored", element, f"a {element.tag} is not drawn")
-    elif context.ignores(element.tag):
-        context.note("ignored", element, "left out by --ignore: nothing collides with it")
-    else:
-        raise refuse(element, f"a {element.tag} is not supported: nothing would collide with it")
+    w = math.sqrt((1 + z) / 2)
+    return Pose((0.0, 0.0, 0.0), (w, -y / (2 * w), x / (2 * w), 0.0))
 
 
 def _mesh(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:
@@ -124,7 +115,7 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
             reason = "left out" if stand_in == NONE else f"the {stand_in} shapes replace it"
             return Lost(element, uri, reason, stand_in)
         context.note("replaced", element, f"'{uri}' by the stand-in {text}")
-        return scaled(stand_in, scale)
+        return scaled(stand_in, scale, element)
     submesh = element.find("submesh")
     name = "" if submesh is None else text_of(submesh.find("name"))
     center = submesh is not None and truth(submesh, "center", False)
@@ -138,12 +129,12 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         context.note("replaced", element, f"'{uri}' by its convex hull")
     elif mesh.simplified:
         context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
-    return Placed(_checked(_scaled(mesh, _times(own, scale)), element))
+    return Placed(_scaled(mesh, _times(own, scale), element))
 
 
-def scaled(stand_in: Placed, scale: Vector) -> Placed:
-    """A stand-in in a model of this scale."""
-    return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.offset.position, scale)))
+def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:
+    """A stand-in for the mesh `element` in a model of this scale. Raises UserError."""
+    return Placed(_scaled(stand_in.shape, scale, element), Pose(_times(stand_in.offset.position, scale)))
 
 
 def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
@@ -159,22 +150,30 @@ def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
     )
 
 
-def _scaled(shape: Shape, scale: Vector) -> Shape:
-    if scale == ONE:
-        return shape
+def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
+    """`shape`, with its sizes along its own axes times `scale`. Raises UserError if it is too small or too large then."""
     match shape:
+        case _ if scale == ONE:
+            pass
         case Box(size):
-            return Box(_times(size, scale))
+            shape = Box(_times(size, scale))
         case Cylinder(radius, length) | Capsule(radius, length):
-            return replace(shape, radius=radius * max(scale[:2]), length=length * scale[2])
+            shape = replace(shape, radius=radius * max(scale[:2]), length=length * scale[2])
         case Sphere(radius):
-            return Sphere(radius * max(scale))
+            shape = Sphere(radius * max(scale))
         case Ellipsoid(radii):
-            return Ellipsoid(_times(radii, scale))
+            shape = Ellipsoid(_times(radii, scale))
         case Mesh(origin, vertices, faces):
             # Mirroring turns a surface inside out: reverse its faces.
             turned = faces[:, ::-1] if np.prod(scale) < 0 else faces
-            return Mesh(f"{origin} * {scale}", vertices * np.array(scale), turned)
+            shape = Mesh(f"{origin} * {scale}", vertices * np.array(scale), turned)
+    if isinstance(shape, Mesh):
+        sizes = [np.ptp(shape.vertices, axis=0).max(), max(np.abs(shape.vertices).max(), SMALLEST)]
+    else:
+        sizes = [size for each in primitive(shape)[1].values() for size in each]
+    if min(sizes) < SMALLEST or max(sizes) > LARGEST:
+        wrong = min(sizes) if min(sizes) < SMALLEST else max(sizes)
+        raise complain(element, f"{RANGE}, found {wrong:g} m after scaling")
     return shape
 
 
@@ -184,46 +183,25 @@ def _times(vector: Vector, scale: Vector) -> Vector:
     return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
 
 
-def _sizes(parent: Element, tag: str, scale: tuple[float, ...]) -> tuple[float, ...]:
-    """The numbers in the child `tag`, one for each factor of `scale` and multiplied by it. Raises UserError."""
+def _sizes(parent: Element, tag: str, count: int) -> tuple[float, ...]:
+    """The `count` sizes in the child `tag`. Raises UserError."""
     element = parent.find(tag)
     if element is None:
         raise complain(parent, f"has no <{tag}>")
-    values = tuple(value * factor for value, factor in zip(numbers(element, len(scale)), scale, strict=True))
+    values = numbers(element, count)
     if min(values) < SMALLEST or max(values) > LARGEST:
-        saved = f" times the saved scale {' '.join(f'{each:g}' for each in scale)}" if set(scale) != {1.0} else ""
-        raise complain(
-            element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found '{text_of(element)[:60]}'{saved}"
-        )
+        raise complain(element, f"{RANGE}, found '{text_of(element)[:60]}'")
     return values
-
-
-def _checked(shape: Shape, element: Element) -> Shape:
-    """`shape`, a mesh. Raises UserError if it is too small or too large."""
-    assert isinstance(shape, Mesh)
-    size, reach = np.ptp(shape.vertices, axis=0).max(), np.abs(shape.vertices).max()
-    if size < SMALLEST or reach > LARGEST:
-        raise complain(
-            element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found {max(size, reach):g} m after scaling"
-        )
-    return shape
 
 
 def read_polyline(geometry: Element, context: Context) -> Mesh:
     """The convex hull of all `<polyline>`s of a `<geometry>`, extruded upwards from z = 0. Raises UserError."""
     elements = geometry.findall("polyline")
-    height = number(elements[0], "height", 1.0)
-    if not SMALLEST <= height <= LARGEST:
-        given = elements[0].find("height")
-        raise complain(
-            elements[0] if given is None else given, f"the height must be from 1e-06 to 1e+06 m, found {height:g}"
-        )
+    height = 1.0 if elements[0].find("height") is None else _sizes(elements[0], "height", 1)[0]
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
         raise complain(elements[0], "needs at least three <point>s that are not on one line")
-    if np.abs(corners).max() > 1e6:
-        raise complain(elements[0], "is larger than 1e+06 m")
     filled = abs(polygon_area(outlines[0]))
     if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
         context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ddenv.world.access import Missing
+from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
@@ -46,19 +46,6 @@ class Part:
         return given or (self.element.get("placement_frame") or "").strip()
 
 
-def parts(element: Element, files: tuple[Path, ...], context: Context) -> list[Part]:
-    """The models directly inside a `<model>` or `<world>`, in the file's order. Raises UserError."""
-    found = []
-    for child in element:
-        if child.tag == "model":
-            found.append(Part(child, child, name_of(child), files))
-        elif child.tag == "include":
-            part = included(child, files, context)
-            if part is not None:
-                found.append(part)
-    return found
-
-
 def included(include: Element, files: tuple[Path, ...], context: Context) -> Part | None:
     """The model that `include` names by its URI; None if it is left out or missing. Raises UserError."""
     uri = text_of(include.find("uri"))
@@ -78,12 +65,16 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     if root.source in files:
         chain = " includes ".join(path.name for path in (*files[files.index(root.source) :], root.source))
         raise complain(include, f"the includes form a cycle: {chain}")
-    model = _only_model(root, include, context)
-    if model is None:
+    models = root.findall("model")
+    if not models and any(root.find(tag) is not None for tag in UNTOUCHABLE):
+        context.note("ignored", include, "nothing can touch it")
         return None
-    name = text_of(include.find("name")) or (_last_of(uri) if root.source.name.startswith(STAND_IN) else name_of(model))
+    if len(models) != 1:
+        found = f"{len(models)} <model> elements" if models else "no <model>"
+        raise complain(include, f"{root.source} holds {found}; expected one")
+    own = _last_of(uri) if root.source.name.startswith(STAND_IN) else name_of(models[0])
     static = truth(include, "static", False) if include.find("static") is not None else None
-    return Part(model, include, name, (*files, root.source), static)
+    return Part(models[0], include, text_of(include.find("name")) or own, (*files, root.source), static)
 
 
 def _last_of(uri: str) -> str:
@@ -93,54 +84,44 @@ def _last_of(uri: str) -> str:
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
     """The root of the included file; None if it is missing (noted or remembered in `context`)."""
+
+    def note(by: str) -> None:
+        outer, context.model = context.model, context.model or text_of(include.find("name")) or _last_of(uri)
+        context.note("replaced", include, f"'{uri}' by {by}")
+        context.model = outer
+
     given = context.stand_in(uri)
+    if given is not None and given[1] == NONE:
+        context.note("ignored", include, f"'{uri}' is left out as asked")
+        return None
     if given is not None:
-        text, stand_in = given
-        if stand_in == NONE:
-            context.note("ignored", include, f"'{uri}' is left out as asked")
-            return None
-        _note(include, uri, f"the stand-in {text}", context)
-        return _stand_in_root(include, text, stand_in)
+        note(f"the stand-in {given[0]}")
+        return _stand_in_root(include, *given)
     try:
-        root = context.root(include, uri, root_of)
+        path, text = context.resources.sdf(uri, include.source.parent)
+        if path not in context.files:
+            context.files[path] = root_of(text, path, context)
+        root = context.files[path]
         if root.source.parent == FOLDER and root.find("model") is not None:
-            _note(include, uri, "the one built into ddenv, which is like Gazebo's", context)
+            note("the one built into ddenv, which is like Gazebo's")
         return root
+    except Unusable as error:
+        raise complain(include, f"'{uri[:200]}' cannot be included: {error}") from None
     except Missing as missing:
         if context.may_guess(uri):
-            found = guess(uri)
-            _note(include, uri, f"a guess, {found.text}: {found.why}", context)
-            return _stand_in_root(include, found.text, found.stand_in)
+            stand_in, words, why, _ = guess(uri)
+            note(f"a guess, {words}: {why}")
+            return _stand_in_root(include, words, stand_in)
         if context.ignores("include"):
             context.note("ignored", include, f"'{uri}' was not found: {missing}")
             return None
-        error = complain(
-            include,
-            f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path, a shape for it with --stand-in "
-            f"'{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), have one guessed with --stand-in auto, "
-            "or leave it out with --ignore include",
+        remedies = (
+            f"give its folder with --model-path, a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, "
+            "sphere, ...), have one guessed with --stand-in auto, or leave it out with --ignore include"
         )
-        context.missing.setdefault(uri, error)
+        why = f"'{uri[:200]}' was not found ({missing}); {remedies}"
+        context.missing.setdefault(uri, complain(include, why))
         return None
-
-
-def _note(include: Element, uri: str, by: str, context: Context) -> None:
-    """Notes what replaces an included model, as a note of that model."""
-    outer = context.model
-    context.model = outer or text_of(include.find("name")) or _last_of(uri)
-    context.note("replaced", include, f"'{uri}' by {by}")
-    context.model = outer
-
-
-def _only_model(root: Element, include: Element, context: Context) -> Element | None:
-    models = root.findall("model")
-    if len(models) == 1:
-        return models[0]
-    if not models and any(root.find(tag) is not None for tag in UNTOUCHABLE):
-        context.note("ignored", include, "nothing can touch it")
-        return None
-    found = f"{len(models)} <model> elements" if models else "no <model>"
-    raise complain(include, f"{root.source} holds {found}; expected one")
 
 
 def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:

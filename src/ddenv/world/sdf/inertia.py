@@ -36,10 +36,8 @@ def read_inertia(
         return spread(collisions, density, link_pose, mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:
         computed = spread(collisions, density, link_pose, None)
-        why = (
-            f"mass {mass:g} kg is impossible: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
-        )
-        context.note("replaced", element, why)
+        why = f"{computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
+        context.note("replaced", element, f"mass {mass:g} kg is impossible: {why}")
         return computed
     tensor = element.find("inertia")
     place = element.find("pose")
@@ -49,10 +47,12 @@ def read_inertia(
     if tensor is not None:
         moments = vector(number_or_nan(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
         products = vector(number_or_nan(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
-        rounded = _rounded_up(moments, products)
-        if is_possible(rounded, products):
-            return Inertia(mass, link_pose @ pose, rounded, products)
-    said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 are impossible"
+        if possible := _possible(moments, products):
+            return Inertia(mass, link_pose @ pose, possible, products)
+    said = "no <inertia>"
+    if tensor is not None:
+        words = (text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
+        said = f"moments {' '.join(words)} kg m^2 are impossible"
     context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
     return spread(collisions, density, link_pose, mass)
 
@@ -68,17 +68,14 @@ def read_density(parent: Element, default: float) -> float:
     return density
 
 
-def _shown(tensor: Element) -> str:
-    return " ".join(text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
-
-
-def _rounded_up(moments: Vector, products: Vector) -> Vector:
-    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates."""
+def _possible(moments: Vector, products: Vector) -> Vector | None:
+    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates; None if no body can have them."""
     low, middle, high = _principal(moments, products)
     excess = high - low - middle
-    if not -1e-9 * high < excess < 1e-5 * high:
-        return moments
-    return vector(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
+    if -1e-9 * high < excess < 1e-5 * high:
+        moments = vector(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
+        low, middle, high = _principal(moments, products)
+    return moments if low > LEAST_MOMENT and high <= low + middle else None
 
 
 def _principal(moments: Vector, products: Vector) -> tuple[float, float, float]:
@@ -90,12 +87,6 @@ def _principal(moments: Vector, products: Vector) -> tuple[float, float, float]:
         return math.nan, math.nan, math.nan
     low, middle, high = np.linalg.eigvalsh(tensor).tolist()
     return low, middle, high
-
-
-def is_possible(moments: Vector, products: Vector) -> bool:
-    """Whether a body can have this inertia: principal moments are positive, and none exceeds the sum of the others."""
-    low, middle, high = _principal(moments, products)
-    return bool(low > LEAST_MOMENT and high <= low + middle)
 
 
 def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
@@ -116,10 +107,10 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
     tensor *= factor
     moments = vector(tensor[axis, axis] for axis in range(3))
     products = (float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2]))
-    moments = _rounded_up(moments, products)
-    if not is_possible(moments, products):
+    possible = _possible(moments, products)
+    if possible is None:
         return _ball(link_pose, total * factor)
-    return Inertia(total * factor, Pose(vector(middle)), moments, products)
+    return Inertia(total * factor, Pose(vector(middle)), possible, products)
 
 
 def _ball(link_pose: Pose, mass: float) -> Inertia:
@@ -142,7 +133,11 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
         case Cylinder(radius, length):
             return math.pi * radius**2 * length, origin, _cylinder(radius, length)
         case Capsule(radius, length):
-            return _capsule(radius, length)
+            tube, balls = math.pi * radius**2 * length, 4 / 3 * math.pi * radius**3
+            # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
+            across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
+            unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
+            return tube + balls, origin, unit / (tube + balls)
         case Mesh(_, vertices, faces):
             return _polyhedron(vertices[faces])
     raise TypeError(type(shape).__name__)
@@ -151,15 +146,6 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
 def _cylinder(radius: float, length: float) -> np.ndarray:
     across = radius**2 / 4 + length**2 / 12
     return np.diag([across, across, radius**2 / 2])
-
-
-def _capsule(radius: float, length: float) -> tuple[float, np.ndarray, np.ndarray]:
-    tube, balls = math.pi * radius**2 * length, 4 / 3 * math.pi * radius**3
-    volume = tube + balls
-    # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
-    across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
-    unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
-    return volume, np.zeros(3), unit / volume
 
 
 def _polyhedron(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from graphlib import CycleError, TopologicalSorter
 
 from ddenv.world.model import Joint
 from ddenv.world.pose import ONE, Pose, Vector
 from ddenv.world.sdf.context import Context, note_unread, refuse, version
-from ddenv.world.sdf.frames import OWN, WORLD, Scope, shown
-from ddenv.world.sdf.includes import Part
+from ddenv.world.sdf.frames import WORLD, Scope, shown
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, number, numbers, text_of, truth
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
@@ -62,7 +62,7 @@ def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> lis
 
 
 def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], context: Context) -> Joint:
-    parent, child = (_end(element, tag, spot, links, context) for tag in ("parent", "child"))
+    parent, child = (_end(element, tag, spot, links) for tag in ("parent", "child"))
     if parent == child:
         raise complain(element, f"joins '{child}' to itself")
     # By element, not by name: something else in the model may have the same name.
@@ -73,9 +73,10 @@ def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], 
         raise complain(element, f"a {kind} joint needs an <axis>")
     first = _axis(axis, spot, nominal)
     second = _second_axis(element, first, spot, nominal) if kind == "universal" else None
-    limit = None if axis is None or kind not in LIMITED else axis.find("limit")
-    dynamics = None if axis is None else axis.find("dynamics")
-    _note_unlimited(element, kind, context)
+    limit, dynamics = (None, None) if axis is None else (axis.find("limit"), axis.find("dynamics"))
+    effort, velocity = (_limit(limit, tag, -1.0) for tag in ("effort", "velocity"))
+    limit = limit if kind in LIMITED else None
+    _note_unread(element, kind, context)
     joint = Joint(
         name=spot.prefix + name_of(element),
         kind=kind,
@@ -83,10 +84,10 @@ def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], 
         child=child,
         pose=moved @ nominal,
         axis=moved.rotate(first),
-        lower=_limit_of(limit, "lower", -math.inf),
-        upper=_limit_of(limit, "upper", math.inf),
-        effort=_limit(axis, "effort"),
-        velocity=_limit(axis, "velocity"),
+        lower=_limit(limit, "lower", -math.inf),
+        upper=_limit(limit, "upper", math.inf),
+        effort=math.inf if effort < 0 else effort,
+        velocity=math.inf if velocity < 0 else velocity,
         damping=0.0 if dynamics is None else number(dynamics, "damping", 0.0),
         axis2=None if second is None else moved.rotate(second),
     )
@@ -97,13 +98,13 @@ def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], 
     return _relative_to_start(joint, first, links)
 
 
-def _end(element: Element, tag: str, spot: Spot, links: dict[str, LinkPose], context: Context) -> str:
+def _end(element: Element, tag: str, spot: Spot, links: dict[str, LinkPose]) -> str:
     """The full name of the link at one end of a joint, or `world`."""
     child = element.find(tag)
     name = text_of(child)
     if tag == "parent" and name == WORLD:
         return WORLD
-    link = link_of(spot.scope, name, element, context) if name else None
+    link = spot.scope.link(name, element) if name else None
     if link is None or spot.prefix + link not in links:
         raise complain(element if child is None else child, f"<{tag}> is not a link of this model: '{name[:80]}'")
     return spot.prefix + link
@@ -111,22 +112,20 @@ def _end(element: Element, tag: str, spot: Spot, links: dict[str, LinkPose], con
 
 def _axis(axis: Element | None, spot: Spot, joint_pose: Pose) -> Vector:
     """The unit vector of an `<axis>` in the world frame, at the nominal poses."""
-    element = None if axis is None else axis.find("xyz")
-    unit = (0.0, 0.0, 1.0) if element is None else _unit(element)
-    if element is not None and element.get("expressed_in"):
-        return (spot.nominal @ spot.scope.pose(element.get("expressed_in", ""), element)).rotate(unit)
-    in_model = (
-        axis is not None and version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5))
-    )
-    return (spot.nominal if in_model else joint_pose).rotate(unit)
-
-
-def _unit(element: Element) -> Vector:
-    x, y, z = numbers(element, 3)
-    length = math.sqrt(x * x + y * y + z * z)
-    if not 1e-9 < length < 1e9:
-        raise complain(element, "the axis has no usable length")
-    return x / length, y / length, z / length
+    if axis is None:
+        return joint_pose.rotate((0.0, 0.0, 1.0))
+    frame, unit, element = joint_pose, (0.0, 0.0, 1.0), axis.find("xyz")
+    if version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5)):
+        frame = spot.nominal
+    if element is not None:
+        x, y, z = numbers(element, 3)
+        length = math.sqrt(x * x + y * y + z * z)
+        if not 1e-9 < length < 1e9:
+            raise complain(element, "the axis has no usable length")
+        unit = x / length, y / length, z / length
+        if named := element.get("expressed_in"):
+            frame = spot.nominal @ spot.scope.pose(named, element)
+    return frame.rotate(unit)
 
 
 def _second_axis(element: Element, first: Vector, spot: Spot, joint_pose: Pose) -> Vector:
@@ -161,100 +160,35 @@ def _relative_to_start(joint: Joint, axis: Vector, links: dict[str, LinkPose]) -
     return replace(joint, lower=joint.lower - here, upper=joint.upper - here)
 
 
-def _note_unlimited(element: Element, kind: str, context: Context) -> None:
-    for axis in (element.find("axis"), element.find("axis2")):
-        limit = None if axis is None else axis.find("limit")
-        bounds = [] if limit is None else [limit.find("lower"), limit.find("upper")]
-        given = any(one is not None and abs(sum(floats(one))) < UNLIMITED for one in bounds)
-        if limit is not None and given and kind not in LIMITED:
+def _note_unread(element: Element, kind: str, context: Context) -> None:
+    for axis in (each for each in (element.find("axis"), element.find("axis2")) if each is not None):
+        limit, old = axis.find("limit"), axis.find("use_parent_model_frame")
+        bounds = [] if limit is None else [*limit.iter("lower"), *limit.iter("upper")]
+        if limit is not None and kind not in LIMITED and any(abs(sum(floats(one))) < UNLIMITED for one in bounds):
             context.note("ignored", limit, f"the limits of a {kind} joint")
-        old = None if axis is None else axis.find("use_parent_model_frame")
         if old is not None and version(old) >= (1, 7):
             context.note("ignored", old, "it has no effect since SDF 1.7")
 
 
-def _bound(value: float) -> float:
-    return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
-
-
-def _limit_of(limit: Element | None, tag: str, default: float) -> float:
+def _limit(limit: Element | None, tag: str, default: float) -> float:
     """The number in child `tag` of `limit`, which may be infinite, or `default`. Raises UserError."""
     child = None if limit is None else limit.find(tag)
     if child is None:
         return default
     values = floats(child)
-    return _bound(values[0]) if len(values) == 1 and math.isinf(values[0]) else _bound(numbers(child, 1)[0])
-
-
-def _limit(axis: Element | None, tag: str) -> float:
-    limit = None if axis is None else axis.find("limit")
-    value = _limit_of(limit, tag, -1.0)
-    return math.inf if value < 0 or value >= UNLIMITED else value
+    value = values[0] if len(values) == 1 and math.isinf(values[0]) else numbers(child, 1)[0]
+    return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
 
 
 def check_tree(joints: list[Joint], element: Element) -> None:
     """Raises UserError if joints close a loop, or if a link is the child of two joints."""
-    parents: dict[str, str] = {}
+    parents: dict[str, list[str]] = {}
     for joint in joints:
         if joint.child in parents:
-            raise complain(
-                element, f"link '{joint.child}' is the child of two joints; only trees of links are supported"
-            )
-        parents[joint.child] = joint.parent
-    # Every link has at most one parent: each path upwards ends at the root, at a link known to be safe, or in a loop.
-    safe: set[str] = set()
-    for start in parents:
-        path: dict[str, None] = {}
-        at: str | None = start
-        while at is not None and at not in safe:
-            if at in path:
-                raise complain(element, f"joints close a loop: {shown([*path, at][list(path).index(at) :])}")
-            path[at] = None
-            at = parents.get(at)
-        safe.update(path)
-
-
-def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
-    """The link that the frame `name` of a model is attached to, such as `link` or `inner::link`; None if there is none.
-
-    Errors point at `asker`. Raises UserError.
-    """
-    seen: dict[str, None] = {}
-    while name not in OWN:
-        if name in seen:
-            raise complain(asker, f"the attachments of frames form a cycle: {shown([*seen, name])}")
-        seen[name] = None
-        thing = scope.named.get(name)
-        if thing is None:
-            first, _, rest = name.partition("::")
-            model = scope.named.get(first) if "::" in name else None
-            return (
-                _joined(first, link_of(scope.inside(model), rest, asker, context)) if isinstance(model, Part) else None
-            )
-        if isinstance(thing, Part):
-            return _joined(name, _canonical(scope.inside(thing), asker, context))
-        if thing.tag == "link":
-            return name
-        name = text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
-    return _canonical(scope, asker, context)
-
-
-def _joined(model: str, link: str | None) -> str | None:
-    return None if link is None else f"{model}::{link}"
-
-
-def _canonical(scope: Scope, asker: Element, context: Context) -> str | None:
-    """The link that a model's own frame is attached to: its `canonical_link`, else its first link."""
-    key, found = id(scope.element), None
-    if key in context.canonical:
-        return context.canonical[key]
-    named, first = scope.element.get("canonical_link"), scope.element.find("link")
-    if named:
-        found = None if named in OWN else link_of(scope, named, asker, context)
-    elif first is not None:
-        found = name_of(first)
-    else:
-        links = (_joined(part.name, _canonical(scope.inside(part), asker, context)) for part in scope.parts)
-        found = next((link for link in links if link is not None), None)
-    context.canonical[key] = found
-    return found
+            why = f"link '{joint.child}' is the child of two joints; only trees of links are supported"
+            raise complain(element, why)
+        parents[joint.child] = [joint.parent]
+    try:
+        TopologicalSorter(parents).prepare()
+    except CycleError as error:
+        raise complain(element, f"joints close a loop: {shown(error.args[1])}") from None

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ddenv.world.extent import around, shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
-from ddenv.world.pose import HERE, Pose, Vector, vector
+from ddenv.world.pose import HERE, Pose, vector
 from ddenv.world.sdf.context import Context, note_unread
-from ddenv.world.sdf.frames import Scope, pose_of
+from ddenv.world.sdf.frames import pose_of
 from ddenv.world.sdf.geometry import Lost, read_shape, remedies, scaled
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
+from ddenv.world.sdf.joints import Spot
 from ddenv.world.sdf.standin import AUTO, NONE, Placed, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
@@ -52,19 +52,20 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 }
 
 
-def read_link(
-    element: Element, scope: Scope, context: Context, *, name: str, pose: Pose, local: Pose, scale: Vector, moving: bool
-) -> Link:
-    """The link of `element`, with its full `name`, its `pose` in the world, `local` in its model, and the `scale` from `<state>`.
-
-    Raises UserError.
-    """
+def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose, *, moving: bool) -> Link:
+    """The link of `element` in the model at `spot`, with its `pose` in the world, and `local` in its model. Raises UserError."""
     note_unread(element, context)
-    children = (child for child in element if child.tag in ("collision", "visual"))
-    items = [_item(child, scope, local, scale, context) for child in children]
-    collisions, density = [], []
+    items = []
+    for child in (child for child in element if child.tag in ("collision", "visual")):
+        note_unread(child, context)
+        name_of(child)
+        own, place = child.find("pose"), spot.scope.place(child)
+        if own is not None and (own.get("relative_to") or own.get("frame")):
+            place = local.inverse() @ place
+        items.append(_Item(child, place, read_shape(child, context, spot.scale)))
     inertial = element.find("inertial")
     usual = WATER if inertial is None else read_density(inertial, WATER)
+    collisions, density, visuals = [], [], []
     for item in items:
         if item.element.tag == "collision":
             placed = _settled(item, items, element, context)
@@ -77,7 +78,13 @@ def read_link(
     kinematic = element.find("kinematic")
     if kinematic is not None and moving and truth(element, "kinematic", False):
         context.note("ignored", kinematic, "forces move it like any other link")
-    return Link(name, pose, inertia, tuple(collisions), tuple(_visuals(items, pose, context)))
+    for item in items:
+        if isinstance(item.shape, Lost) and item.element.tag == "visual":
+            context.note("ignored", item.shape.element, f"'{item.shape.uri}' is not drawn: {item.shape.reason}")
+        elif isinstance(item.shape, Placed) and item.element.tag == "visual":
+            place = pose @ item.pose @ item.shape.offset
+            visuals.append(Visual(name_of(item.element), item.shape.shape, place, read_color(item.element)))
+    return Link(spot.prefix + name_of(element), pose, inertia, tuple(collisions), tuple(visuals))
 
 
 @dataclass(frozen=True)
@@ -87,16 +94,6 @@ class _Item:
     element: Element
     pose: Pose
     shape: Placed | Lost | None
-
-
-def _item(child: Element, scope: Scope, link: Pose, scale: Vector, context: Context) -> _Item:
-    """`link` is the pose of the link in its model."""
-    note_unread(child, context)
-    name_of(child)
-    pose, place = child.find("pose"), scope.place(child)
-    if pose is not None and (pose.get("relative_to") or pose.get("frame")):
-        place = link.inverse() @ place
-    return _Item(child, place, read_shape(child, context, scale))
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
@@ -109,17 +106,18 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
         return None
     if lost.word:
         kind = "visual" if lost.word == AUTO else lost.word
-        box = _box_around([other for other in items if other.element.tag == kind])
+        near = [(one.shape, one.pose) for one in items if one.element.tag == kind and isinstance(one.shape, Placed)]
+        box = around(shape_bounds(one.shape, pose @ one.offset) for one, pose in near)
         if box is not None:
             context.note("replaced", lost.element, f"'{lost.uri}' by the box around its link's {kind} shapes")
-            return Placed(box.shape, item.pose.inverse() @ box.offset)
+            middle = Pose(vector((box[0] + box[1]) / 2))
+            return Placed(Box(vector(np.maximum(box[1] - box[0], 1e-3))), item.pose.inverse() @ middle)
         if lost.word == AUTO:
             return _guessed(lost, item, link, context)
         raise complain(lost.element, f"its link has no {kind} shape that could replace '{lost.uri[:200]}'")
     if context.ignores("mesh"):
-        context.note(
-            "ignored", lost.element, f"'{lost.uri}' is not available ({lost.reason}): nothing collides with it"
-        )
+        why = f"'{lost.uri}' is not available ({lost.reason}): nothing collides with it"
+        context.note("ignored", lost.element, why)
         return None
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
     context.missing.setdefault(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
@@ -128,35 +126,13 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
 
 def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed:
     """A shape for a missing mesh whose link has no other visual shape to go by."""
-    found = guess(lost.uri, link)
-    context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {found.text}: {found.why}")
-    if found.at_mass:
+    stand_in, text, why, scale = guess(lost.uri, link)
+    context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {text}: {why}")
+    if scale is None:
         mass = link.find("inertial/pose")
-        return Placed(found.stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
-    by = [abs(own / usual) for own, usual in zip(lost.scale, found.scale, strict=True)]
-    return scaled(found.stand_in, vector(by))
-
-
-def _box_around(items: list[_Item]) -> Placed | None:
-    """The box around the shapes of `items`, in the frame of their link; None if there are no shapes."""
-    placed = [(item.shape, item.pose) for item in items if isinstance(item.shape, Placed)]
-    box = around(shape_bounds(one.shape, pose @ one.offset) for one, pose in placed)
-    if box is None:
-        return None
-    low, high = box
-    return Placed(Box(vector(np.maximum(high - low, 1e-3))), Pose(vector((low + high) / 2)))
-
-
-def _visuals(items: list[_Item], link: Pose, context: Context) -> Iterator[Visual]:
-    for item in items:
-        if item.element.tag != "visual" or item.shape is None:
-            continue
-        if isinstance(item.shape, Lost):
-            lost = item.shape
-            context.note("ignored", lost.element, f"'{lost.uri}' is not drawn: {lost.reason}")
-            continue
-        pose = link @ item.pose @ item.shape.offset
-        yield Visual(name_of(item.element), item.shape.shape, pose, read_color(item.element))
+        return Placed(stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
+    by = [abs(own / usual) for own, usual in zip(lost.scale, scale, strict=True)]
+    return scaled(stand_in, vector(by), lost.element)
 
 
 def can_be_touched(collision: Element, context: Context) -> bool:
@@ -188,36 +164,25 @@ def read_friction(collision: Element, context: Context) -> float:
         engine, names = collision.find("surface/friction/bullet"), ("friction", "friction2")
     if engine is None:
         return DEFAULT_MU
-    both = []
-    for name in names:
-        element = engine.find(name)
-        mu = DEFAULT_MU if element is None else numbers(element, 1)[0]
-        if element is not None and mu < 0:
-            raise complain(element, f"friction must not be negative, found {mu:g}")
-        both.append(mu)
-    if both[0] != both[1]:
-        why = f"friction of {both[0]:g} and {both[1]:g} in two directions by {min(both):g} in both"
+    first, second = (number(engine, name, DEFAULT_MU) for name in names)
+    for name, mu in zip(names, (first, second), strict=True):
+        if mu < 0:
+            raise complain(next(engine.iter(name)), f"friction must not be negative, found {mu:g}")
+    if first != second:
+        why = f"friction of {first:g} and {second:g} in two directions by {min(first, second):g} in both"
         context.note("replaced", engine, why)
-    return min(both)
+    return min(first, second)
 
 
 def read_color(visual: Element) -> Color | None:
     """The diffuse colour, else the ambient one, else that of a known Gazebo material; None if there is none."""
     opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
-    name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")
-    color = _written(visual) or ((*GAZEBO_COLORS[name], 1.0) if name in GAZEBO_COLORS else None)
-    if color is None:
-        return None
-    # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
-    red, green, blue, alpha = color
-    return red, green, blue, (alpha or 1.0) * opacity
-
-
-def _written(visual: Element) -> Color | None:
     for tag in ("material/diffuse", "material/ambient"):
         element = visual.find(tag)
         if element is not None and text_of(element):
             count = 4 if len((element.text or "").split()) == 4 else 3
             red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
-            return red, green, blue, alpha[0] if alpha else 1.0
-    return None
+            # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
+            return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity
+    name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")
+    return (*GAZEBO_COLORS[name], opacity) if name in GAZEBO_COLORS else None

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from ddenv.world.files.resources import Resources
-from ddenv.world.model import Model, World
+from ddenv.world.model import World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Reading
 from ddenv.world.sdf.frames import pose_of
@@ -27,42 +27,45 @@ def with_places(world: World, places: Mapping[str, Sequence[Pose]], reading: Rea
     moved against each other can only be moved if `<state>` holds its links; one that others are placed relative to stays.
     """
     asked = {name: there for name, there in places.items() if name not in world.anchors}
+    wanted = {model.name: [link.pose for link in model.links] for model in world.models}
     while True:
-        text, wanted = _written(world, asked)
+        moved = {name: there for name, there in asked.items() if not _are_same(wanted[name], there)}
+        text = _written(world, moved)
         again = parse_world(text, world.path, reading, Resources(world.resources))
         # What was written is read again: only that shows that each model is where it has to be.
-        wrong = {model.name for model in again.models if not _is_at(model, wanted[model.name])}
+        found = {model.name: [link.pose for link in model.links] for model in again.models}
+        wrong = {name for name, there in found.items() if not _are_same(there, moved.get(name, wanted[name]))}
         if not wrong & set(asked):
-            return text, [name for name, there in places.items() if not _is_at(again.model(name), there)]
+            return text, [name for name, there in places.items() if not _are_same(found[name], there)]
         asked = {name: there for name, there in asked.items() if name not in wrong}
 
 
-def _is_at(model: Model, places: Sequence[Pose]) -> bool:
-    return all(is_same(link.pose, place) for link, place in zip(model.links, places, strict=True))
+def _are_same(poses: Sequence[Pose], others: Sequence[Pose]) -> bool:
+    return all(is_same(one, other) for one, other in zip(poses, others, strict=True))
 
 
-def _written(world: World, places: Mapping[str, Sequence[Pose]]) -> tuple[bytes, dict[str, Sequence[Pose]]]:
-    """The text, and where the links of all models should then be."""
+def _written(world: World, places: Mapping[str, Sequence[Pose]]) -> bytes:
     root = parse(world.text, world.path)
     elements = {element.start: element for element in root.iter() if element.tag in ("model", "include")}
     edits: list[Edit] = []
-    wanted: dict[str, Sequence[Pose]] = {}
-    for model in world.models:
-        starts = [link.pose for link in model.links]
-        wanted[model.name] = there = places.get(model.name, starts)
-        if _is_at(model, there):
-            wanted[model.name] = starts
-            continue
+    for model in (model for model in world.models if model.name in places):
+        there = places[model.name]
         at, *entries = [elements[start] for start, _ in model.spans]
         turn = there[0] @ model.links[0].pose.inverse()
+        own = (entries or [at])[0].find("pose")
         if entries:
             by_name = {link.name: place for link, place in zip(model.links, there, strict=True)}
             edits += _saved(world.text, entries[0], by_name, turn, "")
-            if entries[0].find("pose") is None:
-                edits.append(_inserted(world.text, entries[0], turn @ model.pose))
-        else:
-            edits.append(_placed(world.text, at, model, turn))
-    return edited(world.text, edits), wanted
+        elif own is not None and (own.get("relative_to") or own.get("frame")):
+            edits.append(_replaced(world.text, own, pose_of(own) @ model.pose.inverse() @ turn @ model.pose))
+        elif own is not None:
+            edits.append(_replaced(world.text, own, turn @ pose_of(own)))
+        if own is None:
+            # A new first child, indented like the one that was the first.
+            holder = (entries or [at])[0]
+            space = (_SPACE.match(world.text, tag_end(world.text, holder)) or [b""])[0].decode()
+            edits.append(with_child(world.text, holder, f"{space}<pose>{_numbers(turn @ model.pose)}</pose>"))
+    return edited(world.text, edits)
 
 
 def is_same(one: Pose, other: Pose) -> bool:
@@ -84,26 +87,9 @@ def _saved(text: bytes, entry: Element, links: Mapping[str, Pose], turn: Pose, p
         yield from _saved(text, inner, links, turn, f"{prefix}{name_of(inner)}::")
 
 
-def _placed(text: bytes, at: Element, model: Model, turn: Pose) -> Edit:
-    """The element of a model in the world; its pose may be relative to a frame."""
-    own = at.find("pose")
-    if own is None:
-        return _inserted(text, at, turn @ model.pose)
-    if not (own.get("relative_to") or own.get("frame")):
-        return _replaced(text, own, turn @ pose_of(own))
-    return _replaced(text, own, pose_of(own) @ model.pose.inverse() @ turn @ model.pose)
-
-
 def _replaced(text: bytes, pose: Element, place: Pose) -> Edit:
     start, end, new = with_words(text, pose, _numbers(place))
     return start, end, _FORMAT.sub(b"", new)
-
-
-def _inserted(text: bytes, holder: Element, place: Pose) -> Edit:
-    """A new first child, indented like the one that was the first."""
-    space = _SPACE.match(text, tag_end(text, holder))
-    assert space is not None
-    return with_child(text, holder, f"{space.group().decode()}<pose>{_numbers(place)}</pose>")
 
 
 def _numbers(pose: Pose) -> str:

@@ -109,16 +109,24 @@ def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[st
     # Those of directives stand in files of their own.
     kept = () if is_directives(world.path) else kept
     models = [one for one in map(world.model, kept) if one.name not in world.anchors and not one.inside]
-    values: list[tuple[Kind, str, float | None]] = [
+    values: list[tuple[Kind, str, Any]] = [
         (kind, f"{model.name}.{what}", _of_model(world, model, what))
         for what, kind in OF_MODELS.items()
         for model in models
     ]
-    data = scenario.model_dump()
-    values += [(kind, name, _at(data, keys)) for name, (kind, keys) in OF_SCENARIO.items()]
+    for name, (kind, (*keys, last)) in OF_SCENARIO.items():
+        section: Any = scenario
+        for key in keys:
+            section = getattr(section, key)
+        values.append((kind, name, getattr(section, last, None)))
     options = scenario.controller.options if ":" in scenario.controller.use else {}
     values += [(_OPTION, f"{OPTIONS}{name}", value) for name, value in options.items() if type(value) in (int, float)]
-    return {name: _number(kind, name, float(value), length) for kind, name, value in values if value is not None}
+    found = {}
+    for kind, name, now in ((kind, name, float(value)) for kind, name, value in values if value is not None):
+        low, high = (float(f"{end:.9g}") for end in kind.range(now, length))
+        resolution = max(kind.matters, 0.0 if kind in (_PLACE, _HEIGHT, _ANGLE) else PART * abs(now))
+        found[name] = Number(name, now, low, high, max(high - now, now - low), resolution, kind.unit)
+    return found
 
 
 def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
@@ -129,18 +137,6 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
             near = nearest(glob, list(numbers))
             raise UserError(f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}")
     return [one for name, one in numbers.items() if not globs or any(fnmatchcase(name, glob) for glob in globs)]
-
-
-def _number(kind: Kind, name: str, now: float, length: float) -> Number:
-    low, high = (float(f"{end:.9g}") for end in kind.range(now, length))
-    resolution = max(kind.matters, 0.0 if kind in (_PLACE, _HEIGHT, _ANGLE) else PART * abs(now))
-    return Number(name, now, low, high, max(high - now, now - low), resolution, kind.unit)
-
-
-def _at(data: Any, keys: Iterable[str]) -> float | None:
-    for key in keys:
-        data = None if data is None else data[key]
-    return None if data is None else float(data)
 
 
 def _of_model(world: World, model: Model, what: str) -> float | None:
@@ -229,10 +225,22 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     owner, _, what = name.rpartition(".")
     model = world.model(owner)
     at = next(one for one in parse(world.text, world.path).iter() if one.start == model.spans[0][0])
-    if what in ("x", "y", "z", "yaw"):
-        text = _moved(scenario, world, model, at, what, value)
+    number, pose = f"{value:.9g}", at.find("pose")
+    words = [] if pose is None else (pose.text or "").split()
+    if what == "friction":
+        edits = [edit for collision in at.iter("collision") for edit in _friction(world.text, collision, number)]
+    elif what not in ("x", "y", "z", "yaw"):
+        edits = list(_sizes(world, model, at, what, number))
+    elif pose is not None and not pose.attrib and len(words) == 6 and len(model.spans) == 1:
+        # A turn about the vertical is the last one of roll, pitch and yaw.
+        turned = float(words[5]) + value - model.pose.yaw()
+        place, word = (5, f"{turned:.9g}") if what == "yaw" else ("xyz".index(what), number)
+        words[place] = word
+        edits = [with_words(world.text, pose, " ".join(words))]
     else:
-        text = edited(world.text, sorted(_edits(world, model, at, what, f"{value:.9g}")))
+        places = {owner: [move_of(model, what, value) @ link.pose for link in model.links]}
+        edits = [(0, len(world.text), with_places(world, places, scenario.reading)[0])]
+    text = edited(world.text, edits)
     try:
         after = parse_world(text, world.path, scenario.reading, Resources(world.resources))
     except UserError as error:
@@ -250,34 +258,15 @@ def move_of(model: Model, what: str, value: float) -> Pose:
     return Pose.from_rpy(x, y, z, 0.0, 0.0, turn) @ Pose(model.pose.position).inverse()
 
 
-def _moved(scenario: Scenario, world: World, model: Model, at: Element, what: str, value: float) -> bytes:
-    """The text with a model in another place."""
-    pose = at.find("pose")
-    words = [] if pose is None else (pose.text or "").split()
-    if pose is not None and not pose.attrib and len(words) == 6 and len(model.spans) == 1:
-        # A turn about the vertical is the last one of roll, pitch and yaw.
-        turned = float(words[5]) + value - model.pose.yaw()
-        place, now = (5, turned) if what == "yaw" else ("xyz".index(what), value)
-        words[place] = f"{now:.9g}"
-        return edited(world.text, [with_words(world.text, pose, " ".join(words))])
-    move = move_of(model, what, value)
-    return with_places(world, {model.name: [move @ link.pose for link in model.links]}, scenario.reading)[0]
-
-
-def _edits(world: World, model: Model, at: Element, what: str, number: str) -> Iterator[Edit]:
-    """How the text of a model changes."""
-    text, now = world.text, _of_model(world, model, what)
-    if what == "friction":
-        for collision in at.iter("collision"):
-            yield from _friction(text, collision, number)
-        return
+def _sizes(world: World, model: Model, at: Element, what: str, number: str) -> Iterator[Edit]:
+    """The changes of a mass or a size; what is drawn of the same size changes with it."""
+    now = _of_model(world, model, what)
     tag, place = ("size", "xyz".index(what[-1])) if what in SIZES[2:] else (what, 0)
     for element in at.iter(tag):
         values, words = floats(element), (element.text or "").split()
         of_shape = element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
-        # What is drawn of the same size changes with it.
         if len(values) > place and values[place] == now and (of_shape or what == "mass"):
-            yield with_words(text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
+            yield with_words(world.text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
 
 
 def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:

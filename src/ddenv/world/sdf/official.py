@@ -51,15 +51,15 @@ def _inside(element: Element, no_colons: bool) -> Iterator[tuple[str, Element]]:
 
 def _is_accepted(inertial: Element) -> bool:
     """Whether neither the mass nor a moment is negative, and no moment exceeds the sum of the other two."""
-    moments = np.array([number_or_nan(inertial, f"inertia/{tag}", 1.0) for tag in ("ixx", "iyy", "izz")])
-    products = np.array([number_or_nan(inertial, f"inertia/{tag}", 0.0) for tag in ("ixy", "ixz", "iyz")])
-    largest = np.abs([*moments, *products]).max()
+    xx, yy, zz = (number_or_nan(inertial, f"inertia/{tag}", 1.0) for tag in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (number_or_nan(inertial, f"inertia/{tag}", 0.0) for tag in ("ixy", "ixz", "iyz"))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    largest = np.abs(tensor).max()
     if not (number_or_nan(inertial, "mass", 1.0) >= 0.0 and math.isfinite(largest)):
         return False
     # Numbers near the largest ones would overflow.
-    moments, (xy, xz, yz) = moments / (largest or 1.0), products / (largest or 1.0)
-    tensor = np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]]) + np.diag(moments)
+    tensor /= largest or 1.0
     # Without products these are the moments themselves, unrounded.
-    low, middle, high = np.linalg.eigvalsh(tensor) if products.any() else np.sort(moments)
-    slack = SLACK * abs(moments.sum())
+    low, middle, high = np.linalg.eigvalsh(tensor) if any((xy, xz, yz)) else np.sort(np.diag(tensor))
+    slack = SLACK * abs(np.trace(tensor))
     return bool(low >= -slack and high <= low + middle + slack)

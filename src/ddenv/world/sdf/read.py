@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import is_directives, read_bytes
-from ddenv.world.files.resources import Resources, on_disk
-from ddenv.world.model import Box, Collision, Mesh, Model, World
+from ddenv.world.files.resources import Resources, search_folders
+from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
-from ddenv.world.sdf.copied import has_includes, with_copies
 from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.inside import opened
+from ddenv.world.sdf.inside import has_includes, opened, with_copies
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
@@ -76,7 +76,7 @@ def disk_of(path: Path, reading: Reading) -> Resources:
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return on_disk(path.parent, reading.model_path)
+    return Resources({}, search_folders(reading.model_path, path.parent))
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:
@@ -97,9 +97,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     context.model = ""
     context.note_unused(root)
     anchors = scope.references()
-    gravity = next(
-        (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None
-    )
+    gravity = next((each for tag in ("gravity", "physics/gravity") for each in world.findall(tag)), None)
     whole = World(
         path=path,
         name=world.get("name") or "",
@@ -122,6 +120,12 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
         if has_includes(part) and model.static and model.name not in world.anchors and len(model.collisions) > 1
     }
     reading = context.reading.model_copy(update={"inside": False})
+
+    def solid(model: Model) -> list[Collision]:
+        """What can be touched of a model. A mesh and its copy differ in their origin alone."""
+        box = Box((0.0, 0.0, 0.0))
+        return [replace(one, shape=box) if isinstance(one.shape, Mesh) else one for one in model.collisions]
+
     while parts:
         text = with_copies(world.text, world.path, scope, list(parts.values()), context.resources)
         try:
@@ -129,48 +133,23 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
         except UserError:
             break
         # What was written is read again: only that shows that each model is what it was.
-        wrong = {name for name in parts if _solid(again.model(name)) != _solid(world.model(name))}
+        wrong = {name for name in parts if solid(again.model(name)) != solid(world.model(name))}
         if not wrong:
             return opened(replace(again, notes=world.notes), parse(text, world.path))
         parts = {name: part for name, part in parts.items() if name not in wrong}
     return opened(world, root)
 
 
-def _solid(model: Model) -> list[Collision]:
-    """What can be touched of a model. A mesh and its copy differ in their origin alone."""
-    return [
-        replace(one, shape=Box((0.0, 0.0, 0.0))) if isinstance(one.shape, Mesh) else one for one in model.collisions
-    ]
-
-
 def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
-    names = unique_names([part.name for part in scope.parts])
-    counts = Counter(part.name for part in scope.parts)
-    left = {name: list(saved) for name, saved in state.items()}
-    models = []
-    for part, name in zip(scope.parts, names, strict=True):
+    names = [part.name for part in scope.parts]
+    counts, models = Counter(names), []
+    for part, name in zip(scope.parts, unique_names(names, " #"), strict=True):
         if name != part.name:
             context.model = name
             context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
-        entries = left.get(part.name)
+        entries = state.get(part.name)
         models.append(assemble(part, name, scope, entries.pop(0) if entries else None, context))
     context.model = ""
-    for entries in left.values():
-        for saved in entries:
-            context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
+    for saved in chain(*state.values()):
+        context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
     return tuple(models)
-
-
-def unique_names(names: list[str]) -> list[str]:
-    """`names` with repeated ones made unique: the second `name` becomes `name #2`, the third `name #3`, ..."""
-    taken, unique = set(names), []
-    given: Counter[str] = Counter()
-    for name in names:
-        own, number = name, given[name]
-        while number and own in taken:
-            number += 1
-            own = f"{name} #{number}"
-        given[name] = max(number, 1)
-        taken.add(own)
-        unique.append(own)
-    return unique

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
@@ -14,22 +14,14 @@ from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.xml import Element, number_or_nan
 
 # The sizes (m) of each kind, as shown in error messages.
-SIZES = {
-    "box": "x,y,z",
-    "cylinder": "radius,length",
-    "sphere": "radius",
-    "capsule": "radius,length",
-    "ellipsoid": "x,y,z",
-}
+SIZES = {"box": "x,y,z", "cylinder": "radius,length", "sphere": "radius"}
+SIZES |= {"capsule": "radius,length", "ellipsoid": "x,y,z"}
 SIBLINGS = ("visual", "collision")
 AUTO, NONE = "auto", "none"
 # In place of a URI: everything that is missing.
 ALL_MISSING = "*"
 LARGEST = 1e6  # m
-HOW = (
-    "box:x,y,z, cylinder:radius,length, sphere:radius, capsule:radius,length, ellipsoid:x,y,z (m), visual, collision, "
-    "auto or none"
-)
+HOW = f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), visual, collision, auto or none"
 
 
 @dataclass(frozen=True)
@@ -59,9 +51,8 @@ def parse_option(option: str) -> tuple[str, str]:
         return ALL_MISSING, AUTO
     uri, sign, text = option.rpartition("=")
     if not sign or not uri.strip():
-        raise UserError(
-            f"--stand-in: expected URI=SHAPE, such as model://barrel=cylinder:0.3,1.0, or auto; found '{option}'"
-        )
+        example = "model://barrel=cylinder:0.3,1.0"
+        raise UserError(f"--stand-in: expected URI=SHAPE, such as {example}, or auto; found '{option}'")
     uri, text = uri.strip(), text.strip()
     parse_stand_in(text, "--stand-in")
     parse_stand_ins({uri: text})
@@ -82,7 +73,10 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     sizes = _numbers(words, SIZES[kind], f"{where}: {kind}")
     if min(sizes) <= 0:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
-    shape = _shape(kind, sizes)
+    kinds: dict[str, Callable[..., Shape]] = {"cylinder": Cylinder, "sphere": Sphere, "capsule": Capsule}
+    shape = kinds[kind](*sizes) if kind in kinds else Box(vector(sizes))
+    if kind == "ellipsoid":
+        shape = Ellipsoid(vector(size / 2 for size in sizes))
     above = (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
     return Placed(shape, Pose(vector(_numbers(center, "x,y,z", f"{where}: the centre after @") if at else above)))
 
@@ -92,22 +86,9 @@ def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
         values = tuple(float(word) for word in text.split(","))
     except ValueError:
         values = ()
-    if len(values) != names.count(",") + 1 or not all(map(math.isfinite, values)) or max(map(abs, values)) > LARGEST:
+    if len(values) != names.count(",") + 1 or not all(abs(value) <= LARGEST for value in values):
         raise UserError(f"{where}: expected {names} in m, found '{text[:60]}'")
     return values
-
-
-def _shape(kind: str, sizes: tuple[float, ...]) -> Shape:
-    match kind:
-        case "box":
-            return Box(vector(sizes))
-        case "cylinder":
-            return Cylinder(*sizes)
-        case "sphere":
-            return Sphere(*sizes)
-        case "capsule":
-            return Capsule(*sizes)
-    return Ellipsoid(vector(size / 2 for size in sizes))
 
 
 def matching(stand_ins: Mapping[str, StandIn], uri: str) -> str | None:
@@ -121,31 +102,20 @@ DEFAULT_MOMENT = 1.0
 SOME = "box:1,1,1"
 
 
-@dataclass(frozen=True)
-class Guess:
-    """A stand-in, its `text`, and `why` it is this one; `scale` is that of a mesh of this size.
+def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vector | None]:
+    """The shape for a missing model, or for a missing mesh of the `link`: the stand-in, its text, and why it is this one.
 
-    It stands where the mesh would, or with `at_mass` at the link's centre of mass.
+    It stands where the mesh would, and has the size of a mesh of that scale; without a scale, at the link's centre of mass.
     """
-
-    stand_in: Placed
-    text: str
-    why: str
-    scale: Vector
-    at_mass: bool = False
-
-
-def guess(uri: str, link: Element | None = None) -> Guess:
-    """The shape for a missing model, or for a missing mesh of the `link`."""
     text, scale = KNOWN_SIZES.get(model_named(uri), (SOME, ONE))
-    why, at_mass = "the size of Gazebo's model", False
+    why, box = "the size of Gazebo's model", None
     if text == SOME:
         box = None if link is None else _box_of_inertia(link)
-        text, at_mass = box or SOME, box is not None
-        why = "the box that has the link's inertia" if at_mass else "nothing says how large it is"
+        text = box or SOME
+        why = "the box that has the link's inertia" if box else "nothing says how large it is"
     stand_in = parse_stand_in(text, "guess")
     assert isinstance(stand_in, Placed)
-    return Guess(stand_in, text, why, scale, at_mass)
+    return stand_in, text, why, None if box else scale
 
 
 def _box_of_inertia(link: Element) -> str | None:

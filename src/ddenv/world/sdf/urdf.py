@@ -12,8 +12,6 @@ from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse, text
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
 LIMITED = ("revolute", "prismatic")
-# URDF's defaults; unlimited joints have a type of their own.
-LIMITS = {"lower": "0", "upper": "0"}
 # The attributes of each URDF shape, with the corresponding SDF elements.
 SHAPES = {
     "box": {"size": "size"},
@@ -34,19 +32,24 @@ def to_sdf(robot: Element, context: Context) -> Element:
             raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
     # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
-    links = {name_of(link): link for link in reversed(robot.findall("link"))}
+    links = {name_of(link): link for link in robot.findall("link")}
     if not links:
         raise complain(robot, "has no <link>")
-    joints = [(joint, *ends(joint, list(links))) for joint in robot.findall("joint")]
-    origins = {child: pose(joint, parent) for joint, parent, child in joints}
-    root = _root(robot, list(links), set(origins))
+    origins, joints = {}, []
+    for source in robot.findall("joint"):
+        parent, child = (_end(source, tag, list(links)) for tag in ("parent", "child"))
+        origins[child] = pose(source, parent)
+        joints.append(joint_of(source, parent, child))
+    roots = [name for name in links if name not in origins]
+    if len(roots) != 1:
+        found = f"found {', '.join(roots[:5])}" if roots else "but joints close a loop"
+        raise complain(robot, f"expected one link that is not the child of a joint, {found}")
     model = element("model", robot, name=name_of(robot))
-    for link in sorted(robot.findall("link"), key=lambda link: name_of(link) != root):
-        made = link_of(link, robot, context)
-        if name_of(link) in origins:
-            made.append(origins[name_of(link)])
-        model.append(made)
-    model.extend([joint_of(joint, parent, child) for joint, parent, child in joints])
+    for source in sorted(robot.findall("link"), key=lambda link: name_of(link) != roots[0]):
+        model.append(link_of(source, robot, context))
+        if name_of(source) in origins:
+            model[-1].append(origins[name_of(source)])
+    model.extend(joints)
     return element("sdf", robot, "", model, version=VERSIONS[-1])
 
 
@@ -74,39 +77,26 @@ def without_mass(model: Model, element: Element) -> Model:
 def has_mass(link: Element) -> bool:
     """Whether `link` has a mass; many links of robots are only frames. Raises UserError."""
     mass = link.find("inertial/mass")
-    return mass is not None and value(mass, "value") != 0.0
-
-
-def _root(robot: Element, links: list[str], children: set[str]) -> str:
-    roots = [name for name in reversed(links) if name not in children]
-    if len(roots) != 1:
-        found = f"found {', '.join(roots[:5])}" if roots else "but joints close a loop"
-        raise complain(robot, f"expected one link that is not the child of a joint, {found}")
-    return roots[0]
+    return mass is not None and numbers(element("value", mass, given(mass, "value")), 1) != (0.0,)
 
 
 def link_of(source: Element, robot: Element, context: Context) -> Element:
     """The SDF link for a URDF one, without its pose. Raises UserError."""
-    name = name_of(source)
-    made = twin(source, name=name)
+    made = twin(source, name=name_of(source))
     inertial = source.find("inertial")
     if inertial is not None and has_mass(source):
-        made.append(_inertial(inertial))
+        parts = [
+            pose(inertial),
+            *(element("mass", mass, given(mass, "value")) for mass in inertial.findall("mass")[:1]),
+        ]
+        for tensor in inertial.findall("inertia")[:1]:
+            parts.append(twin(tensor, *(element(tag, tensor, given(tensor, tag)) for tag in TENSOR)))
+        made.append(twin(inertial, *parts))
     for tag in ("collision", "visual"):
         for count, part in enumerate(source.findall(tag)):
-            more = _surface(name, part, robot) if tag == "collision" else _material(part, robot)
+            more = _surface(name_of(source), part, robot) if tag == "collision" else _material(part, robot)
             own = part.get("name") or f"{tag}_{count}"
             made.append(twin(part, pose(part), _geometry(part, context), *more, name=own))
-    return made
-
-
-def _inertial(source: Element) -> Element:
-    made = twin(source, pose(source))
-    mass, tensor = source.find("mass"), source.find("inertia")
-    if mass is not None:
-        made.append(element("mass", mass, given(mass, "value")))
-    if tensor is not None:
-        made.append(twin(tensor, *(element(tag, tensor, given(tensor, tag)) for tag in TENSOR)))
     return made
 
 
@@ -120,19 +110,15 @@ def _geometry(part: Element, context: Context) -> Element:
     made = twin(shape)
     for attribute, tag in SHAPES[shape.tag].items():
         text = given(shape, attribute)
-        made.append(element(tag, shape, _found(text, shape, context) if tag == "uri" else text))
+        if tag == "uri" and text.startswith("package://") and context.stand_in(text) is None:
+            # It may be in the package that contains the robot's file.
+            package, _, rest = text.removeprefix("package://").partition("/")
+            folders = (folder for folder in shape.source.absolute().parents if folder.name == package)
+            text = next((str(folder / rest) for folder in folders), text)
+        made.append(element(tag, shape, text))
     if shape.tag == "mesh" and shape.get("scale"):
         made.append(element("scale", shape, three(shape, "scale", "")))
     return twin(source, made)
-
-
-def _found(uri: str, shape: Element, context: Context) -> str:
-    """The URI of a mesh; the path, if it is in the package that contains the robot's file."""
-    package, _, rest = uri.removeprefix("package://").partition("/")
-    if not uri.startswith("package://") or context.stand_in(uri) is not None:
-        return uri
-    folder = next((folder for folder in shape.source.absolute().parents if folder.name == package), None)
-    return uri if folder is None else str(folder / rest)
 
 
 def _surface(link: str, part: Element, robot: Element) -> list[Element]:
@@ -149,28 +135,21 @@ def _surface(link: str, part: Element, robot: Element) -> list[Element]:
 
 def _material(part: Element, robot: Element) -> list[Element]:
     """The `<material>` of a visual: its own colour, or that of the robot's material of the same name."""
-    own = part.find("material")
-    if own is None:
-        return []
-    named = [other for other in robot.findall("material") if other.get("name") == own.get("name")]
-    color = next((found for each in (own, *named) if (found := each.find("color")) is not None), None)
-    if color is None:
-        return []
-    return [twin(own, element("diffuse", color, given(color, "rgba")))]
+    own = part.findall("material")[:1]
+    named = [other for one in own for other in robot.findall("material") if other.get("name") == one.get("name")]
+    colors = [color for each in (*own, *named) for color in each.findall("color")[:1]]
+    return [twin(own[0], element("diffuse", color, given(color, "rgba"))) for color in colors[:1]]
 
 
-def ends(joint: Element, links: list[str]) -> tuple[str, str]:
-    """The names of the parent and the child link of `joint`. Raises UserError."""
-    found = []
-    for tag in ("parent", "child"):
-        end = joint.find(tag)
-        if end is None:
-            raise complain(joint, f"has no <{tag}>")
-        name = given(end, "link")
-        if name not in links:
-            raise complain(end, f"there is no link '{name[:80]}'{nearest(name[:80], links[:500])}")
-        found.append(name)
-    return found[0], found[1]
+def _end(joint: Element, tag: str, links: list[str]) -> str:
+    """The name of the parent or the child link of `joint`. Raises UserError."""
+    end = joint.find(tag)
+    if end is None:
+        raise complain(joint, f"has no <{tag}>")
+    name = given(end, "link")
+    if name not in links:
+        raise complain(end, f"there is no link '{name[:80]}'{nearest(name[:80], links[:500])}")
+    return name
 
 
 def joint_of(source: Element, parent: str, child: str) -> Element:
@@ -178,27 +157,22 @@ def joint_of(source: Element, parent: str, child: str) -> Element:
     kind = (source.get("type") or "").strip()
     if kind not in KINDS:
         raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
-    made = twin(
-        source, element("parent", source, parent), element("child", source, child), name=name_of(source), type=kind
-    )
-    if kind != "fixed":
-        made.append(_axis(source, kind))
-    return made
-
-
-def _axis(source: Element, kind: str) -> Element:
-    given_axis, limit, dynamics = source.find("axis"), source.find("limit"), source.find("dynamics")
+    ends = element("parent", source, parent), element("child", source, child)
+    made = twin(source, *ends, name=name_of(source), type=kind)
+    if kind == "fixed":
+        return made
+    own, limit, dynamics = source.find("axis"), source.find("limit"), source.find("dynamics")
     if kind in LIMITED and limit is None:
         raise complain(source, f"a {kind} joint needs a <limit>")
-    place = source if given_axis is None else given_axis
-    xyz = "1 0 0" if given_axis is None else three(given_axis, "xyz", "1 0 0")
-    made = element("axis", source, "", element("xyz", place, xyz))
+    xyz = "1 0 0" if own is None else three(own, "xyz", "1 0 0")
+    axis = element("axis", source, "", element("xyz", source if own is None else own, xyz))
     if limit is not None:
-        given_limits = {tag: text for tag in ("effort", "velocity") if (text := limit.get(tag))}
-        defaults = {tag: limit.get(tag, default) for tag, default in LIMITS.items()} if kind in LIMITED else {}
-        made.append(twin(limit, *(element(tag, limit, text) for tag, text in (defaults | given_limits).items())))
+        said = {tag: limit.get(tag, "0") for tag in ("lower", "upper") if kind in LIMITED}
+        said |= {tag: text for tag in ("effort", "velocity") if (text := limit.get(tag))}
+        axis.append(twin(limit, *(element(tag, limit, text) for tag, text in said.items())))
     if dynamics is not None:
-        made.append(twin(dynamics, element("damping", dynamics, dynamics.get("damping", "0"))))
+        axis.append(twin(dynamics, element("damping", dynamics, dynamics.get("damping", "0"))))
+    made.append(axis)
     return made
 
 
@@ -225,11 +199,6 @@ def given(source: Element, attribute: str) -> str:
     if value is None or not value.strip():
         raise complain(source, f"has no attribute '{attribute}'")
     return value.strip()
-
-
-def value(source: Element, attribute: str) -> float:
-    """An attribute that is one finite number. Raises UserError."""
-    return numbers(element(attribute, source, given(source, attribute)), 1)[0]
 
 
 def three(source: Element, attribute: str, default: str) -> str:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from yaml.nodes import Node
 
+from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
 from ddenv.world.pose import HERE, Pose
@@ -22,7 +24,7 @@ from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.directives import WORLD, WORLD_INSTANCE, Directive, Source, Span, opened, spans_of
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.includes import included
-from ddenv.world.sdf.joints import check_tree, link_of
+from ddenv.world.sdf.joints import check_tree
 from ddenv.world.sdf.urdf import is_urdf, without_mass
 from ddenv.world.sdf.xml import Element, complain
 
@@ -52,8 +54,7 @@ class Fixing:
     own: Frame
     base: Frame
     pose: Pose
-    source: Source
-    node: Node
+    complain: Callable[[str], UserError]
     weld: bool
 
 
@@ -89,16 +90,20 @@ class _Builder:
             case "add_frame":
                 self._add_frame(one)
             case "add_weld":
-                self._add_weld(one)
+                parent, child = (self._frame(keys[end], source) for end in ("parent", "child"))
+                _, pose = source.pose(keys.get("X_PC"), with_base=False)
+                if not child.model:
+                    raise source.complain(keys["child"], "the world cannot be welded to a model; make it the parent")
+                self._fix(Fixing(child, parent, pose, partial(source.complain, one.node), weld=True))
+                for owner in child.owners:
+                    self.spans[owner].append(one.span)
             case "add_collision_filter_group":
                 self.filters.append(one)
             case _:
-                own = keys.get("model_namespace")
-                name = source.namespace if own is None else source.scoped(source.text_of(own))
+                name = source.inner(keys)
                 if name and name not in self.instances:
-                    raise source.complain(
-                        own or one.node, f"there is no model instance '{name[:80]}' for the namespace"
-                    )
+                    node = keys.get("model_namespace", one.node)
+                    raise source.complain(node, f"there is no model instance '{name[:80]}' for the namespace")
 
     def _claim(self, name: str, source: Source, node: Node) -> None:
         if name in self.instances or name == "DefaultModelInstance":
@@ -109,7 +114,8 @@ class _Builder:
         source, keys = one.source, one.keys
         name = source.scoped(source.text_of(keys["name"]))
         self._claim(name, source, keys["name"])
-        include, uri = _element("add_model", one), _element("uri", one)
+        at = source.path, int(one.node.start_mark.line) + 1, one.span
+        include, uri = _element("add_model", *at), _element("uri", *at)
         uri.text = source.text_of(keys["file"])
         include.set("name", name)
         include.append(uri)
@@ -119,19 +125,23 @@ class _Builder:
         if part is None:
             return
         part = replace(part, name=name)
-        outer = Scope(_element(WORLD, one), (source.path,), self.context, self.scopes)
-        model = assemble(part, name, outer, None, self.context)
-        model = without_mass(model, part.element)
+        outer = Scope(_element(WORLD, *at), (source.path,), self.context, self.scopes)
+        model = without_mass(assemble(part, name, outer, None, self.context), part.element)
         positions = source.pairs(keys["default_joint_positions"]) if "default_joint_positions" in keys else {}
         model, turned = _at_positions(model, positions, source)
         self.models[name], self.elements[name] = model, include
         self.spans[name].append(one.span)
-        for own, pose, link in _frames(outer.inside(part), outer.placed(part), "", self.context):
-            if own == OWN_FRAME and is_urdf(part.element):
-                continue
-            self.frames[f"{name}::{own}"] = Frame(name, link, turned.get(link, HERE) @ pose, frozenset([name]))
-            self.instances.add(f"{name}::{own}".rpartition("::")[0])
-        self.roots |= {(name, link): root for link, root in _roots(model).items()}
+        for own, pose, held in _frames(outer.inside(part), outer.placed(part), ""):
+            if own != OWN_FRAME or not is_urdf(part.element):
+                self.frames[f"{name}::{own}"] = Frame(name, held, turned.get(held, HERE) @ pose, frozenset([name]))
+                self.instances.add(f"{name}::{own}".rpartition("::")[0])
+        # By joints, but for those to the world.
+        parents = {joint.child: joint.parent for joint in model.joints if joint.parent != WORLD}
+        for link in model.links:
+            root = link.name
+            while root in parents:
+                root = parents[root]
+            self.roots[name, link.name] = root
         free = source.pairs(keys["default_free_body_pose"]) if "default_free_body_pose" in keys else {}
         for body, value in free.items():
             frame = self.frames.get(f"{name}::{body}")
@@ -139,20 +149,17 @@ class _Builder:
                 raise source.complain(value, f"there is no body '{body[:80]}' in '{name[:80]}'")
             base, pose = source.pose(value)
             there = Frame() if base is None else self._frame(base, source)
-            self._fix(Fixing(frame, there, pose, source, value, weld=False))
+            self._fix(Fixing(frame, there, pose, partial(source.complain, value), weld=False))
 
     def _frame(self, node: Node, source: Source) -> Frame:
         """The frame that `node` names. Raises UserError."""
         name = source.scoped(source.text_of(node))
-        if "::" in name:
-            found = [name] if name in self.frames else []
-        else:
-            found = [each for each in self.frames if each.rpartition("::")[2] == name]
-        if len(found) != 1:
-            many = (
-                f"'{name[:80]}' may be {' or '.join(found[:3])}" if found else f"there is no frame '{name[:80]}' here"
-            )
-            raise source.complain(node, many + ("" if found else nearest(name[:80], list(self.frames)[:500])))
+        found = [each for each in self.frames if name == (each if "::" in name else each.rpartition("::")[2])]
+        if not found:
+            near = nearest(name[:80], list(self.frames)[:500])
+            raise source.complain(node, f"there is no frame '{name[:80]}' here{near}")
+        if len(found) > 1:
+            raise source.complain(node, f"'{name[:80]}' may be {' or '.join(found[:3])}")
         return self.frames[found[0]]
 
     def _add_frame(self, one: Directive) -> None:
@@ -179,16 +186,6 @@ class _Builder:
         for owner in owners:
             self.spans[owner].append(one.span)
 
-    def _add_weld(self, one: Directive) -> None:
-        source = one.source
-        parent, child = (self._frame(one.keys[end], source) for end in ("parent", "child"))
-        _, pose = source.pose(one.keys.get("X_PC"), with_base=False)
-        if not child.model:
-            raise source.complain(one.keys["child"], "the world cannot be welded to a model; make it the parent")
-        self._fix(Fixing(child, parent, pose, source, one.node, weld=True))
-        for owner in child.owners:
-            self.spans[owner].append(one.span)
-
     def _fix(self, fixing: Fixing) -> None:
         name, link = fixing.own.model, fixing.own.link
         key, model = (name, self.roots[name, link]), self.models[name]
@@ -196,11 +193,11 @@ class _Builder:
         if model.static or any(
             joint.parent == WORLD for joint in model.joints if self.roots[name, joint.child] == key[1]
         ):
-            raise fixing.source.complain(fixing.node, f"'{name[:80]}' is fixed to the world by its own file")
+            raise fixing.complain(f"'{name[:80]}' is fixed to the world by its own file")
         if before is not None and (before.weld or not fixing.weld or before.base.model):
-            raise fixing.source.complain(fixing.node, f"'{name[:80]}' is placed twice")
+            raise fixing.complain(f"'{name[:80]}' is placed twice")
         if not (fixing.weld or fixing.base.model or link == key[1]):
-            raise fixing.source.complain(fixing.node, f"'{link[:80]}' is not free: joints hold it")
+            raise fixing.complain(f"'{link[:80]}' is not free: joints hold it")
         self.fixings[key] = fixing
 
     # Where all of it is.
@@ -215,7 +212,7 @@ class _Builder:
             self.places[key] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
         place = self.places[key]
         if place is None:
-            raise fixing.source.complain(fixing.node, f"the place of '{key[0][:80]}' depends on itself")
+            raise fixing.complain(f"the place of '{key[0][:80]}' depends on itself")
         return place
 
     def _pose(self, frame: Frame) -> Pose:
@@ -251,8 +248,7 @@ class _Builder:
                 joints.append(Joint(f"{at} (weld)", "fixed", base.link, at, self._pose(base)))
             elif base.model and not _holds(self.finish(base.model), base.link):
                 if name in self.carriers:
-                    why = f"'{name[:80]}' is welded to two models that can move"
-                    raise fixing.source.complain(fixing.node, why)
+                    raise fixing.complain(f"'{name[:80]}' is welded to two models that can move")
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
@@ -343,27 +339,22 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
 
     Its text is that of the file; if that opens others, with their directives in place of `add_directives`.
     """
-    found = opened(text, path, context)
+    found, flat = opened(text, path, context)
     builder = _Builder(context)
-    for one in found.directives:
+    for one in found:
         builder.take(one)
     models = builder.all()
     shared = list(builder.shared())
     context.complain_of_missing()
-    if found.flat is not None:
+    if flat is not None:
         # Again, for the places in that text; what is wrong was said with the places in the files.
-        again = Context(context.resources, context.reading)
-        return parse_directives(found.flat, path, again)
+        return parse_directives(flat, path, Context(context.resources, context.reading))
     going = {span for spans in builder.spans.values() for span in spans} | {one.span for one in builder.filters}
-    if (
-        models
-        and text[found.directives[0].span[0] :].startswith(b"-")
-        and all(one.span in going for one in found.directives)
-    ):
+    if models and text[found[0].span[0] :].startswith(b"-") and all(one.span in going for one in found):
         # Drake takes an empty list, but not a missing one.
-        span = found.directives[0].span[0], found.directives[-1].span[1]
+        span = found[0].span[0], found[-1].span[1]
         shared.append(Shared(span, frozenset(model.name for model in models), b"\n  []"))
-    context.note_unused(_element(WORLD, Source(path, "")))
+    context.note_unused(_element(WORLD, path))
     ties = ((builder.carrier(name), builder.carrier(other)) for name, other in builder.ties)
     return World(
         path=path,
@@ -380,36 +371,23 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
     )
 
 
-def _element(tag: str, one: Directive | Source) -> Element:
+def _element(tag: str, path: Path, line: int = 1, span: Span = (0, 0)) -> Element:
     """An element at the place of a directive, for all that reads SDF."""
     made = Element(tag)
-    made.source = one.path if isinstance(one, Source) else one.source.path
-    made.line, (made.start, made.end) = (1, (0, 0)) if isinstance(one, Source) else (one.line, one.span)
-    made.parent = None
+    made.source, made.line, made.parent = path, line, None
+    made.start, made.end = span
     return made
 
 
-def _frames(scope: Scope, here: Pose, prefix: str, context: Context) -> Iterator[tuple[str, Pose, str]]:
+def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, str]]:
     """The links and frames of a model and of those inside it: name, pose where the file puts it, and link."""
     named = [name for name, one in scope.named.items() if isinstance(one, Element) and one.tag in ("link", "frame")]
     for name in (OWN_FRAME, *named):
-        link = link_of(scope, name, scope.element, context)
+        link = scope.link(name, scope.element)
         if link is not None:
             yield prefix + name, here @ scope.pose(name, scope.element), prefix + link
     for part in scope.parts:
-        yield from _frames(scope.inside(part), here @ scope.placed(part), f"{prefix}{part.name}::", context)
-
-
-def _roots(model: Model) -> dict[str, str]:
-    """For each link the one that joints hang it and others from: no joint holds that, or only one to the world."""
-    parents = {joint.child: joint.parent for joint in model.joints if joint.parent != WORLD}
-    found = {}
-    for link in model.links:
-        root = link.name
-        while root in parents:
-            root = parents[root]
-        found[link.name] = root
-    return found
+        yield from _frames(scope.inside(part), here @ scope.placed(part), f"{prefix}{part.name}::")
 
 
 def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -> tuple[Model, dict[str, Pose]]:
@@ -418,11 +396,11 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
     turns: dict[str, tuple[float, Pose]] = {}
     for name, node in positions.items():
         joint = joints.get(name)
-        if joint is None or joint.kind not in ("revolute", "continuous", "prismatic"):
-            why = "there is no joint" if joint is None else f"only joints with one position are read; {joint.kind} is"
-            raise source.complain(
-                node, f"{why} '{name[:80]}'" + ("" if joint else nearest(name[:80], list(joints)[:500]))
-            )
+        if joint is None:
+            near = nearest(name[:80], list(joints)[:500])
+            raise source.complain(node, f"there is no joint '{name[:80]}'{near}")
+        if joint.kind not in ("revolute", "continuous", "prismatic"):
+            raise source.complain(node, f"only joints with one position are read; {joint.kind} is '{name[:80]}'")
         (at,) = source.numbers(node, 1)
         x, y, z = joint.axis
         if joint.kind == "prismatic":

@@ -123,20 +123,15 @@ def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
     return b"".join([*parts, text[at:]])
 
 
-def xpath(element: Element) -> str:
-    """The XPath of `element`, such as /sdf/world/model[@name='box']/link[@name='link']/pose."""
+def place(element: Element) -> str:
+    """File, line and XPath of `element`, such as /sdf/world/model[@name='box']/link[@name='link']/pose."""
     steps = []
     node: Element | None = element
     while node is not None:
         name = node.get("name")
         steps.append(node.tag if name is None or node.tag == "world" else f"{node.tag}[@name='{name[:80]}']")
         node = node.parent
-    return "/" + "/".join(reversed(steps))
-
-
-def place(element: Element) -> str:
-    """File, line and XPath of `element`."""
-    return f"{element.source}:{element.line}: {xpath(element)}"
+    return f"{element.source}:{element.line}: /{'/'.join(reversed(steps))}"
 
 
 def complain(element: Element, message: str) -> UserError:
@@ -198,8 +193,6 @@ def truth(parent: Element, tag: str, default: bool) -> bool:
     if child is None:
         return default
     word = (child.text or "").strip().lower()
-    if word in ("1", "true"):
-        return True
-    if word in ("0", "false"):
-        return False
-    raise complain(child, f"expected true or false, found '{word[:60]}'")
+    if word not in ("1", "true", "0", "false"):
+        raise complain(child, f"expected true or false, found '{word[:60]}'")
+    return word in ("1", "true")
