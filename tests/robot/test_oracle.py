@@ -82,9 +82,25 @@ def waiting(trajectory: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 @given(ways(), ways())
+def test_the_distance_of_trajectories_is_one(a, b):
+    distance = trajectory_distance(a, b)
+    assert distance == pytest.approx(trajectory_distance(b, a))
+    assert trajectory_distance(a, a) == 0.0
+    farthest = max(np.linalg.norm(p - q) for p in a[:, 1:4] for q in b[:, 1:4])
+    assert 0.0 <= distance <= farthest + 1e-9
+
+
+@given(ways(), ways())
 def test_a_run_that_was_cut_waits_at_its_end(cut, f):
     """Whether a robot that stands still is watched to the end or not makes no difference."""
     assert trajectory_distance(cut, f) == pytest.approx(trajectory_distance(waiting(cut, f[:, 0]), f))
+
+
+@given(ways(), st.tuples(numbers, numbers, numbers))
+def test_the_same_way_elsewhere_is_as_far_as_it_was_moved(way, shift):
+    moved = way.copy()
+    moved[:, 1:4] += shift
+    assert trajectory_distance(way, moved) == pytest.approx(np.linalg.norm(shift), abs=1e-9)
 
 
 @given(ways(), ways(), st.floats(0.01, 50))

@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, CoulombFriction
 
-from ddenv.robot.drake.shapes import wheel_friction, world_friction
+from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of, resting_corners, wheel_friction, world_friction
 from ddenv.robot.simulation.template import Template
 from ddenv.world.drive import find_drive
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
+from ddenv.world.extent import shape_bounds
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.whole import whole_of
 from tests.robot.conftest import link_of, model_of, wedge
@@ -147,3 +148,59 @@ def test_spinning_wheels_push_with_mu_times_the_weight(world_of, husky, scenario
 def test_ground_that_is_rougher_than_the_wheels_is_all_the_same(world_of, husky, scenario_of, box):
     runs = [drive(world_of, husky, scenario_of, box, mu).trajectory.tobytes() for mu in (1.5, 100.0, 1000.0)]
     assert runs[0] == runs[1] == runs[2]
+
+
+@pytest.mark.parametrize("shape", [Box((0.4, 0.3, 0.2)), Cylinder(0.2, 0.3), HULL, wedge(0.4, 0.5, 0.3)])
+def test_corner_spheres_lie_just_inside(shape):
+    low, high = shape_bounds(shape, Pose())
+    corners = np.array(corners_of(shape))
+    assert (corners.min(axis=0) - CORNER_RADIUS >= low - 1e-9).all()
+    assert (corners.max(axis=0) + CORNER_RADIUS <= high + 1e-9).all()
+    assert corners.min(axis=0) - CORNER_RADIUS == pytest.approx(low, abs=0.007)
+    assert corners.max(axis=0) + CORNER_RADIUS == pytest.approx(high, abs=0.007)
+
+
+def test_a_mesh_of_many_corners_gets_32_spread_over_it():
+    turns = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    rim = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
+    vertices = np.vstack([rim, rim + np.array([0, 0, 1])])
+    number = np.arange(100)
+    after = (number + 1) % 100
+    sides = [np.column_stack(three) for three in ((number, after, after + 100), (number, after + 100, number + 100))]
+    caps = [np.column_stack([np.full(98, 0), number[2:], number[1:-1]])]
+    caps += [np.column_stack([np.full(98, 100), number[1:-1] + 100, number[2:] + 100])]
+    corners = np.array(corners_of(Mesh("drum", vertices, np.vstack([*sides, *caps]))))
+    assert len(corners) == 32
+    assert np.linalg.norm(corners[:, :2], axis=1) == pytest.approx(np.ones(32), abs=0.01)
+    for end in (corners[corners[:, 2] < 0.5], corners[corners[:, 2] > 0.5]):
+        angles = np.sort(np.arctan2(end[:, 1], end[:, 0]))
+        assert np.diff([*angles, angles[0] + 2 * np.pi]).max() < 1.0
+
+
+def tile(across: int) -> list[Collision]:
+    """A tile of `across` times `across` boxes, 0.5 m apart, with every other one a step higher."""
+    places = [(0.5 * i, 0.5 * j, 0.1 * ((i + j) % 2)) for i in range(across) for j in range(across)]
+    return [Collision("box", Box((0.5, 0.5, 0.2)), Pose(place), 0.5) for place in places]
+
+
+def test_a_link_of_few_shapes_rests_on_all_of_their_corners():
+    collisions = tile(2)
+    assert resting_corners(collisions) == [corners_of(each.shape) for each in collisions]
+
+
+def test_a_link_of_many_shapes_rests_on_the_outermost_corners():
+    collisions = tile(6)
+    rests = resting_corners(collisions)
+    assert len(rests) == 36
+    assert all(set(some) <= set(corners_of(each.shape)) for some, each in zip(rests, collisions, strict=True))
+    places = np.array(
+        [(each.pose @ Pose(corner)).position for each, some in zip(collisions, rests, strict=True) for corner in some]
+    )
+    every = np.array([(each.pose @ Pose(corner)).position for each in collisions for corner in corners_of(each.shape)])
+    assert len(places) < 64
+    # As wide as the whole tile, on top and below.
+    assert places.min(axis=0) == pytest.approx(every.min(axis=0)) and places.max(axis=0) == pytest.approx(
+        every.max(axis=0)
+    )
+    low = places[places[:, 2] == every[:, 2].min()]
+    assert np.ptp(low[:, 0]) > 2 and np.ptp(low[:, 1]) > 2
