@@ -69,7 +69,12 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
 
 
 class Whole(click.IntRange):
+    """A whole number, which the help calls as any number."""
+
     name = "whole number"
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        return "NUMBER"
 
 
 # Options.
@@ -96,8 +101,9 @@ def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) ->
             continue
         # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
         kind = Whole(0) if one.none else one.kind
+        shape = None if one.kind is str else "NUMBER"
         words += f" {one.more}" if one.shown == "method" else ""
-        found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=words))
+        found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or shape, help=words))
     return together(*found)
 
 
