@@ -47,8 +47,7 @@ def world_command() -> None:
 
 def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
-    from ddenv.runs.remedies import with_remembered
-    from ddenv.runs.subject import reading_of
+    from ddenv.runs.subject import reading_of, with_remembered
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN
     from ddenv.world.sdf.read import read_world

@@ -5,21 +5,17 @@ The workbench asks for it; every command that reads a world uses it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runs.remembered import read_state, state_file, write_state
-from ddenv.text import first_of, shortened
-from ddenv.world.access import MissingFiles, is_folder, without_tilde
-
-if TYPE_CHECKING:
-    from ddenv.world.scenario import Reading
+from ddenv.runs.remembered import read_state, write_state
+from ddenv.world.access import is_folder, without_tilde
 
 REMEDIES = "remedies.json"
-# Maximum numbers of URIs that are kept, and that a line names, and the maximum width of each in cells.
-KEPT, NAMED, LONGEST = 1000, 3, 60
+# Maximum number of URIs that are kept.
+KEPT = 1000
 
 
 def remembered() -> dict[str, str]:
@@ -67,30 +63,3 @@ def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[
     stand_ins = tuple(f"{uri}={text}" for uri, text in found.items() if text and not text.startswith("/"))
     more = {"model_path": folders, "stand_in": stand_ins}
     return {**options, **{name: (*options.get(name, ()), *each) for name, each in more.items() if each}}
-
-
-def with_remembered(world: Path, reading: Reading, announce: Callable[[str], None] | None = None) -> Reading:
-    """How to read a world, with the remedies that the user chose for files which it lacks; it says which these are.
-
-    Whatever else is wrong with the world shows when it is read.
-    """
-    from ddenv.runs.subject import reading_of
-    from ddenv.world.sdf.read import read_world
-
-    known, found, read_as = remembered(), dict[str, str](), reading
-    while known:
-        read_as = reading_of(reading, **with_remedies({}, found))
-        try:
-            read_world(world, read_as)
-            break
-        except MissingFiles as error:
-            fresh = {uri: known[uri] for uri in error.uris if uri in known and uri not in found}
-            if not fresh:
-                break
-            found |= fresh
-        except UserError:
-            break
-    if found and announce is not None:
-        names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED)
-        announce(f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out")
-    return read_as if found else reading

@@ -15,10 +15,12 @@ from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import named
-from ddenv.runs.remedies import with_remembered
+from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
+from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
-from ddenv.world.access import is_world, read_bytes, resolved, write_file
+from ddenv.text import first_of, shortened
+from ddenv.world.access import MissingFiles, is_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
@@ -33,6 +35,8 @@ Announce = Callable[[str], None]
 RESOURCE = "resource "
 # The options on how a world is read.
 READING = ("model_path", "stand_in", "ignore", "inside")
+# Maximum number of remembered remedies that a line names, and the maximum width of each in cells.
+NAMED, LONGEST = 3, 60
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     Raises UserError.
     """
     others = dict(given)
-    remembered = others.pop("remembered", False)
+    reads_remembered = others.pop("remembered", False)
     reading = {option: others.pop(option) for option in READING if option in others}
     spawn, goal = given["spawn"], given["goal"]
     if not is_world(Path(name)):
@@ -98,7 +102,7 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
-    if not remembered:
+    if not reads_remembered:
         return scenario
     return scenario.model_copy(update={"reading": with_remembered(scenario.world, read_as, announce)})
 
@@ -120,6 +124,30 @@ def reading_of(
     ignored = dict.fromkeys((*reading.ignore, *ignore))
     within = reading.inside or bool(inside)
     return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored), inside=within)
+
+
+def with_remembered(world: Path, reading: Reading, announce: Announce | None = None) -> Reading:
+    """How to read a world, with the remedies that the user chose for files which it lacks; it says which these are.
+
+    Whatever else is wrong with the world shows when it is read.
+    """
+    known, found, read_as = remembered(), dict[str, str](), reading
+    while known:
+        read_as = reading_of(reading, **with_remedies({}, found))
+        try:
+            read_world(world, read_as)
+            break
+        except MissingFiles as error:
+            fresh = {uri: known[uri] for uri in error.uris if uri in known and uri not in found}
+            if not fresh:
+                break
+            found |= fresh
+        except UserError:
+            break
+    if found and announce is not None:
+        names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED)
+        announce(f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out")
+    return read_as if found else reading
 
 
 def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
