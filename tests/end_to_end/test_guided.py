@@ -22,10 +22,11 @@ def baseline(terminal, tmp_path):
 
 
 @pytest.mark.terminal
-def test_a_reduction_is_guided_by_keys_alone(terminal, baseline):
+def test_a_reduction_is_guided_by_keys_alone(terminal, baseline, tmp_path):
     run = baseline
     bench = terminal(80, 24, "open", "one")
     bench.see("paused")
+    _veto_and_take_it_back(bench, run)
     _pin(bench, run)
     _try_and_adopt(bench, run)
     bench.press("Space")
@@ -34,13 +35,22 @@ def test_a_reduction_is_guided_by_keys_alone(terminal, baseline):
     assert first.minimal
     assert {"deck", "wall", "ball"} == set(first.environment)
     _undo(bench, run)
+    _branch(bench, run)
+    _export(bench, tmp_path)
     bench.press("q")
     bench.see("Keep it running")
     bench.press("l")
     # Whoever comes back finds all of it.
     kinds = [one.kind for one in state_of(run).decisions]
-    for kind in ("pin", "try", "adopt", "undo"):
+    for kind in ("veto", "unveto", "pin", "try", "adopt", "undo", "go_back"):
         assert kind in kinds
+
+
+def _veto_and_take_it_back(bench, run):
+    bench.press("v")
+    bench.see("⊘ vetoed")
+    bench.press("v")
+    wait_until(lambda: not state_of(run).round.candidates[0].verdict)
 
 
 def _pin(bench, run):
@@ -69,6 +79,29 @@ def _undo(bench, run):
     bench.press("u")
     wait_until(lambda: state_of(run).nodes[left - 1].rejected)
     wait_until(lambda: state_of(run).status == "finished")
+
+
+def _branch(bench, run):
+    bench.see("finished")
+    bench.press("h")
+    bench.see("Reductions")
+    bench.see("deck, wall, post, ball")
+    bench.press("Home")
+    bench.see("where the run began")
+    bench.press("Enter")
+    bench.see("The run pauses there")
+    bench.press("y")
+    wait_until(lambda: state_of(run).node == 0 and state_of(run).status == "paused")
+    bench.see("A B parts")
+
+
+def _export(bench, folder):
+    bench.press("E")
+    bench.see("report (HTML)")
+    bench.press("C-s")
+    wait_until(lambda: (folder / "one.html").exists() and (folder / "one.minimal.sdf").exists())
+    bench.press("Escape")
+    bench.see("A B parts")
 
 
 @pytest.mark.terminal
