@@ -158,3 +158,12 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
 def _resume(run: Path) -> subprocess.CompletedProcess:
     words = [sys.executable, "-m", "ddenv", "resume", str(run), "--jobs", "2"]
     return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
+
+
+@pytest.mark.programs
+def test_where_all_of_the_baseline_breaks_there_is_nothing_to_reduce(tmp_path):
+    run = tmp_path / "run.ddenv"
+    create_trusted(own_scenario(tmp_path, "import sys; print('no licence', file=sys.stderr); sys.exit(7)"), run)
+    done = _resume(run)
+    assert done.returncode == 1
+    assert "no baseline run finished: the command's exit code is 7, neither 0 nor 1: no licence" in done.stdout

@@ -238,6 +238,34 @@ def test_an_engine_that_a_killed_study_left_is_waited_for(alone, lab, monkeypatc
     assert engine.poll() == 0 and len(lab.started) == 2
 
 
+def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, monkeypatch):
+    """It was started just before the study was killed: it has the run before the new one's engine has."""
+    gate = threading.Event()
+    start = lab.start_engine
+
+    look, mine, looks = Runner.look, [], []
+
+    def let_go(self):
+        look(self)
+        if mine and mine[0].poll() is not None:
+            looks.append(self)
+        # The study has seen that the new one has given up.
+        if len(looks) > 1:
+            gate.set()
+
+    def late(*words, **options):
+        monkeypatch.setattr("ddenv.study.conduct.start_engine", start)
+        orphan(lab, *alone, gate)
+        mine.append(start(*words, **options))
+        return mine[0]
+
+    monkeypatch.setattr("ddenv.study.conduct.start_engine", late)
+    monkeypatch.setattr(Runner, "look", let_go)
+    code, words = study(*alone)
+    gate.set()
+    assert code == 0, words
+
+
 def test_an_engine_that_was_left_is_stopped_with_the_study(alone, lab, monkeypatch):
     engine = orphan(lab, *alone, gate := threading.Event())
     lab.before = until_stopped
