@@ -87,8 +87,7 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
 def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:
     """CPU time (s) of simulating a run with these wheel speeds."""
     shared, period = template.context, template._clock.command_period
-    built, context = shared.built, shared.plant_context
-    present = keep | template._always
+    built, present = shared.built, keep | template._always
     kept = [body for name, body in built.moving.items() if name in present]
     shared.presence.remove(template.names - present)
     shared.diagram_context.SetTime(0.0)
@@ -99,7 +98,7 @@ def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], sim
 
         def advance() -> None:
             for number, wheels in enumerate(speeds, start=1):
-                motors.FixValue(context, np.concatenate([np.zeros_like(wheels), wheels]))
+                motors.FixValue(shared.plant_context, np.concatenate([np.zeros_like(wheels), wheels]))
                 simulator.AdvanceTo(min(number * period, simulated))
 
         return cpu(advance)[0]

@@ -27,13 +27,12 @@ from ddenv.schemas import nearest
 
 # The commands, and the file of each. Only that of the command that is used is loaded: the workbench is on the screen sooner.
 COMMANDS = {
-    **dict.fromkeys(("run", "resume", "certify", "study"), "run"),
-    **dict.fromkeys(("open", "serve", "learn"), "workbench"),
+    **dict.fromkeys(("run", "resume", "certify"), "run"),
+    **dict.fromkeys(("open", "serve"), "workbench"),
     **dict.fromkeys(("runs", "schemas", "config", "doctor"), "lists"),
     **dict.fromkeys(("export", "reproduce", "report"), "share"),
     **dict.fromkeys(("why", "isolate", "margins"), "explain"),
-    "test": "test",
-    "world": "world",
+    **{name: name for name in ("test", "learn", "study", "world")},
 }
 
 
