@@ -1,18 +1,21 @@
 """The list of all runs: how each stands, and what can be done with it."""
 
 from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
 
 import fake_moments
 import fake_run
 import pytest
 from textual import events
+from textual.app import App
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.runs.recent_runs import RunsFolder
+from ddenv.workbench.runs.recent_runs import Recent, RunsFolder
 from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
 from ddenv.workbench.runs.runs_table import RunTable, compared, differences
 from ddenv.workbench.setup.setup_screen import SetupScreen
@@ -107,6 +110,23 @@ async def test_every_run_says_how_it_stands(several, runs):
         assert listed.rows()["crates-1"][3] == "11"
         assert "another" in listed.rows()
         assert listed.table.chosen.path.stem == "done"
+
+
+async def test_while_runs_are_first_read_a_cursor_that_nobody_moved_stays_at_the_newest_run():
+    copied, new, old = (
+        Recent(Path(f"{name}.ddenv"), changed) for name, changed in (("a", 9.0), ("b", 8.0), ("c", 7.0))
+    )
+    app = App()
+    async with app.run_test() as pilot:
+        await app.mount(table := RunTable(id="runs"))
+        table.show([copied, new, old], "changed")
+        # The file is a copy: its run is older than the file.
+        copied = replace(copied, changed=1.0, status="finished")
+        table.show([new, old, copied], "changed")
+        assert table.chosen == new
+        await pilot.press("down")
+        table.show([old, new, copied], "changed")
+        assert table.chosen == old
 
 
 @pytest.mark.screens

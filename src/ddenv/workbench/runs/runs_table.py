@@ -178,9 +178,15 @@ class RunTable(DataTable[Text]):
     def chosen(self) -> Recent | None:
         return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
 
+    @property
+    def _followed(self) -> Recent | None:
+        """The run on which the cursor stays. While runs are first read, their order changes: a cursor at the top stays there."""
+        is_reading = any(not run.status and not run.trouble for run in self._runs)
+        return None if is_reading and self.cursor_row == 0 else self.chosen
+
     def show(self, runs: list[Recent], order: str) -> None:
         """Shows these in this order, whose column is marked; the cursor stays on its run."""
-        before, paths, chosen = self._runs, [run.path for run in runs], self.chosen
+        before, paths, followed = self._runs, [run.path for run in runs], self._followed
         self._runs = list(runs)
         if (self._wide, self._order) == (self.size.width, order) and paths == [run.path for run in before]:
             for was, run in zip(before, runs, strict=True):
@@ -202,8 +208,8 @@ class RunTable(DataTable[Text]):
             self.add_column(Text(title, justify="right" if number else "left"), width=width, key=name)
         for run in runs:
             self.add_row(*self._row(run), key=str(run.path))
-        if chosen is not None and chosen.path in paths:
-            self.move_cursor(row=paths.index(chosen.path), animate=False)
+        if followed is not None and followed.path in paths:
+            self.move_cursor(row=paths.index(followed.path), animate=False)
 
     def on_resize(self) -> None:
         self.show(self._runs, self._order)
