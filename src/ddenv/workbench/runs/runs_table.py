@@ -25,7 +25,7 @@ from ddenv.workbench.shared.bindings import keys
 MOST_NAMES, MOST_COMPARED, LONGEST = 40, 20, 60
 NONE = "none"
 # What the screen shows elsewhere, or what every run has its own of.
-ASIDE = ("name", "description")
+ASIDE = ("name", "description", "folder")
 # Files are the same if their names are: a run holds its own copy, and its machine has other folders.
 FILES = ("world", "model")
 
