@@ -72,6 +72,9 @@ class Status(Widget):
 
         At an earlier moment of the run, `place` is its number, and the number of moments.
         """
+        if (scene, asked, place) == self._besides and snapshot is self._snapshot:
+            # Counting the tests of a long run takes longer than answering a key.
+            return
         self._snapshot, self._besides = snapshot, (scene, asked, place)
         now = facts(snapshot, scene, asked) if place is None else facts_of_past(snapshot, scene, *place)
         if now != self._facts:
