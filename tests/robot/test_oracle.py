@@ -1,4 +1,4 @@
-"""In which way a robot failed, and when a failure is the same failure."""
+"""How a robot failed, and when two failures are the same."""
 
 from __future__ import annotations
 

@@ -53,8 +53,8 @@ Make = Callable[[Scenario, World, Model], Simulator]
 
 @dataclass(frozen=True)
 class Start:
-    """What rests on what in the settled world, as (upper, lower), and how it settled. `ties` has models with what they are tied to:
-    without it they would move by themselves. None: nothing is known without a test.
+    """Which models rest on which in the settled world, as (upper, lower), and how it settled. `ties` are pairs of a model and one
+    that it is tied to, without which it would move by itself. None: nothing is known without a test.
     """
 
     supports: list[tuple[str, str]]

@@ -1,4 +1,4 @@
-"""Rehearsals: scripts of piles, how a world comes to rest before the robot moves, and what rests on what."""
+"""Rehearsals: scripts of piles, how a world comes to rest before the robot moves, and which models rest on which."""
 
 from __future__ import annotations
 

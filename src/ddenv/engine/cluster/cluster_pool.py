@@ -164,8 +164,8 @@ class ClusterPool:
     def __init__(
         self, scenario: Scenario, world: World, robot: Model, cluster: str, tell: Callable[[int, str], None]
     ) -> None:
-        """`tell` is told how many tests the cluster makes at the same time now, and a sentence. Raises UserError if no scheduler
-        answers, or where Drake is needed and not installed.
+        """Calls `tell` with the number of tests that the cluster can run at the same time, and a sentence. Raises UserError if no
+        scheduler answers, or where Drake is needed and not installed.
         """
         self._cluster, self._tell, self._parts = cluster, tell, (scenario, world, robot)
         self._blob = pickle.dumps(self._parts)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text, TextType
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.message import Message
-from textual.screen import ModalScreen, ScreenResultType
+from textual.screen import ModalScreen, Screen
 from textual.widgets import DirectoryTree, Input, OptionList, Static
 from textual.widgets.option_list import Option
 
@@ -121,27 +122,20 @@ class WorldTree(DirectoryTree):
         return Text(plain(label))
 
 
-class Asks(ModalScreen[ScreenResultType]):
-    """A dialog with one line to type, which `take` takes; the UserError that it raises is shown in the dialog."""
-
-    def take(self, text: str) -> None:
-        raise NotImplementedError
-
-    @on(Input.Submitted)
-    def _typed(self, event: Input.Submitted) -> None:
-        self.answer(event.value)
-
-    def answer(self, text: str) -> None:
-        try:
-            self.take(text)
-        except UserError as error:
-            self.complain(str(error))
-
-    def complain(self, words: str) -> None:
-        self.query_one("#wrong", Static).update(Text(plain(words)))
+@contextmanager
+def complaints(dialog: Screen[Any]) -> Iterator[None]:
+    """Shows a UserError in the dialog, which stays open."""
+    try:
+        yield
+    except UserError as error:
+        complain(dialog, str(error))
 
 
-class OpenFile(Asks[Path | None]):
+def complain(dialog: Screen[Any], words: str) -> None:
+    dialog.query_one("#wrong", Static).update(Text(plain(words)))
+
+
+class OpenFile(ModalScreen[Path | None]):
     """Asks for a scenario or world file."""
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="open.cancel", tooltip="choose no file")]
@@ -157,10 +151,15 @@ class OpenFile(Asks[Path | None]):
 
     @on(DirectoryTree.FileSelected)
     def _chosen(self, event: DirectoryTree.FileSelected) -> None:
-        self.answer(str(event.path))
+        self._take(str(event.path))
 
-    def take(self, text: str) -> None:
-        self.dismiss(path_to_open(text))
+    @on(Input.Submitted)
+    def _typed(self, event: Input.Submitted) -> None:
+        self._take(event.value)
+
+    def _take(self, text: str) -> None:
+        with complaints(self):
+            self.dismiss(path_to_open(text))
 
 
 def path_to_open(text: str) -> Path:
@@ -209,7 +208,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     write_file(path, scenario_text(keys_in(path.resolve().parent, scenario), scenario))
 
 
-class SaveScenario(Asks[Path | None]):
+class SaveScenario(ModalScreen[Path | None]):
     """Returns the file that was written, or None. An existing file is only replaced after a second enter."""
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="save.cancel", tooltip="write nothing")]
@@ -229,20 +228,22 @@ class SaveScenario(Asks[Path | None]):
     @on(Input.Changed)
     def _changed(self) -> None:
         self._replace = None
-        self.complain("")
+        complain(self, "")
 
-    def take(self, text: str) -> None:
-        path = scenario_path(text)
-        if is_file(path) and path != self._replace:
-            self._replace = path
-            raise UserError(f"{path} exists already: enter again replaces it, or type another name")
-        self._write(path)
+    @on(Input.Submitted)
+    def _typed(self, event: Input.Submitted) -> None:
+        with complaints(self):
+            path = scenario_path(event.value)
+            if is_file(path) and path != self._replace:
+                self._replace = path
+                raise UserError(f"{path} exists already: enter again replaces it, or type another name")
+            self._write(path)
 
     @work(thread=True, group="save", exclusive=True)
     def _write(self, path: Path) -> None:
         try:
             save_scenario(self._scenario, path)
         except UserError as error:
-            call_if_open(self, self.complain, str(error))
+            call_if_open(self, complain, self, str(error))
             return
         call_if_open(self, self.dismiss, path)

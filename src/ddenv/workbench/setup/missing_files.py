@@ -18,14 +18,15 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.message import Message
-from textual.widgets import OptionList, Static
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.runs.remedies import remedy, remembered, with_remedies
 from ddenv.text import count, plain
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.setup.files import Asks
+from ddenv.workbench.setup.files import complaints
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.world.access import MissingFiles
@@ -88,7 +89,7 @@ def read_with_remedies(
         by = next((note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)), "left out")
         words = f"in {text}" if text.startswith("/") else by.removeprefix("a guess, ").removeprefix("the stand-in ")
         if not text:
-            words = f"{f'not in {vain[uri]}; ' if uri in vain else ''}guess {words}"
+            words = f"not in {vain[uri]}; guess {words}" if uri in vain else f"guess {words}"
         missing.append(Missing(uri, text, words))
     return world, chosen, tuple(missing)
 
@@ -171,7 +172,7 @@ class MissingList(OptionList):
         return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
 
 
-class AskRemedy(Asks[str | None]):
+class AskRemedy(ModalScreen[str | None]):
     """Asks for the remedy of one missing file."""
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="remedy.cancel", tooltip="change nothing")]
@@ -188,7 +189,9 @@ class AskRemedy(Asks[str | None]):
             yield Static("", id="wrong", classes="wrong", markup=False)
             yield Static(Text(HOW, "dim"), markup=False)
 
-    def take(self, text: str) -> None:
-        if not text.strip() and not self._row.remedy:
-            raise UserError("type one of these, or press escape to change nothing")
-        self.dismiss(remedy(text))
+    @on(Input.Submitted)
+    def _typed(self, event: Input.Submitted) -> None:
+        with complaints(self):
+            if not event.value.strip() and not self._row.remedy:
+                raise UserError("type one of these, or press escape to change nothing")
+            self.dismiss(remedy(event.value))

@@ -71,7 +71,7 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     from ddenv.runs.tests_left import rough_run
 
     reduction = scenario.reduction
-    # Another simulator does not say what took part.
+    # Another simulator does not say which models affected a run.
     rough = rough_run(models, reduction, past.rate, slices=scenario.oracle is None)
     low, middle, high = rough.tests
     budget = getattr(reduction, "budget", None)
