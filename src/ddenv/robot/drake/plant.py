@@ -33,10 +33,14 @@ from pydrake.multibody.tree import (
 from pydrake.multibody.tree import Joint as DrakeJoint
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from ddenv.robot.drake.contact_shapes import contact_shapes, turning_joints
 from ddenv.robot.drake.shapes import (
     CORNER_RADIUS,
+    DISSIPATION,
+    WHEEL_DISSIPATION,
     drake_shape,
     resting_corners,
+    stiffness,
     surface,
     to_drake,
     transform,
@@ -109,7 +113,7 @@ class Built:
     """The plant of a world.
 
     `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
-    world. `moving` are the dynamic models in the order of the world file; `twins` stand for those of them that float. `own_pairs`
+    world. `moving` are the dynamic models in the order in which they were added; `twins` stand for those of them that float. `own_pairs`
     are the geometries of each two links of a model that touch each other: none, unless it collides with itself.
     """
 
@@ -143,25 +147,26 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     plant, scene_graph = AddMultibodyPlant(config, builder)
     plant.mutable_gravity_field().set_gravity_vector(np.array(world.gravity))
     wheels = wheel_friction(robot, drive)
+    # The order in which models are added is the order of the solver's unknowns, which decides the last bits of every result. The
+    # robot comes first.
+    models = sorted(world.models, key=_place_in_order)
     static = {
-        model.name: tuple(_register(plant, plant.world_body(), Pose(), still_links(model), wheels, corners=False))
-        for model in world.models
+        model.name: tuple(_register(plant, plant.world_body(), Pose(), model, still_links(model), wheels, corners=False))
+        for model in models
     }
-    # The order in which moving models are added is the order of the solver's unknowns, which decides the last bits of every
-    # result. It is always the file's order, with the robot first.
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
     for joint in (joint for joint in robot.joints if joint.name in drive.joints):
         actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
         actuator.set_controller_gains(PdControllerGains(p=0.0, d=motor_gain))
     moving = {
         model.name: _add_moving(plant, scene_graph, model, f"model/{model.name}", wheels)
-        for model in world.models
+        for model in models
         if not model.static and model.links
     }
     # Those that can lie anywhere, and touch themselves nowhere.
     twins = {
         model.name: _twin(plant, model, wheels)
-        for model in world.models
+        for model in models
         if model.name in moving
         and not model.self_collide
         and all("world" not in (j.parent, j.child) for j in model.joints)
@@ -181,17 +186,29 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins, own_pairs)
 
 
+def _place_in_order(model: Model) -> tuple[object, ...]:
+    """What sorts models by where they are and what shapes they have; by name only where these are equal.
+
+    So a run does not depend on the order of the models in a file.
+    """
+    shapes = [(link.pose, [(one.pose, one.shape) for one in link.collisions]) for link in model.links]
+    return model.pose.position, model.pose.quaternion, repr(shapes), model.name
+
+
 def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
     # Without corners: the model rests on nothing while its twin stands for it.
-    if len(model.collisions) <= MANY:
+    stand_ins = [contact_shapes(model, link) for link in model.links]
+    if sum(len(shapes) for of_link in stand_ins for shapes in of_link) <= MANY:
         parts: list[Part] = []
-        for number, link in enumerate(model.links):
-            for one in link.collisions:
-                name = str(plant.num_collision_geometries())
-                away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
-                shape, properties = drake_shape(one.shape), surface(world_friction(one.mu, wheels))
-                geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, shape, name, properties)
-                parts.append(Part(geometry, number, shape, transform(link.pose.inverse() @ one.pose), away))
+        for number, (link, of_link) in enumerate(zip(model.links, stand_ins, strict=True)):
+            for collision, shapes in zip(link.collisions, of_link, strict=True):
+                properties = surface(world_friction(collision.mu, wheels), stiffness(model))
+                for shape, pose in shapes:
+                    name = str(plant.num_collision_geometries())
+                    away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
+                    solid = drake_shape(shape)
+                    geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid, name, properties)
+                    parts.append(Part(geometry, number, solid, transform(link.pose.inverse() @ pose), away))
         return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
     shapes: list[GeometryId] = []
@@ -202,7 +219,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         frame = cast(FixedOffsetFrame, plant.AddFrame(loose))
         body = plant.AddRigidBody(link.name, instance, SpatialInertia.Zero())
         plant.AddJoint(WeldJoint(f"weld/{link.name}", frame, body.body_frame(), RigidTransform()))
-        shapes += _register(plant, body, link.pose.inverse(), [link], wheels, corners=False)
+        shapes += _register(plant, body, link.pose.inverse(), model, [link], wheels, corners=False)
         places.append((frame, away))
     return Twin(tuple(shapes), places=tuple(places))
 
@@ -218,7 +235,7 @@ def _add_moving(
     boxes: list[Bounds | None] = []
     for link, body in zip(model.links, bodies, strict=True):
         free: tuple[Link, ...] = () if link.name in still else (link,)
-        geometry += _register(plant, body, link.pose.inverse(), free, wheels, corners=wheels is not None)
+        geometry += _register(plant, body, link.pose.inverse(), model, free, wheels, corners=wheels is not None)
         boxes.append(bounds(link.collisions, link.pose.inverse()) if free else None)
     if not model.self_collide:
         scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometry)))
@@ -242,25 +259,32 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
 
 
 def _register(
-    plant: MultibodyPlant, body: RigidBody, frame: Pose, links: Iterable[Link], wheels: float | None, corners: bool
+    plant: MultibodyPlant,
+    body: RigidBody,
+    frame: Pose,
+    model: Model,
+    links: Iterable[Link],
+    wheels: float | None,
+    corners: bool,
 ) -> list[GeometryId]:
-    """Registers the collisions of `links` on `body`; `frame` is the pose of the world in the body's frame.
+    """Registers the collisions of `links` of `model` on `body`; `frame` is the pose of the world in the body's frame.
 
     With `corners`, each gets small spheres to rest on: a face that rests on a single contact point would creep.
     """
     identities = []
     for link in links:
+        dissipation = WHEEL_DISSIPATION if turning_joints(model, link) else DISSIPATION
         rests = resting_corners(link.collisions) if corners else [[]] * len(link.collisions)
-        for collision, places in zip(link.collisions, rests, strict=True):
+        for collision, parts, places in zip(link.collisions, contact_shapes(model, link), rests, strict=True):
             mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
-            shapes = [(drake_shape(collision.shape), collision.pose)]
+            properties = surface(mu, stiffness(model), dissipation)
+            shapes = [(drake_shape(shape), pose) for shape, pose in parts]
             shapes += [(Sphere(CORNER_RADIUS), collision.pose @ Pose(place)) for place in places]
             for shape, pose in shapes:
                 # Drake requires different names; nothing reads them.
                 name = str(plant.num_collision_geometries())
-                identities.append(
-                    plant.RegisterCollisionGeometry(body, transform(frame @ pose), shape, name, surface(mu))
-                )
+                place = transform(frame @ pose)
+                identities.append(plant.RegisterCollisionGeometry(body, place, shape, name, properties))
     return identities
 
 

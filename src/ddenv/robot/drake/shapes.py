@@ -19,10 +19,24 @@ from ddenv.world.drive import Drive, wheel_links
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 
-# Every surface has the same compliance. It is explicit because Drake would otherwise derive it from the masses in the world, and
-# removing a model would change the contacts of all others. Two such surfaces in series give 1e5 N/m: a Husky sinks in by 1.4 mm.
-STIFFNESS = 2e5  # N/m
-DISSIPATION = 5.0  # s/m, Hunt-Crossley
+# The contact of two surfaces is as stiff as both in series. Drake would derive it from the masses in the world, and removing a model
+# would change the contacts of all others; here it follows from the model's own mass. On a single contact no model sinks by more than
+# `SINK`, and none is softer than `SOFTEST`. What never moves is rigid.
+SINK = 4e-3  # m
+SOFTEST = 1e5  # N/m
+RIGID = 1e12  # N/m
+GRAVITY = 9.81  # m/s^2, whatever the world's is
+# Hunt-Crossley dissipation, s/m. Wheels have less: their spheres come and go, and each that comes would push, but grip a step later.
+DISSIPATION = 5.0
+WHEEL_DISSIPATION = 1.0
+
+
+def stiffness(model: Model) -> float:
+    """The stiffness of the surfaces of `model`, N/m."""
+    if model.static:
+        return RIGID
+    mass = sum(link.inertia.mass for link in model.links if link.inertia is not None)
+    return max(SOFTEST, mass * GRAVITY / SINK)
 
 
 def to_drake(array: Floats) -> Any:
@@ -51,13 +65,13 @@ def world_friction(mu: float, wheels: float) -> float:
     return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
 
 
-def surface(mu: float) -> drake.ProximityProperties:
-    """A surface with Drake's friction coefficient `mu`.
+def surface(mu: float, stiffness: float, dissipation: float = DISSIPATION) -> drake.ProximityProperties:
+    """A surface with Drake's friction coefficient `mu`, its `stiffness` (N/m) and `dissipation` (s/m).
 
     Static and dynamic friction are equal: with a difference, wheels stick and slip at the rate of the time steps.
     """
     properties = drake.ProximityProperties()
-    drake.AddContactMaterial(DISSIPATION, STIFFNESS, CoulombFriction(mu, mu), properties)
+    drake.AddContactMaterial(dissipation, stiffness, CoulombFriction(mu, mu), properties)
     return properties
 
 

@@ -201,7 +201,7 @@ class Stillness:
 class Script:
     """How a pile of K models moves alone, with a row for each tick of the clock.
 
-    `names` are its models in the order of the world file. `states` (T, E) are the pile's positions and velocities in the order of
+    `names` are its models in the order of the plant. `states` (T, E) are the pile's positions and velocities in the order of
     `Hold.entries`; `motions` and `paces` (T of each) are those of its links, paces their mean speeds since the row before, m/s.
     `resting` (K,) are the models that are at rest after the last row, or have fallen out of the world.
     """

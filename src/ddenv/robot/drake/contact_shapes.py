@@ -1,0 +1,194 @@
+"""The boxes and spheres that stand for a collision, so that contacts are right at edges.
+
+Drake computes the contact of a sphere with a box, and that of two boxes, exactly. Nearly all other pairs go through a general
+solver that is wrong at edges: there its normal is the line between the centres of the two shapes, so that a cylinder which rolls
+over a lip of 1 mm hits a wall, and the longer the slab behind the lip, the steeper that wall. `benchmarks/contact_normals.py`
+measures each pair. docs/how-it-works.md says what stands for what.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv.arrays import Floats
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Joint, Link, Mesh, Model, Shape, Sphere
+from ddenv.world.model import held_with, is_fixed
+from ddenv.world.pose import Pose, Vector, vector
+
+# A shape at its place in the frame of the collision.
+Placed = tuple[Shape, Pose]
+
+# How far a wheel may rise and fall as it rolls from sphere to sphere on a plane: this many m, and this share of its radius.
+BUMP = 1e-3
+BUMP_SHARE = 6e-3
+# How far an edge may sink in between two spheres of a wheel, as a share of the wheel's radius.
+DIP_SHARE = 0.012
+# The spheres of a thin wheel have this share of its radius: smaller ones would leave gaps between them.
+THINNEST = 1 / 12
+MOST_SPHERES = 96  # of one ring
+# How far the sides of a prism may lie from the cylinder that it stands for, m, and the number of its sides.
+FLAT = 5e-3
+FEWEST_SIDES = 16
+MOST_SIDES = 96
+
+
+def contact_shapes(model: Model, link: Link) -> list[list[Placed]]:
+    """For each collision of `link` what stands for it; the poses are in the world, as the model starts."""
+    axles = turning_joints(model, link)
+    loose = not model.static and not axles
+    return [
+        [(shape, collision.pose @ pose) for shape, pose in _parts(collision, axles, loose)]
+        for collision in link.collisions
+    ]
+
+
+def turning_joints(model: Model, link: Link) -> tuple[Joint, ...]:
+    """The joints of `model` that turn `link` about an axis: its axle if it is a wheel."""
+    held = held_with(model, link.name)
+    turning = (joint for joint in model.joints if joint.kind in ("revolute", "continuous"))
+    return tuple(joint for joint in turning if joint.child in held and not is_fixed(joint))
+
+
+def _parts(collision: Collision, axles: Sequence[Joint], loose: bool) -> list[Placed]:
+    for axle in axles:
+        wheel = wheel_of(collision, axle)
+        if wheel is not None:
+            return tyre(wheel)
+    match collision.shape:
+        case Cylinder(radius, length):
+            return _cylinder(radius, length, loose)
+        case Capsule(radius, length):
+            ends = [(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)]
+            return [*prism(radius, length, rolls=loose), *ends]
+    return [(collision.shape, Pose())]
+
+
+def _cylinder(radius: float, length: float, loose: bool) -> list[Placed]:
+    """A cylinder along z. One that is `loose` may roll: spheres as wide as it touch the ground between the prism's edges."""
+    boxes = prism(radius, length, rolls=loose)
+    if not loose:
+        return boxes
+    width = min(length / 2, radius)
+    ends = sorted({width - length / 2, length / 2 - width})
+    return [*boxes, *(sphere for end in ends for sphere in ring(radius, width, end))]
+
+
+def prism(radius: float, length: float, rolls: bool) -> list[Placed]:
+    """The boxes that together fill a prism in place of a cylinder along z.
+
+    Each is as wide as one side of the prism, and reaches from there through the axis to the opposite side. The prism lies inside
+    a cylinder that `rolls`; else its sides are as far outside the cylinder as inside.
+    """
+    needed = math.pi / math.acos(max(0.0, 1.0 - FLAT / radius))
+    half = math.ceil(min(max(needed, FEWEST_SIDES), MOST_SIDES) / 2)
+    angle = math.pi / (2 * half)
+    outer = radius if rolls else radius * angle / math.sin(angle)
+    box = Box((2 * outer * math.cos(angle), 2 * outer * math.sin(angle), length))
+    return [(box, Pose.from_rpy(0.0, 0.0, 0.0, 0.0, 0.0, 2 * angle * number)) for number in range(half)]
+
+
+@dataclass(frozen=True, slots=True)
+class Wheel:
+    """What rolls: `radius` and `width` in m, its axle along the z axis of `pose` in the frame of the collision."""
+
+    radius: float
+    width: float
+    pose: Pose = Pose()
+
+
+def tyre(wheel: Wheel) -> list[Placed]:
+    """The spheres that stand for a wheel: a ring of them, which has a real tyre's round shoulders, or several side by side.
+
+    The mean radius on which it rolls is the wheel's.
+    """
+    radius, half = wheel.radius, wheel.width / 2
+    shoulder = min(max(half, THINNEST * radius), radius / 2)
+    if half > radius:
+        # Between two rings that are its shoulders the whole wheel fits as a ball.
+        inside = half - radius
+        balls = np.linspace(-inside, inside, 1 + math.ceil(4 * inside / radius)).tolist()
+        rows = [(shoulder, shoulder - half), (shoulder, half - shoulder), *((radius, place) for place in balls)]
+    else:
+        inside = max(0.0, half - shoulder)
+        count = 1 + math.ceil(2 * inside / shoulder)
+        rows = [(shoulder, place) for place in (np.linspace(-inside, inside, count) if count > 1 else (0.0,))]
+    spheres = (sphere for width, place in rows for sphere in ring(radius, width, place))
+    return [(sphere, wheel.pose @ pose) for sphere, pose in spheres]
+
+
+def ring(radius: float, width: float, height: float) -> list[Placed]:
+    """Spheres of the radius `width` (m) in a ring around z at `height` (m), which reach as far as a wheel of `radius` (m).
+
+    A wheel's centre is highest where it stands on one sphere, and lowest between two: it rolls on the mean, so they stand out.
+    """
+    inner = radius - width
+    if inner < BUMP_SHARE * radius:
+        return [(Sphere(radius), Pose((0.0, 0.0, height)))]
+    bump = min(BUMP, BUMP_SHARE * radius)
+    even = math.pi / math.acos(max(0.0, 1.0 - bump / inner))
+    closed = math.tau * inner / math.sqrt(8 * width * DIP_SHARE * radius)
+    count = min(math.ceil(max(even, closed)), MOST_SPHERES)
+    inner *= (math.pi / count) / math.sin(math.pi / count)
+    angles = (math.tau * number / count for number in range(count))
+    places: list[Vector] = [(inner * math.cos(angle), inner * math.sin(angle), height) for angle in angles]
+    return [(Sphere(width), Pose(place)) for place in places]
+
+
+# A shape is a wheel if its axis is that of the joint, up to this share of its radius, and it is so round.
+CENTRED = 0.03
+ROUND = 0.95
+DIRECTIONS = 24
+
+
+def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
+    """The wheel that a collision is on the joint `axle`; None if it is none, or a sphere, which needs nothing in its place."""
+    pose, shape = collision.pose, collision.shape
+    # The axle as seen from the collision.
+    back = pose.inverse()
+    axis = np.array(back.rotate(axle.axis))
+    place = np.array((back @ axle.pose).position)
+    match shape:
+        case Cylinder(radius, length):
+            width = length
+        case Capsule(radius, length):
+            width = length + 2 * radius
+        case Ellipsoid((across, other, along)) if math.isclose(across, other, rel_tol=CENTRED):
+            # The circle that fits its cross-section at the ground has this radius.
+            radius, width = across, 2 * min(along * along / across, across)
+        case Mesh(_, vertices):
+            return _round_mesh(vertices, place, axis)
+        case _:
+            return None
+    aside = math.hypot(place[0], place[1])
+    if abs(axis[2]) < 1 - CENTRED**2 / 2 or aside > CENTRED * radius:
+        return None
+    return Wheel(radius, width)
+
+
+def _round_mesh(vertices: Floats, place: Floats, axis: Floats) -> Wheel | None:
+    """The wheel that a hull of `vertices` (N, 3) m is about the line through `place` (3,) m along the unit vector `axis` (3,)."""
+    turn = _pointing(axis)
+    points = (vertices - place) @ turn.rotation()
+    far = np.hypot(points[:, 0], points[:, 1])
+    radius = float(far.max())
+    angles = math.tau * np.arange(DIRECTIONS) / DIRECTIONS
+    reach = (points[:, :2] @ np.vstack([np.cos(angles), np.sin(angles)])).max(axis=0)
+    if reach.min() < ROUND * radius:
+        return None
+    tread = points[far > ROUND * radius, 2]
+    low, high = float(tread.min()), float(tread.max())
+    middle = vector(place + axis * (low + high) / 2)
+    return Wheel(radius, high - low, Pose(middle, turn.quaternion))
+
+
+def _pointing(axis: Floats) -> Pose:
+    """The least turn that takes the z axis to the unit vector `axis` (3,)."""
+    x, y, z = axis.tolist()
+    length = math.hypot(x, y, 1.0 + z)
+    if length < 1e-9:
+        return Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
+    return Pose(quaternion=((1.0 + z) / length, -y / length, x / length, 0.0))
