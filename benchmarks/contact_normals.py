@@ -4,12 +4,12 @@
 
 A piece of some length, 0.1 m thick, and a thing as large as a wheel touch by 1 mm: a flat or smooth
 side on a side (face), an edge of either on a side or across an edge (edge), a corner of either on a
-side (corner). Each shape of a pair is once the piece and once the thing. Poses are random, with the
-contact anywhere on side and edge. Exact is the least depth over all directions.
+side (corner). Both shapes are piece and thing. Poses are random, the contact is anywhere on a side
+or edge. Exact is the least depth over all directions.
 
-Prints a row for each pair: the largest angle between Drake's normal and the exact one, in degrees,
-for each length of the piece, and the largest error of the depth, in %. With `--quantile 0.5` it is
-the median of each. Exact are pairs without an angle above 0.001 degrees or a depth off by 0.001 %.
+Prints a row for each pair: the largest angle between Drake's normal and the exact one, degrees, for
+each length of the piece, and the largest error of the depth, %; medians with `--quantile 0.5`. Exact
+are pairs with no angle above 0.001 degrees and no depth off by 0.001 %.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations_with_replacement
-from typing import Any
 
 import numpy as np
 from pydrake import geometry
@@ -35,8 +34,6 @@ SITUATIONS = {
     "edge": [("edge", "side"), ("side", "edge"), ("edge", "edge")],
     "corner": [("corner", "side"), ("side", "corner")],
 }
-# Directions that the search for the least depth looks at before it refines the best.
-LOOKS = np.random.default_rng(0).normal(size=(2000, 3))
 FINE = {"xatol": 1e-9, "fatol": 1e-14}
 facing = partial(RotationMatrix.MakeFromOneVector, axis_index=2)
 # A point of a shape and its normal there; the normal of a contact and its depth, m.
@@ -48,7 +45,7 @@ Contact = tuple[np.ndarray, float]
 class Body:
     """A convex shape, how far it reaches in directions (N, 3), and its features: random touches."""
 
-    shape: Any
+    shape: geometry.Shape
     reach: Callable[[np.ndarray], np.ndarray]
     features: dict[str, Callable[[np.random.Generator], Touch]]
 
@@ -59,8 +56,7 @@ def main() -> None:
     parser.add_argument("--quantile", type=float, default=1.0, help="1 is the largest error")
     options = parser.parse_args()
     heads = [f"{situation}: {', '.join(map(str, LENGTHS))} m" for situation in SITUATIONS]
-    print(f"| pair | normals | {' | '.join(heads)} | depth, % |")
-    print("|---|---|---|---|---|---|", flush=True)
+    print(f"| pair | normals | {' | '.join(heads)} | depth, % |\n{'|---' * 6}|", flush=True)
     for pair in combinations_with_replacement(bodies(length=1.0, thickness=1.0), 2):
         print(row(pair, options.poses, options.quantile), flush=True)
 
@@ -72,12 +68,12 @@ def row(pair: tuple[str, str], poses: int, quantile: float) -> str:
         angles = [f"{np.quantile(some, quantile, axis=0)[0]:.1f}" for some in by_length if some]
         found += [one for some in by_length for one in some]
         cells.append(", ".join(angles) or "-")
-    kind = "exact" if np.max(found) < 1e-3 else "general"
     cells.append(f"{np.quantile(found, quantile, axis=0)[1]:.1f}")
-    return f"| {' and '.join(pair)} | {kind} | {' | '.join(cells)} |"
+    first = [" and ".join(pair), "exact" if np.max(found) < 1e-3 else "general"]
+    return f"| {' | '.join(first + cells)} |"
 
 
-def errors(pair: tuple[str, str], length: float, ways: list[Any], poses: int) -> list[list[float]]:
+def errors(pair: tuple[str, str], length: float, ways: list, poses: int) -> list[list[float]]:
     """Of angle, degrees, and depth, %, where they touch in these ways."""
     chance, found = np.random.default_rng(0), []
     for one, other in sorted({pair, pair[::-1]}):
@@ -99,7 +95,7 @@ def errors(pair: tuple[str, str], length: float, ways: list[Any], poses: int) ->
     return found
 
 
-def drake(piece: Any, thing: Any) -> Callable[[RigidTransform], Contact]:
+def drake(piece: geometry.Shape, thing: geometry.Shape) -> Callable[[RigidTransform], Contact]:
     """A function from the thing's pose to Drake's contact. The normal points out of the piece."""
     scene = geometry.SceneGraph()
     source = scene.RegisterSource("contact")
@@ -133,8 +129,8 @@ def exact(piece: Body, thing: Body, pose: RigidTransform, starts: list[np.ndarra
     def tilted(xy: np.ndarray, plane: np.ndarray) -> float:
         return float(way(np.array([plane @ [*xy, 1.0]]))[0])
 
-    found = []
-    for start in [*starts, LOOKS[np.argmin(way(LOOKS))]]:
+    found, looks = [], np.random.default_rng(0).normal(size=(2000, 3))
+    for start in [*starts, looks[np.argmin(way(looks))]]:
         plane = facing(start).matrix()
         least = minimize(tilted, x0=[0, 0], args=(plane,), method="Nelder-Mead", options=FINE)
         found.append((least.fun, plane @ [*least.x, 1.0]))
@@ -159,7 +155,7 @@ def bodies(length: float, thickness: float) -> dict[str, Body]:
     }
 
 
-def polytope(vertices: np.ndarray, shape: Any) -> Body:
+def polytope(vertices: np.ndarray, shape: geometry.Shape) -> Body:
     facets = np.unique(ConvexHull(vertices).equations.round(9), axis=0)
     on = np.abs(vertices @ facets[:, :3].T + facets[:, 3]) < 1e-6
 
@@ -176,7 +172,7 @@ def polytope(vertices: np.ndarray, shape: Any) -> Body:
     return Body(shape, lambda directions: (directions @ vertices.T).max(axis=1), features)
 
 
-def ellipsoid(axes: np.ndarray, shape: Any) -> Body:
+def ellipsoid(axes: np.ndarray, shape: geometry.Shape) -> Body:
     def side(chance: np.random.Generator) -> Touch:
         unit = along(chance, [1, 1, 1])
         return unit * axes, unit / axes / np.linalg.norm(unit / axes)
@@ -192,9 +188,8 @@ def cylinder(radius: float, half: float) -> Body:
         return radius * np.sqrt(part) * out + half * up, up
 
     def edge(chance: np.random.Generator) -> Touch:
-        normal = along(chance, [1, 1, 1])
-        point = [*radius * normal[:2] / np.linalg.norm(normal[:2]), half * np.sign(normal[2])]
-        return np.array(point), normal
+        out, up, tilt = along(chance, [1, 1, 0]), along(chance, [0, 0, 1]), chance.uniform(0.2, 1.4)
+        return radius * out + half * up, np.cos(tilt) * out + np.sin(tilt) * up
 
     def reach(directions: np.ndarray) -> np.ndarray:
         return radius * np.linalg.norm(directions[:, :2], axis=1) + half * np.abs(directions[:, 2])

@@ -28,7 +28,7 @@ RIGID = 1e12  # N/m
 GRAVITY = 9.81  # m/s^2, whatever the world's is
 # Hunt-Crossley dissipation, s/m. Wheels have less: their spheres come and go, and each that comes would push, but grip a step later.
 DISSIPATION = 5.0
-WHEEL_DISSIPATION = 1.0
+WHEEL_DISSIPATION = 0.5
 
 
 def stiffness(model: Model) -> float:

@@ -26,6 +26,7 @@ from ddenv.world.drive import Drive
 from ddenv.world.pose import Pose, angle_between
 from ddenv.world.scenario import Controller, Scenario
 
+UNSOLVED = "did not converge"  # in what Drake's solver says when it finds no contact forces
 LONGEST_LOOK = 10.0  # the maximum real time between two recorded poses that counts as time of the run, s
 # The outcome, the failure, and whether the run was cut short.
 End = tuple[str, str, bool]
@@ -160,10 +161,20 @@ class Run:
             self._simulator.AdvanceTo(until)
         # Drake raises SystemExit when one of its own checks fails.
         except (RuntimeError, ValueError, SystemExit) as error:
-            if self._look() and "nan" not in str(error).lower():
-                return (str(error).strip() or type(error).__name__).splitlines()[0]
-            return "not-finite"
+            if not self._look() or "nan" in str(error).lower():
+                return "not-finite"
+            if UNSOLVED in str(error):
+                return self._unsolved()
+            return (str(error).strip() or type(error).__name__).splitlines()[0]
         return "" if self._look() else "not-finite"
+
+    def _unsolved(self) -> str:
+        """What to say where the solver finds no contact forces: it fails where masses differ too much."""
+        problem = "Drake found no contact forces; a smaller simulation.time_step may help"
+        if not self.kept:
+            return problem
+        lightest = min(self.kept, key=_mass)
+        return f"{problem}; the lightest loose model, '{lightest.name}', has {_mass(lightest):.3g} kg"
 
     def _command(self, tick: Tick) -> End | None:
         """Sets the wheel speeds that the controller wants. Returns how the run ends if the controller fails."""
@@ -208,6 +219,10 @@ class Run:
         wx, wy, wz = self._state[self._spin : self._spin + 3]
         wheels = tuple([sign * self._state[start] for start, sign in self._wheels])
         return Truth(heading, roll, pitch, up_x * wx + up_y * wy + up_z * wz, wheels)
+
+
+def _mass(body: Body) -> float:
+    return float(sum(link.default_mass() for link in body.links))
 
 
 # A robot that stays within this distance (m) and angle (rad) for this time (s) is stuck. Wheels that slip in a rut rock a robot by

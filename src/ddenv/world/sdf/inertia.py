@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,12 +21,33 @@ BARE = 0.05
 LIGHTEST, HEAVIEST = 1e-9, 1e9  # accepted masses, kg
 THINNEST, DENSEST = 1e-3, 1e6  # accepted densities, kg/m^3
 LEAST_MOMENT = 1e-15  # minimum principal moment of inertia, kg m^2
+# Drake's contacts cannot be solved for a link that turns or moves more easily than this mass, spread evenly over its shapes, kg.
+LIGHTEST_IN_CONTACT = 1e-5
 
 
 def read_inertia(
     link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
 ) -> Inertia:
     """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
+    inertia = _given(link, link_pose, collisions, density, context)
+    if all(isinstance(one.shape, Plane) for one in collisions):
+        return inertia
+    least = spread(collisions, density, link_pose, LIGHTEST_IN_CONTACT)
+    solid_enough = f"contacts need at least those of {LIGHTEST_IN_CONTACT:g} kg, spread evenly over its shapes"
+    if inertia.mass < least.mass:
+        context.note("replaced", link, f"too light, {inertia.mass:.3g} kg: mass and inertia; {solid_enough}")
+        return least
+    lowest = _principal(inertia.moments, inertia.products)[0]
+    needed = _principal(least.moments, least.products)[0]
+    if lowest >= needed:
+        return inertia
+    context.note("replaced", link, f"too small moments of inertia, {lowest:.3g} kg m^2: {solid_enough}")
+    return replace(inertia, moments=vector(moment + needed for moment in inertia.moments))
+
+
+def _given(
+    link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
+) -> Inertia:
     element = link.find("inertial")
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
