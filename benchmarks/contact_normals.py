@@ -7,9 +7,10 @@ side on a side (face), an edge of either on a side or across an edge (edge), a c
 side (corner). Both shapes are piece and thing. Poses are random, the contact is anywhere on a side
 or edge. Exact is the least depth over all directions.
 
-Prints a row for each pair: the largest angle between Drake's normal and the exact one, degrees, for
-each length of the piece, and the largest error of the depth, %; medians with `--quantile 0.5`. Exact
-are pairs with no angle above 0.001 degrees and no depth off by 0.001 %.
+Prints a row for each pair: the largest angle between Drake's normal and the exact one, degrees,
+for each length of the piece, and the largest error of the depth, %; medians with `--quantile 0.5`.
+Exact are pairs whose depth is off by 5 % at most: where edges of two boxes cross, FCL takes the
+depth of a face if that is at most 5 % more. Takes five minutes.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ SITUATIONS = {
     "edge": [("edge", "side"), ("side", "edge"), ("edge", "edge")],
     "corner": [("corner", "side"), ("side", "corner")],
 }
-FINE = {"xatol": 1e-9, "fatol": 1e-14}
+FINE = {"xatol": 1e-7, "fatol": 1e-12}
 facing = partial(RotationMatrix.MakeFromOneVector, axis_index=2)
 # A point of a shape and its normal there; the normal of a contact and its depth, m.
 Touch = tuple[np.ndarray, np.ndarray]
@@ -52,7 +53,7 @@ class Body:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--poses", type=int, default=12, help="of each kind of contact and length")
+    parser.add_argument("--poses", type=int, default=30, help="of each kind of contact and length")
     parser.add_argument("--quantile", type=float, default=1.0, help="1 is the largest error")
     options = parser.parse_args()
     heads = [f"{situation}: {', '.join(map(str, LENGTHS))} m" for situation in SITUATIONS]
@@ -62,15 +63,15 @@ def main() -> None:
 
 
 def row(pair: tuple[str, str], poses: int, quantile: float) -> str:
-    cells, found = [], []
+    found, cells = [], [" and ".join(pair)]
     for ways in SITUATIONS.values():
         by_length = [errors(pair, length, ways, poses) for length in LENGTHS]
         angles = [f"{np.quantile(some, quantile, axis=0)[0]:.1f}" for some in by_length if some]
         found += [one for some in by_length for one in some]
         cells.append(", ".join(angles) or "-")
     cells.append(f"{np.quantile(found, quantile, axis=0)[1]:.1f}")
-    first = [" and ".join(pair), "exact" if np.max(found) < 1e-3 else "general"]
-    return f"| {' | '.join(first + cells)} |"
+    cells.insert(1, "exact" if np.max(found, axis=0)[1] <= 5 else "general")
+    return f"| {' | '.join(cells)} |"
 
 
 def errors(pair: tuple[str, str], length: float, ways: list, poses: int) -> list[list[float]]:
@@ -89,7 +90,7 @@ def errors(pair: tuple[str, str], length: float, ways: list, poses: int) -> list
                 turn = facing(normal) @ spin @ facing(-its_normal).inverse()
                 pose = RigidTransform(turn, point - DEPTH * normal - turn @ its_point)
                 said, said_depth = ask(pose)
-                true, true_depth = exact(piece, thing, pose, starts=[normal, said])
+                true, true_depth = exact(piece, thing, pose, guesses=[normal, said])
                 angle = np.degrees(2 * np.arcsin(np.linalg.norm(said - true) / 2))
                 found.append([angle, 100 * abs(said_depth / true_depth - 1)])
     return found
@@ -118,7 +119,7 @@ def drake(piece: geometry.Shape, thing: geometry.Shape) -> Callable[[RigidTransf
     return ask
 
 
-def exact(piece: Body, thing: Body, pose: RigidTransform, starts: list[np.ndarray]) -> Contact:
+def exact(piece: Body, thing: Body, pose: RigidTransform, guesses: list[np.ndarray]) -> Contact:
     """The direction in which the thing has the least way out of the piece, and that way, m."""
     turn, place = pose.rotation().matrix(), pose.translation()
 
@@ -129,8 +130,9 @@ def exact(piece: Body, thing: Body, pose: RigidTransform, starts: list[np.ndarra
     def tilted(xy: np.ndarray, plane: np.ndarray) -> float:
         return float(way(np.array([plane @ [*xy, 1.0]]))[0])
 
-    found, looks = [], np.random.default_rng(0).normal(size=(2000, 3))
-    for start in [*starts, looks[np.argmin(way(looks))]]:
+    found = []
+    for looks in (np.array(guesses), np.random.default_rng(0).normal(size=(2000, 3))):
+        start = looks[np.argmin(way(looks))]
         plane = facing(start).matrix()
         least = minimize(tilted, x0=[0, 0], args=(plane,), method="Nelder-Mead", options=FINE)
         found.append((least.fun, plane @ [*least.x, 1.0]))

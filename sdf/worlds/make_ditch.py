@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pieces
 
-GAP = 0.4  # m
+GAP = 0.41  # m
 TOP = 2.0  # m above the ground
 PLATFORM = (8.0, 9.0)  # m along and across the way
 TILE = (1.27, 0.6)  # m

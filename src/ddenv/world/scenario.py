@@ -156,7 +156,7 @@ class Controller(Section):
     turn_rate: Positive = Field(default=1.0, description="maximum commanded turn rate, rad/s")
     heading_gain: Positive = Field(default=1.5, description="turn rate per heading error, 1/s")
     skid: Positive = Field(
-        default=0.48, le=1, description="share of a commanded turn that is carried out; 1 without skidding"
+        default=0.43, le=1, description="share of a commanded turn that is carried out; 1 without skidding"
     )
     motor_gain: Positive = Field(default=30.0, description="wheel torque per wheel speed error, N m s/rad")
     planner: Planner = Planner()

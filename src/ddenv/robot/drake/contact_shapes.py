@@ -15,9 +15,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Floats
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Joint, Link, Mesh, Model, Shape, Sphere
-from ddenv.world.model import held_with, is_fixed
-from ddenv.world.pose import Pose, Vector, vector
+from ddenv.robot.drake.mesh_pieces import pieces
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Joint,
+    Link,
+    Mesh,
+    Model,
+    Shape,
+    Sphere,
+    held_with,
+    is_fixed,
+)
+from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # A shape at its place in the frame of the collision.
 Placed = tuple[Shape, Pose]
@@ -64,7 +78,16 @@ def _parts(collision: Collision, axles: Sequence[Joint], loose: bool) -> list[Pl
         case Capsule(radius, length):
             ends = [(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)]
             return [*prism(radius, length, rolls=loose), *ends]
+        case Mesh():
+            return [placed for piece in pieces(collision.shape) for placed in _piece(*piece, loose)]
     return [(collision.shape, Pose())]
+
+
+def _piece(shape: Shape, pose: Pose, loose: bool) -> list[Placed]:
+    """What stands for a piece of a mesh at `pose` in the frame of the mesh."""
+    if not isinstance(shape, Cylinder):
+        return [(shape, pose)]
+    return [(part, pose @ place) for part, place in _cylinder(shape.radius, shape.length, loose)]
 
 
 def _cylinder(radius: float, length: float, loose: bool) -> list[Placed]:
@@ -97,7 +120,7 @@ class Wheel:
 
     radius: float
     width: float
-    pose: Pose = Pose()
+    pose: Pose = HERE
 
 
 def tyre(wheel: Wheel) -> list[Placed]:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape, Sphere
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
@@ -33,20 +33,7 @@ from pydrake.multibody.tree import (
 from pydrake.multibody.tree import Joint as DrakeJoint
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from ddenv.robot.drake.contact_shapes import contact_shapes, turning_joints
-from ddenv.robot.drake.shapes import (
-    CORNER_RADIUS,
-    DISSIPATION,
-    WHEEL_DISSIPATION,
-    drake_shape,
-    resting_corners,
-    stiffness,
-    surface,
-    to_drake,
-    transform,
-    wheel_friction,
-    world_friction,
-)
+from ddenv.robot.drake.shapes import Solid, link_solids, to_drake, transform, wheel_friction
 from ddenv.world.drive import Drive
 from ddenv.world.extent import Bounds, bounds
 from ddenv.world.model import Inertia, Joint, Link, Model, World, held_with, is_fixed, still_links
@@ -113,8 +100,8 @@ class Built:
     """The plant of a world.
 
     `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
-    world. `moving` are the dynamic models in the order in which they were added; `twins` stand for those of them that float. `own_pairs`
-    are the geometries of each two links of a model that touch each other: none, unless it collides with itself.
+    world. `moving` are the dynamic models in the order in which they were added; `twins` stand for those of them that float.
+    `own_pairs` are the geometries of each two links of a model that touch each other: none, unless it collides with itself.
     """
 
     diagram: Diagram
@@ -150,10 +137,10 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     # The order in which models are added is the order of the solver's unknowns, which decides the last bits of every result. The
     # robot comes first.
     models = sorted(world.models, key=_place_in_order)
-    static = {
-        model.name: tuple(_register(plant, plant.world_body(), Pose(), model, still_links(model), wheels, corners=False))
-        for model in models
-    }
+    static: dict[str, tuple[GeometryId, ...]] = {}
+    for model in models:
+        solids = (link_solids(model, link, wheels, corners=False) for link in still_links(model))
+        static[model.name] = tuple(_register(plant, plant.world_body(), Pose(), chain.from_iterable(solids)))
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
     for joint in (joint for joint in robot.joints if joint.name in drive.joints):
         actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
@@ -197,29 +184,27 @@ def _place_in_order(model: Model) -> tuple[object, ...]:
 
 def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
     # Without corners: the model rests on nothing while its twin stands for it.
-    stand_ins = [contact_shapes(model, link) for link in model.links]
-    if sum(len(shapes) for of_link in stand_ins for shapes in of_link) <= MANY:
+    solids = [link_solids(model, link, wheels, corners=False) for link in model.links]
+    if sum(map(len, solids)) <= MANY:
         parts: list[Part] = []
-        for number, (link, of_link) in enumerate(zip(model.links, stand_ins, strict=True)):
-            for collision, shapes in zip(link.collisions, of_link, strict=True):
-                properties = surface(world_friction(collision.mu, wheels), stiffness(model))
-                for shape, pose in shapes:
-                    name = str(plant.num_collision_geometries())
-                    away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
-                    solid = drake_shape(shape)
-                    geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid, name, properties)
-                    parts.append(Part(geometry, number, solid, transform(link.pose.inverse() @ pose), away))
+        for number, link in enumerate(model.links):
+            for solid in solids[number]:
+                name = str(plant.num_collision_geometries())
+                away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
+                geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid.shape, name, solid.surface)
+                place = transform(link.pose.inverse() @ solid.pose)
+                parts.append(Part(geometry, number, solid.shape, place, away))
         return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
     shapes: list[GeometryId] = []
     places: list[tuple[FixedOffsetFrame, RigidTransform]] = []
-    for link in model.links:
+    for link, of_link in zip(model.links, solids, strict=True):
         away = RigidTransform(to_drake(np.array([APART * plant.num_bodies(), 0.0, DEEPER])))
         loose = FixedOffsetFrame(f"at/{link.name}", plant.world_frame(), away, instance)
         frame = cast(FixedOffsetFrame, plant.AddFrame(loose))
         body = plant.AddRigidBody(link.name, instance, SpatialInertia.Zero())
         plant.AddJoint(WeldJoint(f"weld/{link.name}", frame, body.body_frame(), RigidTransform()))
-        shapes += _register(plant, body, link.pose.inverse(), model, [link], wheels, corners=False)
+        shapes += _register(plant, body, link.pose.inverse(), of_link)
         places.append((frame, away))
     return Twin(tuple(shapes), places=tuple(places))
 
@@ -234,9 +219,12 @@ def _add_moving(
     geometry: list[GeometryId] = []
     boxes: list[Bounds | None] = []
     for link, body in zip(model.links, bodies, strict=True):
-        free: tuple[Link, ...] = () if link.name in still else (link,)
-        geometry += _register(plant, body, link.pose.inverse(), model, free, wheels, corners=wheels is not None)
-        boxes.append(bounds(link.collisions, link.pose.inverse()) if free else None)
+        if link.name in still:
+            boxes.append(None)
+            continue
+        solids = link_solids(model, link, wheels, corners=wheels is not None)
+        geometry += _register(plant, body, link.pose.inverse(), solids)
+        boxes.append(bounds(link.collisions, link.pose.inverse()))
     if not model.self_collide:
         scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometry)))
     by_name = {link.name: (link, body) for link, body in zip(model.links, bodies, strict=True)}
@@ -258,34 +246,15 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
     return SpatialInertia.Zero()
 
 
-def _register(
-    plant: MultibodyPlant,
-    body: RigidBody,
-    frame: Pose,
-    model: Model,
-    links: Iterable[Link],
-    wheels: float | None,
-    corners: bool,
-) -> list[GeometryId]:
-    """Registers the collisions of `links` of `model` on `body`; `frame` is the pose of the world in the body's frame.
-
-    With `corners`, each gets small spheres to rest on: a face that rests on a single contact point would creep.
-    """
-    identities = []
-    for link in links:
-        dissipation = WHEEL_DISSIPATION if turning_joints(model, link) else DISSIPATION
-        rests = resting_corners(link.collisions) if corners else [[]] * len(link.collisions)
-        for collision, parts, places in zip(link.collisions, contact_shapes(model, link), rests, strict=True):
-            mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
-            properties = surface(mu, stiffness(model), dissipation)
-            shapes = [(drake_shape(shape), pose) for shape, pose in parts]
-            shapes += [(Sphere(CORNER_RADIUS), collision.pose @ Pose(place)) for place in places]
-            for shape, pose in shapes:
-                # Drake requires different names; nothing reads them.
-                name = str(plant.num_collision_geometries())
-                place = transform(frame @ pose)
-                identities.append(plant.RegisterCollisionGeometry(body, place, shape, name, properties))
-    return identities
+def _register(plant: MultibodyPlant, body: RigidBody, frame: Pose, solids: Iterable[Solid]) -> list[GeometryId]:
+    """Registers `solids` on `body`; `frame` is the pose of the world in the body's frame."""
+    # Drake requires different names; nothing reads them.
+    return [
+        plant.RegisterCollisionGeometry(
+            body, transform(frame @ solid.pose), solid.shape, str(plant.num_collision_geometries()), solid.surface
+        )
+        for solid in solids
+    ]
 
 
 def spatial_inertia(inertia: Inertia, link: Pose) -> SpatialInertia:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
@@ -15,18 +16,19 @@ from pydrake.multibody.plant import CoulombFriction
 from scipy.spatial import ConvexHull, QhullError
 
 from ddenv.arrays import Floats
+from ddenv.robot.drake.contact_shapes import contact_shapes, turning_joints
 from ddenv.world.drive import Drive, wheel_links
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 
-# The contact of two surfaces is as stiff as both in series. Drake would derive it from the masses in the world, and removing a model
-# would change the contacts of all others; here it follows from the model's own mass. On a single contact no model sinks by more than
-# `SINK`, and none is softer than `SOFTEST`. What never moves is rigid.
+# The contact of two surfaces is as stiff as both in series. Drake would derive it from the masses in the world, and removing a
+# model would change the contacts of all others; here it follows from the model's own mass. On a single contact no model sinks by
+# more than `SINK`, and none is softer than `SOFTEST`. What never moves is rigid.
 SINK = 4e-3  # m
 SOFTEST = 1e5  # N/m
 RIGID = 1e12  # N/m
 GRAVITY = 9.81  # m/s^2, whatever the world's is
-# Hunt-Crossley dissipation, s/m. Wheels have less: their spheres come and go, and each that comes would push, but grip a step later.
+# Hunt-Crossley dissipation, s/m. Wheels have less: it makes each of their spheres push as it comes, but grip only a step later.
 DISSIPATION = 5.0
 WHEEL_DISSIPATION = 0.5
 
@@ -73,6 +75,33 @@ def surface(mu: float, stiffness: float, dissipation: float = DISSIPATION) -> dr
     properties = drake.ProximityProperties()
     drake.AddContactMaterial(dissipation, stiffness, CoulombFriction(mu, mu), properties)
     return properties
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """A shape in Drake with its `pose` in the world, as the model starts."""
+
+    shape: drake.Shape
+    pose: Pose
+    surface: drake.ProximityProperties
+
+
+def link_solids(model: Model, link: Link, wheels: float | None, corners: bool) -> list[Solid]:
+    """What stands in Drake for the collisions of a link of the world, or (`wheels` is None) of the robot.
+
+    `wheels` is the robot's `wheel_friction`. With `corners` each collision also gets small spheres to rest on: a face that rests
+    on a single contact point would creep.
+    """
+    dissipation = WHEEL_DISSIPATION if turning_joints(model, link) else DISSIPATION
+    rests = resting_corners(link.collisions) if corners else [[]] * len(link.collisions)
+    solids: list[Solid] = []
+    for collision, parts, places in zip(link.collisions, contact_shapes(model, link), rests, strict=True):
+        mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
+        properties = surface(mu, stiffness(model), dissipation)
+        solids += [Solid(drake_shape(shape), pose, properties) for shape, pose in parts]
+        corner = drake.Sphere(CORNER_RADIUS)
+        solids += [Solid(corner, collision.pose @ Pose(place), properties) for place in places]
+    return solids
 
 
 CORNER_RADIUS = 0.002  # m
