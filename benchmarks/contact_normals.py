@@ -4,13 +4,12 @@
 
 A piece of some length, 0.1 m thick, and a thing as large as a wheel touch by 1 mm: a flat or smooth
 side on a side (face), an edge of either on a side or across an edge (edge), a corner of either on a
-side (corner). Both shapes are piece and thing. Poses are random, the contact is anywhere on a side
-or edge. Exact is the least depth over all directions.
+side (corner). Each shape of a pair is once the piece, once the thing; poses are random. The exact
+normal is the direction in which the way out is shortest. Takes five minutes.
 
-Prints a row for each pair: the largest angle between Drake's normal and the exact one, degrees,
-for each length of the piece, and the largest error of the depth, %; medians with `--quantile 0.5`.
-Exact are pairs whose depth is off by 5 % at most: where edges of two boxes cross, FCL takes the
-depth of a face if that is at most 5 % more. Takes five minutes.
+Prints for each pair the largest angle between Drake's normal and the exact one, in degrees, by the
+length of the piece, and the largest error of the depth, in %; medians with `--quantile 0.5`. Exact
+allows 5 % of depth: FCL's box-box prefers a face to crossing edges that are up to 5 % less deep.
 """
 
 from __future__ import annotations
@@ -120,7 +119,7 @@ def drake(piece: geometry.Shape, thing: geometry.Shape) -> Callable[[RigidTransf
 
 
 def exact(piece: Body, thing: Body, pose: RigidTransform, guesses: list[np.ndarray]) -> Contact:
-    """The direction in which the thing has the least way out of the piece, and that way, m."""
+    """The direction in which the thing has the shortest way out of the piece, and that way, m."""
     turn, place = pose.rotation().matrix(), pose.translation()
 
     def way(directions: np.ndarray) -> np.ndarray:
