@@ -11,11 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.robot.drake.mesh_pieces import pieces
+from ddenv.world.extent import vertices_of
+from ddenv.world.files.meshes import convex_hull
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -33,8 +36,16 @@ from ddenv.world.model import (
 )
 from ddenv.world.pose import HERE, Pose, Vector, vector
 
-# A shape at its place in the frame of the collision.
-Placed = tuple[Shape, Pose]
+
+class Placed(NamedTuple):
+    """A shape at its `pose`, and which shapes can touch it: all, only spheres, or all but spheres."""
+
+    shape: Shape
+    pose: Pose
+    touches: Literal["all", "spheres", "others"] = "all"
+
+
+Kind = Literal["static", "robot", "loose"]
 
 # How far a wheel may rise and fall as it rolls from sphere to sphere on a plane: this many m, and this share of its radius.
 BUMP = 1e-3
@@ -44,18 +55,24 @@ DIP_SHARE = 0.012
 # The spheres of a thin wheel have this share of its radius: smaller ones would leave gaps between them.
 THINNEST = 1 / 12
 MOST_SPHERES = 96  # of one ring
-# How far the sides of a prism may lie from the cylinder that it stands for, m, and the number of its sides.
+# How far the sides of a prism of boxes may lie from the cylinder that it stands for, m, and the number of its sides.
 FLAT = 5e-3
 FEWEST_SIDES = 16
 MOST_SIDES = 96
+FINE_SIDES = 32  # of a prism that is a single shape
 
 
-def contact_shapes(model: Model, link: Link) -> list[list[Placed]]:
-    """For each collision of `link` what stands for it; the poses are in the world, as the model starts."""
+def contact_shapes(model: Model, link: Link, robot: bool) -> list[list[Placed]]:
+    """For each collision of a `link` what stands for it; the poses are in the world, as the model starts.
+
+    With `robot` the model is the robot, no part of which rolls except its wheels.
+    """
     axles = turning_joints(model, link)
-    loose = not model.static and not axles
+    kind: Kind = "robot" if robot else "loose"
+    if model.static:
+        kind = "static"
     return [
-        [(shape, collision.pose @ pose) for shape, pose in _parts(collision, axles, loose)]
+        [part._replace(pose=collision.pose @ part.pose) for part in _parts(collision, axles, kind)]
         for collision in link.collisions
     ]
 
@@ -67,37 +84,53 @@ def turning_joints(model: Model, link: Link) -> tuple[Joint, ...]:
     return tuple(joint for joint in turning if joint.child in held and not is_fixed(joint))
 
 
-def _parts(collision: Collision, axles: Sequence[Joint], loose: bool) -> list[Placed]:
+def _parts(collision: Collision, axles: Sequence[Joint], kind: Kind) -> list[Placed]:
     for axle in axles:
         wheel = wheel_of(collision, axle)
         if wheel is not None:
             return tyre(wheel)
     match collision.shape:
         case Cylinder(radius, length):
-            return _cylinder(radius, length, loose)
+            return cylinder(radius, length, kind)
         case Capsule(radius, length):
-            ends = [(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)]
-            return [*prism(radius, length, rolls=loose), *ends]
+            ends = [Placed(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)]
+            return [*cylinder(radius, length, "static" if kind == "static" else "robot"), *ends]
         case Mesh():
-            return [placed for piece in pieces(collision.shape) for placed in _piece(*piece, loose)]
-    return [(collision.shape, Pose())]
+            return [placed for shape, pose in pieces(collision.shape) for placed in _piece(shape, pose, kind)]
+    return [Placed(collision.shape, HERE)]
 
 
-def _piece(shape: Shape, pose: Pose, loose: bool) -> list[Placed]:
+def _piece(shape: Shape, pose: Pose, kind: Kind) -> list[Placed]:
     """What stands for a piece of a mesh at `pose` in the frame of the mesh."""
     if not isinstance(shape, Cylinder):
-        return [(shape, pose)]
-    return [(part, pose @ place) for part, place in _cylinder(shape.radius, shape.length, loose)]
+        return [Placed(shape, pose)]
+    return [part._replace(pose=pose @ part.pose) for part in cylinder(shape.radius, shape.length, kind)]
 
 
-def _cylinder(radius: float, length: float, loose: bool) -> list[Placed]:
-    """A cylinder along z. One that is `loose` may roll: spheres as wide as it touch the ground between the prism's edges."""
-    boxes = prism(radius, length, rolls=loose)
-    if not loose:
-        return boxes
+def cylinder(radius: float, length: float, kind: Kind) -> list[Placed]:
+    """What stands for a cylinder along z.
+
+    A sphere touches a cylinder exactly, and a box a prism nearly so: of what is static each sees its own. What moves must touch
+    boxes of any length exactly, so it is made of boxes; between the edges of what rolls, spheres as wide as it touch the ground.
+    """
+    if kind == "static":
+        return [Placed(Cylinder(radius, length), HERE, "spheres"), Placed(_fine_prism(radius, length), HERE, "others")]
+    if kind == "robot":
+        return prism(radius, length, rolls=False)
     width = min(length / 2, radius)
     ends = sorted({width - length / 2, length / 2 - width})
-    return [*boxes, *(sphere for end in ends for sphere in ring(radius, width, end))]
+    return [*prism(radius, length, rolls=True), *(sphere for end in ends for sphere in ring(radius, width, end))]
+
+
+def _fine_prism(radius: float, length: float) -> Mesh:
+    points, _ = vertices_of(Cylinder(_mean_outer(radius, FINE_SIDES), length), FINE_SIDES)
+    return Mesh(f"prism {radius} {length}", *convex_hull(points))
+
+
+def _mean_outer(radius: float, sides: int) -> float:
+    """The radius on which the corners of a prism lie whose sides are as far outside a cylinder as inside."""
+    angle = math.pi / sides
+    return radius * angle / math.sin(angle)
 
 
 def prism(radius: float, length: float, rolls: bool) -> list[Placed]:
@@ -109,9 +142,9 @@ def prism(radius: float, length: float, rolls: bool) -> list[Placed]:
     needed = math.pi / math.acos(max(0.0, 1.0 - FLAT / radius))
     half = math.ceil(min(max(needed, FEWEST_SIDES), MOST_SIDES) / 2)
     angle = math.pi / (2 * half)
-    outer = radius if rolls else radius * angle / math.sin(angle)
+    outer = radius if rolls else _mean_outer(radius, 2 * half)
     box = Box((2 * outer * math.cos(angle), 2 * outer * math.sin(angle), length))
-    return [(box, Pose.from_rpy(0.0, 0.0, 0.0, 0.0, 0.0, 2 * angle * number)) for number in range(half)]
+    return [Placed(box, Pose.from_rpy(0.0, 0.0, 0.0, 0.0, 0.0, 2 * angle * number)) for number in range(half)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +173,7 @@ def tyre(wheel: Wheel) -> list[Placed]:
         count = 1 + math.ceil(2 * inside / shoulder)
         rows = [(shoulder, place) for place in (np.linspace(-inside, inside, count) if count > 1 else (0.0,))]
     spheres = (sphere for width, place in rows for sphere in ring(radius, width, place))
-    return [(sphere, wheel.pose @ pose) for sphere, pose in spheres]
+    return [part._replace(pose=wheel.pose @ part.pose) for part in spheres]
 
 
 def ring(radius: float, width: float, height: float) -> list[Placed]:
@@ -150,7 +183,7 @@ def ring(radius: float, width: float, height: float) -> list[Placed]:
     """
     inner = radius - width
     if inner < BUMP_SHARE * radius:
-        return [(Sphere(radius), Pose((0.0, 0.0, height)))]
+        return [Placed(Sphere(radius), Pose((0.0, 0.0, height)))]
     bump = min(BUMP, BUMP_SHARE * radius)
     even = math.pi / math.acos(max(0.0, 1.0 - bump / inner))
     closed = math.tau * inner / math.sqrt(8 * width * DIP_SHARE * radius)
@@ -158,7 +191,7 @@ def ring(radius: float, width: float, height: float) -> list[Placed]:
     inner *= (math.pi / count) / math.sin(math.pi / count)
     angles = (math.tau * number / count for number in range(count))
     places: list[Vector] = [(inner * math.cos(angle), inner * math.sin(angle), height) for angle in angles]
-    return [(Sphere(width), Pose(place)) for place in places]
+    return [Placed(Sphere(width), Pose(place)) for place in places]
 
 
 # A shape is a wheel if its axis is that of the joint, up to this share of its radius, and it is so round.

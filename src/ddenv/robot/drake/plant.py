@@ -7,13 +7,21 @@ There is no visual geometry: nobody looks at a worker.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import chain, combinations
+from itertools import combinations
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    SceneGraph,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
@@ -102,6 +110,7 @@ class Built:
     `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
     world. `moving` are the dynamic models in the order in which they were added; `twins` stand for those of them that float.
     `own_pairs` are the geometries of each two links of a model that touch each other: none, unless it collides with itself.
+    `apart` are sets of shapes that never touch each other, since others touch in their place (`Placed.touches`).
     """
 
     diagram: Diagram
@@ -112,6 +121,7 @@ class Built:
     moving: dict[str, Body]
     twins: dict[str, Twin]
     own_pairs: dict[str, list[tuple[list[GeometryId], list[GeometryId]]]]
+    apart: tuple[tuple[GeometrySet, GeometrySet], ...]
 
     def shapes(self) -> list[tuple[str, tuple[GeometryId, ...]]]:
         """The collision shapes of each model but the robot: first those that never move, then those that can."""
@@ -137,10 +147,7 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     # The order in which models are added is the order of the solver's unknowns, which decides the last bits of every result. The
     # robot comes first.
     models = sorted(world.models, key=_place_in_order)
-    static: dict[str, tuple[GeometryId, ...]] = {}
-    for model in models:
-        solids = (link_solids(model, link, wheels, corners=False) for link in still_links(model))
-        static[model.name] = tuple(_register(plant, plant.world_body(), Pose(), chain.from_iterable(solids)))
+    static = _add_still(plant, models, wheels)
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
     for joint in (joint for joint in robot.joints if joint.name in drive.joints):
         actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
@@ -163,6 +170,9 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         own = GeometrySet(list(static[body.name])), GeometrySet(list(body.geometry))
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(*own))
     plant.Finalize()
+    apart = _apart(scene_graph.model_inspector(), [driver, *moving.values()])
+    for one, other in apart:
+        filters.Apply(CollisionFilterDeclaration().ExcludeBetween(one, other))
     # Drake has filtered links that a joint connects.
     filtered = scene_graph.model_inspector().CollisionFiltered
     shapes = {name: map(plant.GetCollisionGeometriesForBody, body.links) for name, body in moving.items()}
@@ -170,7 +180,38 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         name: [pair for pair in combinations(filter(None, found), 2) if not filtered(pair[0][0], pair[1][0])]
         for name, found in shapes.items()
     }
-    return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins, own_pairs)
+    return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins, own_pairs, apart)
+
+
+def _apart(inspector: SceneGraphInspector, bodies: Sequence[Body]) -> tuple[tuple[GeometrySet, GeometrySet], ...]:
+    """The pairs of sets of shapes that never touch each other; none if there is nothing that only some shapes can touch."""
+    views: dict[str, list[GeometryId]] = {"all": [], "spheres": [], "others": []}
+    for geometry in inspector.GetAllGeometryIds():
+        views[inspector.GetName(geometry).split("::")[-1].split()[0]].append(geometry)
+    if not views["spheres"]:
+        return ()
+    moving = [geometry for body in bodies for geometry in body.geometry]
+    spheres = [geometry for geometry in moving if isinstance(inspector.GetShape(geometry), Sphere)]
+    others = set(moving) - set(spheres)
+    return (
+        (GeometrySet(views["spheres"]), GeometrySet(sorted(others, key=GeometryId.get_value))),
+        (GeometrySet(views["others"]), GeometrySet(spheres)),
+    )
+
+
+def _add_still(plant: MultibodyPlant, models: Sequence[Model], wheels: float) -> dict[str, tuple[GeometryId, ...]]:
+    """The geometry of what never moves, by model. Its order does not depend on how shapes are grouped into models, either."""
+    solids = [
+        (model.name, solid)
+        for model in models
+        for link in still_links(model)
+        for solid in link_solids(model, link, wheels, corners=False)
+    ]
+    solids.sort(key=lambda pair: (pair[1].pose.position, pair[1].pose.quaternion, pair[1].touches))
+    geometry: dict[str, list[GeometryId]] = {model.name: [] for model in models}
+    for name, solid in solids:
+        geometry[name] += _register(plant, plant.world_body(), Pose(), [solid])
+    return {name: tuple(identities) for name, identities in geometry.items()}
 
 
 def _place_in_order(model: Model) -> tuple[object, ...]:
@@ -189,7 +230,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         parts: list[Part] = []
         for number, link in enumerate(model.links):
             for solid in solids[number]:
-                name = str(plant.num_collision_geometries())
+                name = f"{solid.touches} {plant.num_collision_geometries()}"
                 away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
                 geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid.shape, name, solid.surface)
                 place = transform(link.pose.inverse() @ solid.pose)
@@ -248,13 +289,13 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
 
 def _register(plant: MultibodyPlant, body: RigidBody, frame: Pose, solids: Iterable[Solid]) -> list[GeometryId]:
     """Registers `solids` on `body`; `frame` is the pose of the world in the body's frame."""
-    # Drake requires different names; nothing reads them.
-    return [
-        plant.RegisterCollisionGeometry(
-            body, transform(frame @ solid.pose), solid.shape, str(plant.num_collision_geometries()), solid.surface
-        )
-        for solid in solids
-    ]
+    identities = []
+    for solid in solids:
+        # Drake requires different names.
+        name = f"{solid.touches} {plant.num_collision_geometries()}"
+        place = transform(frame @ solid.pose)
+        identities.append(plant.RegisterCollisionGeometry(body, place, solid.shape, name, solid.surface))
+    return identities
 
 
 def spatial_inertia(inertia: Inertia, link: Pose) -> SpatialInertia:

@@ -52,16 +52,23 @@ class Presence:
             self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._movers))
         if back:
             self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._movers))
+            self._keep_apart()
         self._removed = removed
         self._kept = {name: geometry for name, geometry in static.items() if name not in removed}
 
     def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
         """Lets `bodies` touch themselves, each other, `others`, what is kept and never moves, and with `robot` also the robot."""
         self._apply(CollisionFilterDeclaration.AllowBetween, bodies, others, robot)
+        self._keep_apart()
 
     def part(self, bodies: Sequence[Body], others: Sequence[Body]) -> None:
         """Undoes `join`. `others` are the moving models that `bodies` could touch besides each other."""
         self._apply(CollisionFilterDeclaration.ExcludeBetween, bodies, others, True)
+
+    def _keep_apart(self) -> None:
+        """Filters what never touches, which may just have been allowed."""
+        for one, other in self._built.apart:
+            self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(one, other))
 
     def _apply(
         self, between: Callable[..., object], bodies: Sequence[Body], others: Sequence[Body], robot: bool

@@ -79,11 +79,12 @@ def surface(mu: float, stiffness: float, dissipation: float = DISSIPATION) -> dr
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """A shape in Drake with its `pose` in the world, as the model starts."""
+    """A shape in Drake with its `pose` in the world, as the model starts; `touches` is that of `Placed`."""
 
     shape: drake.Shape
     pose: Pose
     surface: drake.ProximityProperties
+    touches: str = "all"
 
 
 def link_solids(model: Model, link: Link, wheels: float | None, corners: bool) -> list[Solid]:
@@ -95,10 +96,11 @@ def link_solids(model: Model, link: Link, wheels: float | None, corners: bool) -
     dissipation = WHEEL_DISSIPATION if turning_joints(model, link) else DISSIPATION
     rests = resting_corners(link.collisions) if corners else [[]] * len(link.collisions)
     solids: list[Solid] = []
-    for collision, parts, places in zip(link.collisions, contact_shapes(model, link), rests, strict=True):
+    parts_of = contact_shapes(model, link, robot=wheels is None)
+    for collision, parts, places in zip(link.collisions, parts_of, rests, strict=True):
         mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
         properties = surface(mu, stiffness(model), dissipation)
-        solids += [Solid(drake_shape(shape), pose, properties) for shape, pose in parts]
+        solids += [Solid(drake_shape(one.shape), one.pose, properties, one.touches) for one in parts]
         corner = drake.Sphere(CORNER_RADIUS)
         solids += [Solid(corner, collision.pose @ Pose(place), properties) for place in places]
     return solids
