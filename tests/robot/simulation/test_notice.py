@@ -112,7 +112,7 @@ def test_a_moving_model_that_slept_is_touched_where_the_robot_finds_it(world_of,
     result = run(template, "near", "pushed", "door")
     assert set(result.first_touched) == {"ground", "near"}
     # Contacts are looked at every 0.1 s, and the crate may jump ahead for a moment.
-    assert x_at(result, result.first_touched["near"]) + FRONT == pytest.approx(1.35, abs=0.2)
+    assert x_at(result, result.first_touched["near"]) + FRONT == pytest.approx(1.35, abs=0.3)
     # The crate in front moves the other one, which the robot itself never touches.
     assert result.motions["pushed"][-1, 1] > 2.0
     template._sleeping = False

@@ -121,7 +121,7 @@ def test_what_an_always_kept_model_is_tied_to_takes_part(world_of, add, husky, s
 
 def test_what_lies_beside_what_is_pushed_sleeps_on(flat):
     # A row across the robot's path, in which each cube nearly touches the next.
-    row = [cube(f"cube_{number}", 1.5, 0.305 * number, 0.15) for number in range(7)]
+    row = [cube(f"cube_{number}", 1.5, 0.31 * number, 0.15) for number in range(7)]
     result = flat(*row).run(names(*row), 1)
     assert "cube_0" in result.motions
     assert "cube_6" not in result.took_part
