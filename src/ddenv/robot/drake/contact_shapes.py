@@ -93,8 +93,8 @@ def _parts(collision: Collision, axles: Sequence[Joint], kind: Kind) -> list[Pla
         case Cylinder(radius, length):
             return cylinder(radius, length, kind)
         case Capsule(radius, length):
-            ends = [Placed(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)]
-            return [*cylinder(radius, length, "static" if kind == "static" else "robot"), *ends]
+            tube = cylinder(radius, length, kind) if kind == "static" else prism(radius, length, rolls=True)
+            return [*tube, *(Placed(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1))]
         case Mesh():
             return [placed for shape, pose in pieces(collision.shape) for placed in _piece(shape, pose, kind)]
     return [Placed(collision.shape, HERE)]
@@ -161,19 +161,24 @@ def tyre(wheel: Wheel) -> list[Placed]:
 
     The mean radius on which it rolls is the wheel's.
     """
-    radius, half = wheel.radius, wheel.width / 2
+    radius = wheel.radius
+    half = wheel.width / 2
     shoulder = min(max(half, THINNEST * radius), radius / 2)
-    if half > radius:
-        # Between two rings that are its shoulders the whole wheel fits as a ball.
-        inside = half - radius
-        balls = np.linspace(-inside, inside, 1 + math.ceil(4 * inside / radius)).tolist()
-        rows = [(shoulder, shoulder - half), (shoulder, half - shoulder), *((radius, place) for place in balls)]
+    inside = max(0.0, half - shoulder)
+    if half <= radius:
+        spheres = [part for place in _spread(inside, shoulder / 2) for part in ring(radius, shoulder, place)]
     else:
-        inside = max(0.0, half - shoulder)
-        count = 1 + math.ceil(2 * inside / shoulder)
-        rows = [(shoulder, place) for place in (np.linspace(-inside, inside, count) if count > 1 else (0.0,))]
-    spheres = (sphere for width, place in rows for sphere in ring(radius, width, place))
+        # Between two rings that are its shoulders the whole wheel fits as a ball, which it rolls on.
+        within = radius * (1 - BUMP_SHARE)
+        spheres = [part for place in (-inside, inside) for part in ring(within, shoulder, place)]
+        spheres += [part for place in _spread(half - radius, radius / 4) for part in ring(radius, radius, place)]
     return [part._replace(pose=wheel.pose @ part.pose) for part in spheres]
+
+
+def _spread(inside: float, step: float) -> list[float]:
+    """Places from -`inside` to `inside` (m), evenly and at most two `step` (m) apart; the middle if that is all."""
+    count = 1 + math.ceil(inside / step - 1e-9)
+    return np.linspace(-inside, inside, count).tolist() if count > 1 else [0.0]
 
 
 def ring(radius: float, width: float, height: float) -> list[Placed]:
@@ -201,7 +206,7 @@ DIRECTIONS = 24
 
 
 def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
-    """The wheel that a collision is on the joint `axle`; None if it is none, or a sphere, which needs nothing in its place."""
+    """The wheel that a collision is on the joint `axle`; None if it is none, or rolls on spheres anyway."""
     pose, shape = collision.pose, collision.shape
     # The axle as seen from the collision.
     back = pose.inverse()
@@ -210,8 +215,6 @@ def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
     match shape:
         case Cylinder(radius, length):
             width = length
-        case Capsule(radius, length):
-            width = length + 2 * radius
         case Ellipsoid((across, other, along)) if math.isclose(across, other, rel_tol=CENTRED):
             # The circle that fits its cross-section at the ground has this radius.
             radius, width = across, 2 * min(along * along / across, across)
