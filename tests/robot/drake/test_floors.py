@@ -118,11 +118,16 @@ def highest(climbs: Callable[[float], bool]) -> float:
     return low
 
 
+# On smooth ground an edge between two spheres of a wheel gives it some grip (docs/contact.md).
 @pytest.mark.parametrize(
-    ("mu", "effort"),
-    [(0.8, 40.0), *(pytest.param(*case, marks=pytest.mark.rates) for case in ((0.4, 40.0), (1.0, 10.0)))],
+    ("mu", "effort", "share"),
+    [
+        (0.8, 40.0, 0.1),
+        pytest.param(1.0, 10.0, 0.1, marks=pytest.mark.rates),
+        pytest.param(0.4, 40.0, 0.2, marks=pytest.mark.rates),
+    ],
 )
-def test_a_wheel_climbs_what_a_ball_of_its_size_climbs(drive, husky, monkeypatch, mu, effort):
+def test_a_wheel_climbs_what_a_ball_of_its_size_climbs(drive, husky, monkeypatch, mu, effort, share):
     # Against a box a ball is exact. It is too wide for a wheel, but nothing stands beside the robot here.
     def rough(parts: list[Collision]) -> Model:
         return static("platform", *(replace(part, mu=mu) for part in parts))
@@ -139,7 +144,7 @@ def test_a_wheel_climbs_what_a_ball_of_its_size_climbs(drive, husky, monkeypatch
     as_ball = highest(climbs)
     assert 0.03 < as_ball < 0.15
     # Each limit is found to 4 mm.
-    assert as_tyre == pytest.approx(as_ball, rel=0.1, abs=0.008)
+    assert as_tyre == pytest.approx(as_ball, rel=share, abs=0.008)
 
 
 def test_a_mesh_that_is_no_box_is_climbed_where_the_ground_is_rough(drive):

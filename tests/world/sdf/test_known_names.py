@@ -119,7 +119,9 @@ def test_auto_leaves_what_is_there(read, tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n")
     world = read(lost("a.obj"), stand_ins={"*": "auto", "a.obj": "auto"})
     assert tuple(model_bounds(world.models[0])[1]) == (2, 2, 2)
-    assert [note.why for note in world.notes] == ["'a.obj' by its convex hull"]
+    assert [note.why for note in world.notes] == [
+        "'a.obj' by its convex hull; contact at the edges of hulls that are no boxes is rough"
+    ]
 
 
 def test_one_uri_can_be_guessed_and_another_left_out(read):

@@ -126,7 +126,9 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         word = AUTO if context.may_guess(uri) else ""
         return Lost(element, uri, str(error), word, _times(own, scale))
     if convex:
-        context.note("replaced", element, f"'{uri}' by its convex hull")
+        context.note(
+            "replaced", element, f"'{uri}' by its convex hull; contact at the edges of hulls that are no boxes is rough"
+        )
     elif mesh.simplified:
         context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
     return Placed(_scaled(mesh, _times(own, scale), element))
