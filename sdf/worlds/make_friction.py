@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pieces
 
-CROSSFALL = 0.03  # m down for each m to the right
+CROSSFALL = 0.035  # m down for each m to the right
 ASPHALT_MU = 0.8
 RED_MU, GREEN_MU = 1.5, 0.0015
 RED, GREEN = "0.70 0.16 0.12 1", "0.20 0.58 0.28 1"
