@@ -35,7 +35,7 @@ CAMERAS = {
 }
 LEGEND = ("path of this test", "ghost: the other run", "left out of this test")
 READY = (
-    "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 20"
+    "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 8"
 )
 # Hides Meshcat's own controls, and the entries of the legend that are not in the picture.
 TIDY = """

@@ -3,7 +3,7 @@
 Drake computes the contact of a sphere with a box, and that of two boxes, exactly. Nearly all other pairs go through a general
 solver that is wrong at edges: there its normal is the line between the centres of the two shapes, so that a cylinder which rolls
 over a lip of 1 mm hits a wall, and the longer the slab behind the lip, the steeper that wall. `benchmarks/contact_normals.py`
-measures each pair. docs/how-it-works.md says what stands for what.
+measures each pair. docs/contact.md says what stands for what.
 """
 
 from __future__ import annotations
