@@ -207,17 +207,16 @@ DIRECTIONS = 24
 
 def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
     """The wheel that a collision is on the joint `axle`; None if it is none, or rolls on spheres anyway."""
-    pose, shape = collision.pose, collision.shape
     # The axle as seen from the collision.
-    back = pose.inverse()
+    back = collision.pose.inverse()
     axis = np.array(back.rotate(axle.axis))
     place = np.array((back @ axle.pose).position)
-    match shape:
+    match collision.shape:
         case Cylinder(radius, length):
             width = length
-        case Ellipsoid((across, other, along)) if math.isclose(across, other, rel_tol=CENTRED):
-            # The circle that fits its cross-section at the ground has this radius.
-            radius, width = across, 2 * min(along * along / across, across)
+        case Ellipsoid((radius, other, along)) if math.isclose(radius, other, rel_tol=CENTRED):
+            # Half as wide as the circle that fits its cross-section at the ground.
+            width = 2 * min(along * along / radius, radius)
         case Mesh(_, vertices):
             return _round_mesh(vertices, place, axis)
         case _:

@@ -48,6 +48,7 @@ def read_inertia(
 def _given(
     link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
 ) -> Inertia:
+    """The inertia that the file gives, or where it gives none or an impossible one, that of its shapes."""
     element = link.find("inertial")
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
