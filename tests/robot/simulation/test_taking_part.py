@@ -15,7 +15,7 @@ from ddenv.robot.simulation import taking_part
 from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
-from tests.robot.conftest import bits, cube, door, link_of, model_of
+from tests.robot.conftest import bits, cube, door, link_of, model_of, wedge
 from tests.tiers import examples
 
 SECTIONS = {"failure": {"timeout": 3.0}, "goal": {"x": 9, "y": 0}}
@@ -125,6 +125,17 @@ def test_what_lies_beside_what_is_pushed_sleeps_on(flat):
     result = flat(*row).run(names(*row), 1)
     assert "cube_0" in result.motions
     assert "cube_6" not in result.took_part
+
+
+def test_what_wakes_another_model_takes_part_although_it_sleeps_on(flat):
+    # A ball rolls slowly past a cube, 9.5 cm away: near enough to be simulated from there on.
+    hill = model_of("hill", link_of("link", wedge(1.0, 1.0, 0.03), Pose((2.0, 3.0, 0.015)), mass=None))
+    ball = model_of("ball", link_of("link", Sphere(0.2), Pose((2.4, 3.4, 0.23))))
+    passed = cube("passed", 1.9, 3.845, 0.15)
+    result = flat(hill, ball, passed).run(names(hill, ball, passed), 1)
+    # Only what moves has a motion.
+    assert result.motions.keys() == {"ball"}
+    assert {"ball", "passed"} <= result.took_part
 
 
 def test_nothing_is_claimed_where_it_is_unknown(flat):

@@ -196,6 +196,8 @@ class Sleep:
         within = self._settled & (near | touching[:, self._awake].any(axis=1))
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
         start: Booleans = ~self._awake & (close | met | self._due | (pressed & self._settled))
+        # What wakes another model, or keeps it awake, takes part although it stays asleep.
+        self._took_part |= meeting[:, start | (self._awake & ~self._has_twin)].any(axis=1)
         if start.any():
             self._loads.woke(start, pressed)
             # What has no twin cannot stay asleep beside what wakes.
