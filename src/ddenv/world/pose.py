@@ -120,6 +120,15 @@ def wrap(angle: float) -> float:
     return math.remainder(angle, math.tau)
 
 
+def pointing(axis: Vector) -> Pose:
+    """The shortest rotation from the z axis to the unit vector `axis`."""
+    x, y, z = axis
+    w = math.sqrt(max(0.0, 1.0 + z) / 2)
+    if w < 1e-6:
+        return Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
+    return Pose(quaternion=(w, -y / (2 * w), x / (2 * w), 0.0))
+
+
 def vector(values: Iterable[float]) -> Vector:
     """Three numbers, such as a row of an array, as a plain vector."""
     x, y, z = values

@@ -34,7 +34,7 @@ from ddenv.world.model import (
     held_with,
     is_fixed,
 )
-from ddenv.world.pose import HERE, Pose, Vector, vector
+from ddenv.world.pose import HERE, Pose, Vector, pointing, vector
 
 
 class Placed(NamedTuple):
@@ -229,7 +229,7 @@ def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
 
 def _round_mesh(vertices: Floats, place: Floats, axis: Floats) -> Wheel | None:
     """The wheel that a hull of `vertices` (N, 3) m is about the line through `place` (3,) m along the unit vector `axis` (3,)."""
-    turn = _pointing(axis)
+    turn = pointing(vector(axis))
     points = (vertices - place) @ turn.rotation()
     far = np.hypot(points[:, 0], points[:, 1])
     radius = float(far.max())
@@ -241,12 +241,3 @@ def _round_mesh(vertices: Floats, place: Floats, axis: Floats) -> Wheel | None:
     low, high = float(tread.min()), float(tread.max())
     middle = vector(place + axis * (low + high) / 2)
     return Wheel(radius, high - low, Pose(middle, turn.quaternion))
-
-
-def _pointing(axis: Floats) -> Pose:
-    """The least turn that takes the z axis to the unit vector `axis` (3,)."""
-    x, y, z = axis.tolist()
-    length = math.hypot(x, y, 1.0 + z)
-    if length < 1e-9:
-        return Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
-    return Pose(quaternion=((1.0 + z) / length, -y / length, x / length, 0.0))

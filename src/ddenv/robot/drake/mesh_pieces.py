@@ -10,19 +10,18 @@ import math
 from functools import cache
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import trimesh
 
 from ddenv.arrays import Floats
 from ddenv.world.files.meshes import convex_hull
 from ddenv.world.model import Box, Cylinder, Mesh, Shape
-from ddenv.world.pose import Pose, Vector, vector
+from ddenv.world.pose import HERE, Pose, pointing, vector
 
 LONGEST = 2.0  # of a piece along any axis of its mesh, m
 MOST_PIECES = 512  # of one mesh: of a larger one the pieces are longer
-# Faces count as parallel or perpendicular within this (the sine of the angle between them), and sliver faces do not count.
-STRAIGHT = 2e-3
-SLIVER = 1e-6
-# A prism with at least this many sides counts as a cylinder if its corners lie on a circle within this share of the radius.
+# A mesh that leaves at most this share of the box around it empty is that box.
+EMPTY = 5e-4
+# A prism with at least this many sides is a cylinder if its corners lie on a circle within this share of the radius.
 SIDES = 12
 ROUND = 0.01
 
@@ -30,72 +29,44 @@ ROUND = 0.01
 @cache
 def pieces(mesh: Mesh) -> list[tuple[Shape, Pose]]:
     """The shapes that stand for a convex mesh, in its frame."""
-    normals = _face_normals(mesh)
-    known = _as_box(mesh, normals) or _as_cylinder(mesh, normals)
+    known = _as_box(mesh) or _as_cylinder(mesh)
     if known is not None:
         return [known]
-    return [(piece, Pose()) for piece in _cut(mesh)]
+    return [(piece, HERE) for piece in _cut(mesh)]
 
 
-def _face_normals(mesh: Mesh) -> Floats:
-    """The normals (N, 3) of the faces of a mesh, each direction once."""
-    corners = mesh.vertices[mesh.faces]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(crosses, axis=1)
-    large = areas > SLIVER * areas.sum()
-    distinct: list[Floats] = []
-    for normal in crosses[large] / areas[large, None]:
-        if all(np.linalg.norm(normal - other) > STRAIGHT for other in distinct):
-            distinct.append(normal)
-    return np.array(distinct)
-
-
-def _as_box(mesh: Mesh, normals: Floats) -> tuple[Shape, Pose] | None:
+def _as_box(mesh: Mesh) -> tuple[Shape, Pose] | None:
     """The box that `mesh` is; None if it is another shape."""
-    if len(normals) != 6:
+    if len(mesh.vertices) != 8:
         return None
-    first = normals[0]
-    across = normals[np.abs(normals @ first) < STRAIGHT]
-    if len(across) != 4:
+    to_box, size = trimesh.bounds.oriented_bounds(mesh.vertices)
+    if _solid(mesh).volume < (1 - EMPTY) * math.prod(size):
         return None
-    second = across[0]
-    axes = np.column_stack([first, second, np.cross(first, second)])
-    if (np.abs(normals @ axes).max(axis=1) < 1 - STRAIGHT**2).any():
-        return None
-    size, pose = _extent(mesh, axes)
-    return Box(size), pose
+    turned = trimesh.transformations.quaternion_from_matrix(to_box)
+    return Box(vector(size)), Pose(vector(to_box[:3, 3]), tuple(turned.tolist())).inverse()
 
 
-def _extent(mesh: Mesh, axes: Floats) -> tuple[Vector, Pose]:
-    """The size and the pose of the box around `mesh` along `axes`, the columns of a matrix (3, 3)."""
-    turn = Rotation.from_matrix(axes)
-    points = mesh.vertices @ turn.as_matrix()
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = vector(turn.apply((low + high) / 2))
-    x, y, z, w = turn.as_quat().tolist()
-    return vector(high - low), Pose(middle, (w, x, y, z))
+def _solid(mesh: Mesh) -> trimesh.Trimesh:
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
-def _as_cylinder(mesh: Mesh, normals: Floats) -> tuple[Shape, Pose] | None:
+def _as_cylinder(mesh: Mesh) -> tuple[Shape, Pose] | None:
     """The cylinder that `mesh` stands for if it is a regular prism of many sides; None if it is another shape."""
-    for axis in normals:
-        along = np.abs(normals @ axis)
-        ends = along > 1 - STRAIGHT**2
-        sides = along < STRAIGHT
-        if ends.sum() != 2 or sides.sum() < SIDES or not (ends | sides).all():
-            continue
-        first = normals[sides][0]
-        size, turned = _extent(mesh, np.column_stack([first, np.cross(axis, first), axis]))
-        # The corners lie evenly around the axis, and as many at each end.
-        pose = Pose(vector(mesh.vertices.mean(axis=0)), turned.quaternion)
-        points = (mesh.vertices - pose.position) @ pose.rotation()
-        corners = np.hypot(points[:, 0], points[:, 1])
-        radius = float(corners.max())
-        flats = (points @ (normals[sides] @ pose.rotation()).T).max(axis=0)
-        if corners.min() < (1 - ROUND) * radius or flats.min() < math.cos(1.1 * math.pi / sides.sum()) * radius:
-            continue
-        # Between its corners and the middles of its sides.
-        return Cylinder((radius + float(flats.mean())) / 2, size[2]), pose
+    if len(mesh.vertices) < 2 * SIDES:
+        return None
+    middle = mesh.vertices.mean(axis=0)
+    for axis in _solid(mesh).facets_normal:
+        turn = pointing(vector(axis))
+        x, y, z = ((mesh.vertices - middle) @ turn.rotation()).T
+        distances = np.hypot(x, y)
+        radius = float(distances.max())
+        angles = np.sort(np.arctan2(y, x))
+        widest = float(np.diff(angles, append=angles[0] + math.tau).max())
+        at_ends = np.abs(z).min() > (1 - ROUND) * np.abs(z).max()
+        if at_ends and distances.min() > (1 - ROUND) * radius and widest < 1.1 * math.tau / SIDES:
+            # Between its corners and the middles of its sides.
+            between = radius * (1 + math.cos(widest / 2)) / 2
+            return Cylinder(between, float(np.ptp(z))), Pose(vector(middle), turn.quaternion)
     return None
 
 
@@ -107,23 +78,14 @@ def _cut(mesh: Mesh) -> list[Mesh]:
         longest *= 1.25
     parts = [(mesh.vertices, mesh.faces)]
     for axis, count in enumerate(counts):
-        planes = np.linspace(low[axis], high[axis], count + 1)[1:-1]
-        for place in planes:
-            halves = (_halves(*part, axis, float(place)) for part in parts)
-            parts = [half for pair in halves for half in pair]
+        for place in np.linspace(low, high, count + 1)[1:-1]:
+            parts = [half for part in parts for half in _halves(*part, np.eye(3)[axis], place)]
     if len(parts) == 1:
         return [mesh]
     return [Mesh(f"{mesh.origin} {number}", *part) for number, part in enumerate(parts)]
 
 
-def _halves(vertices: Floats, faces: Floats, axis: int, place: float) -> list[tuple[Floats, Floats]]:
-    """The convex hull of `vertices`, cut where the coordinate `axis` is `place` (m); one part if the plane misses it."""
-    heights = vertices[:, axis] - place
-    if heights.min() >= 0 or heights.max() <= 0:
-        return [(vertices, faces)]
-    edges = np.unique(np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
-    start, end = edges[heights[edges[:, 0]] * heights[edges[:, 1]] < 0].T
-    share = (heights[start] / (heights[start] - heights[end]))[:, None]
-    crossings = vertices[start] + share * (vertices[end] - vertices[start])
-    sides = (vertices[heights <= 0], vertices[heights >= 0])
-    return [convex_hull(np.vstack([side, crossings])) for side in sides]
+def _halves(vertices: Floats, faces: Floats, normal: Floats, place: Floats) -> list[tuple[Floats, Floats]]:
+    """The convex hull of `vertices`, cut by the plane through `place` (3,) m; one part if the plane misses it."""
+    sides = (trimesh.intersections.slice_faces_plane(vertices, faces, side * normal, place)[0] for side in (-1, 1))
+    return [convex_hull(points) for points in sides if len(points)]

@@ -147,7 +147,7 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     # The order in which models are added is the order of the solver's unknowns, which decides the last bits of every result. The
     # robot comes first.
     models = sorted(world.models, key=_place_in_order)
-    static = _add_still(plant, models, wheels)
+    static, touched_by = _add_still(plant, models, wheels)
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
     for joint in (joint for joint in robot.joints if joint.name in drive.joints):
         actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
@@ -170,7 +170,7 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         own = GeometrySet(list(static[body.name])), GeometrySet(list(body.geometry))
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(*own))
     plant.Finalize()
-    apart = _apart(scene_graph.model_inspector(), [driver, *moving.values()])
+    apart = _apart(scene_graph.model_inspector(), touched_by, [driver, *moving.values()])
     for one, other in apart:
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(one, other))
     # Drake has filtered links that a joint connects.
@@ -183,24 +183,28 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins, own_pairs, apart)
 
 
-def _apart(inspector: SceneGraphInspector, bodies: Sequence[Body]) -> tuple[tuple[GeometrySet, GeometrySet], ...]:
+def _apart(
+    inspector: SceneGraphInspector, touched_by: dict[str, list[GeometryId]], bodies: Sequence[Body]
+) -> tuple[tuple[GeometrySet, GeometrySet], ...]:
     """The pairs of sets of shapes that never touch each other; none if there is nothing that only some shapes can touch."""
-    views: dict[str, list[GeometryId]] = {"all": [], "spheres": [], "others": []}
-    for geometry in inspector.GetAllGeometryIds():
-        views[inspector.GetName(geometry).split("::")[-1].split()[0]].append(geometry)
-    if not views["spheres"]:
+    if not touched_by["spheres"]:
         return ()
     moving = [geometry for body in bodies for geometry in body.geometry]
-    spheres = [geometry for geometry in moving if isinstance(inspector.GetShape(geometry), Sphere)]
-    others = set(moving) - set(spheres)
+    spheres = {geometry for geometry in moving if isinstance(inspector.GetShape(geometry), Sphere)}
+    others = [geometry for geometry in moving if geometry not in spheres]
     return (
-        (GeometrySet(views["spheres"]), GeometrySet(sorted(others, key=GeometryId.get_value))),
-        (GeometrySet(views["others"]), GeometrySet(spheres)),
+        (GeometrySet(touched_by["spheres"]), GeometrySet(others)),
+        (GeometrySet(touched_by["others"]), GeometrySet(list(spheres))),
     )
 
 
-def _add_still(plant: MultibodyPlant, models: Sequence[Model], wheels: float) -> dict[str, tuple[GeometryId, ...]]:
-    """The geometry of what never moves, by model. Its order does not depend on how shapes are grouped into models, either."""
+def _add_still(
+    plant: MultibodyPlant, models: Sequence[Model], wheels: float
+) -> tuple[dict[str, tuple[GeometryId, ...]], dict[str, list[GeometryId]]]:
+    """The geometry of what never moves, by model, and by what it touches (`Placed.touches`).
+
+    Its order does not depend on how shapes are grouped into models, either.
+    """
     solids = [
         (model.name, solid)
         for model in models
@@ -209,9 +213,12 @@ def _add_still(plant: MultibodyPlant, models: Sequence[Model], wheels: float) ->
     ]
     solids.sort(key=lambda pair: (pair[1].pose.position, pair[1].pose.quaternion, pair[1].touches))
     geometry: dict[str, list[GeometryId]] = {model.name: [] for model in models}
+    touched_by: dict[str, list[GeometryId]] = {"all": [], "spheres": [], "others": []}
     for name, solid in solids:
-        geometry[name] += _register(plant, plant.world_body(), Pose(), [solid])
-    return {name: tuple(identities) for name, identities in geometry.items()}
+        [identity] = _register(plant, plant.world_body(), Pose(), [solid])
+        geometry[name].append(identity)
+        touched_by[solid.touches].append(identity)
+    return {name: tuple(identities) for name, identities in geometry.items()}, touched_by
 
 
 def _place_in_order(model: Model) -> tuple[object, ...]:
@@ -230,7 +237,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         parts: list[Part] = []
         for number, link in enumerate(model.links):
             for solid in solids[number]:
-                name = f"{solid.touches} {plant.num_collision_geometries()}"
+                name = str(plant.num_collision_geometries())
                 away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
                 geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid.shape, name, solid.surface)
                 place = transform(link.pose.inverse() @ solid.pose)
@@ -292,7 +299,7 @@ def _register(plant: MultibodyPlant, body: RigidBody, frame: Pose, solids: Itera
     identities = []
     for solid in solids:
         # Drake requires different names.
-        name = f"{solid.touches} {plant.num_collision_geometries()}"
+        name = str(plant.num_collision_geometries())
         place = transform(frame @ solid.pose)
         identities.append(plant.RegisterCollisionGeometry(body, place, solid.shape, name, solid.surface))
     return identities

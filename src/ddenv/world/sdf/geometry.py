@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -13,7 +12,7 @@ from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
 from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
+from ddenv.world.pose import HERE, ONE, Pose, Vector, pointing, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
@@ -93,11 +92,7 @@ def _turned(normal: Element | None) -> Pose:
     length = float(np.linalg.norm(direction))
     if not 1e-9 < length < 1e9:
         raise complain(normal, "the normal has no usable length")
-    x, y, z = (direction / length).tolist()
-    if z < -1 + 1e-12:
-        return Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
-    w = math.sqrt((1 + z) / 2)
-    return Pose((0.0, 0.0, 0.0), (w, -y / (2 * w), x / (2 * w), 0.0))
+    return pointing(vector(direction / length))
 
 
 def _mesh(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:

@@ -162,26 +162,15 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
             unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
             return tube + balls, origin, unit / (tube + balls)
         case Mesh(_, vertices, faces):
-            return _polyhedron(vertices[faces])
+            import trimesh
+
+            # About its middle, since the sums lose digits far from the origin.
+            middle = vertices.mean(axis=0)
+            whole = trimesh.triangles.mass_properties((vertices - middle)[faces])
+            return whole.volume, whole.center_mass + middle, np.asarray(whole.inertia) / whole.volume
     raise TypeError(type(shape).__name__)
 
 
 def _cylinder(radius: float, length: float) -> np.ndarray:
     across = radius**2 / 4 + length**2 / 12
     return np.diag([across, across, radius**2 / 2])
-
-
-def _polyhedron(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Sums signed tetrahedra between an inner point and each of the triangles (N, 3, 3)."""
-    inside = triangles.reshape(-1, 3).mean(axis=0)
-    a, b, c = np.moveaxis(triangles - inside, 1, 0)
-    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
-    volume = float(volumes.sum())
-    first = np.einsum("i,ij->j", volumes, a + b + c) / 4
-    corners = np.stack([a, b, c], axis=1)
-    total = corners.sum(axis=1)
-    second = np.einsum("i,ij,ik->jk", volumes, total, total) + np.einsum("i,ilj,ilk->jk", volumes, corners, corners)
-    covariance = second / 20 / volume
-    center = first / volume
-    covariance -= np.outer(center, center)
-    return volume, center + inside, np.trace(covariance) * np.eye(3) - covariance
