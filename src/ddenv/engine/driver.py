@@ -258,7 +258,8 @@ class Driver:
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         spec, asked = self._scenario.failure, self._reduction
-        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose)
+        usual = asked.baseline_runs
+        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose, usual)
         if isinstance(found, str):
             return None
         f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)

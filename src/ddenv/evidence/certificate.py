@@ -23,8 +23,10 @@ from ddenv.environment import Environment
 from ddenv.evidence.rates import HIGHEST_RATE, Shown, wilson_interval
 
 Verdict = Literal[
-    "", "kept", "lost", "exact", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"
+    "", "kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "passes", "fails", "not shown", "unknown"
 ]
+# Without these models f is rarer, but not shown to be rare enough. "helps": it is shown not to be that rare.
+HELPING = ("helps", "rarer")
 
 # The chance that any claim of a run is wrong, over all its certificates. It is not divided by the number of models: "each model is
 # needed" is wrong only if a certain one is not, and its own bet won by chance.
@@ -43,8 +45,9 @@ ALONE_SHARE, ALONE_FIRST = 0.7, 10
 # The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
 # many times as fast as they did.
 MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
-# A model without which f is shown to be rarer, and seems to keep so much of its rate, helps after so many pairs.
-HELPS_AFTER, HELPS_SHARE = 60, 0.75
+# Where f is shown to be rarer without a model and seems to keep so much of its rate, more than so many pairs would decide little,
+# unless the bet that it does has won such a part of what it needs.
+HELPS_AFTER, HELPS_SHARE, NEARLY = 60, 0.75, 0.2
 # If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
 ABOUT_AS_OFTEN = 0.9
 # Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
@@ -269,8 +272,9 @@ def falls(
 ) -> Procedure:
     """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
-    "needed" is wrong with a probability of at most `error`. "helps": f is rarer, but not by so much; "not needed": it
-    shows about as often, which the next certificate has to show.
+    "needed" is wrong with a probability of at most `error`. "rarer": f is rarer than in `left`; "helps": that, and more
+    frequent than `share`, each wrong in at most 1 / `REFUTED` of the cases. "not needed": it seems to show about as often; that
+    has no error, and the next certificate has to show it.
     """
     assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
     for run in range(MOST_REMOVAL_PAIRS):
@@ -282,13 +286,15 @@ def falls(
             return "needed", bound
         rarer = rarer or assumed.below(1.0) >= REFUTED
         often = sound.above(share)
-        if often >= REFUTED or (rarer and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE):
+        if often >= REFUTED:
             return "helps" if rarer else "not needed", bound
+        if rarer and often < NEARLY * REFUTED and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE:
+            return "rarer", bound
         likeliest = max(often * error * REFUTED, assumed.below(share))
         if run + 1 >= FEWEST_PAIRS and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / error:
             break
     about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
-    return ("helps" if rarer else "not needed" if about_as_often else "not shown"), bound
+    return ("rarer" if rarer else "not needed" if about_as_often else "not shown"), bound
 
 
 def often(environment: Environment, runs: int) -> Procedure:

@@ -9,14 +9,14 @@ from statistics import median
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
-from ddenv.evidence.certificate import Terms, certificate_tests, falls, keeps, often, settle
+from ddenv.evidence.certificate import HELPING, Terms, certificate_tests, falls, keeps, often, settle
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
 from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
-from ddenv.text import percent
+from ddenv.text import percent_at_least, percent_at_most
 
 
 def is_minimal(certificate: Certificate) -> bool:
@@ -30,10 +30,16 @@ def helping(certificate: Certificate) -> tuple[str, ...]:
     """The models but for which a certificate shows the end to be minimal; the one without which f shows most often comes first."""
     left, *removals = certificate.claims
     helps = [claim for claim in removals if claim.verdict != "needed"]
-    if left.verdict != "kept" or {claim.verdict for claim in helps} != {"helps"}:
+    if left.verdict != "kept" or not all(claim.verdict in HELPING for claim in helps):
         return ()
     helps.sort(key=lambda claim: -claim.shown / max(1, claim.runs))
     return tuple(claim.without for claim in helps if claim.without is not None)
+
+
+def only_helping(certificate: Certificate) -> tuple[str, ...]:
+    """Those of them without which f is shown to be not much rarer: a user may leave one out."""
+    little = {claim.without for claim in certificate.claims if claim.verdict == "helps"}
+    return tuple(name for name in helping(certificate) if name in little)
 
 
 def terms_of(state: RunState, certificate: Certificate) -> Terms:
@@ -189,15 +195,16 @@ class FreshRuns:
         """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
-        return f"{'≤' if self.without else '≥'} {percent(self.bound)}"
+        return f"≤ {percent_at_most(self.bound)}" if self.without else f"≥ {percent_at_least(self.bound)}"
 
     @property
     def shows(self) -> str:
         """The same in words."""
         if self.bound is None or not self.shows_at_least:
             return ""
-        share = percent(self.bound)
-        return f"at most {share} as often" if self.without else f"keeps at least {share} of the rate"
+        if self.without:
+            return f"at most {percent_at_most(self.bound)} as often"
+        return f"keeps at least {percent_at_least(self.bound)} of the rate"
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:

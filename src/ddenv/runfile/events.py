@@ -389,7 +389,9 @@ class ClaimMade:
 
     without: Natural | None
     environment: Natural
-    verdict: Annotated[str, OneOf("kept", "lost", "exact", "needed", "helps", "not needed", "not shown", "unknown")]
+    verdict: Annotated[
+        str, OneOf("kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "not shown", "unknown")
+    ]
     shown: Natural
     runs: Natural
     low: Share
