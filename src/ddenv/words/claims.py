@@ -272,7 +272,9 @@ def of_passing(state: RunState, one: Isolation) -> str:
     names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(one, first)}"
-    said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(one, first)}"
+    tested = "" if one.asked.chosen else f", tested above {percent(one.asked.rather_than)}"
+    without = "it" if len(gone) == 1 else "them"
+    said = f"a nearest world that passes lacks {names}: without {without} {_reaching(one, first)}{tested}"
     verdicts = {str(claim.back): claim.verdict for claim in backs}
     if doubt := _doubt(
         verdicts, "not shown that each of them has to go", "not a nearest one: the robot seems to pass", "with"
