@@ -12,7 +12,8 @@ from tests.conftest import DATA
 def runs(without, *outcomes):
     models = 3 - bool(without)
     return [
-        {"without": without, "models": models, "outcome": outcome, "seed": seed} for seed, outcome in enumerate(outcomes)
+        {"without": without, "models": models, "outcome": outcome, "seed": seed}
+        for seed, outcome in enumerate(outcomes)
     ]
 
 

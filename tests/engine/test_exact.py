@@ -134,7 +134,11 @@ def test_each_run_behind_the_result_is_replayed_once(tmp_path):
     drive(exact_run(tmp_path, exact_seeds=3), pool)
     again = {test: number for test in pool.made if (number := pool.made.count(test)) > 1}
     behind = [(frozenset({"wall"}), 0), *((frozenset(), seed) for seed in range(3))]
-    assert set(behind) <= set(again) <= {*behind, (frozenset(ELEMENTS), 0)} | {(frozenset({"wall"}), seed) for seed in (1, 2)}
+    assert (
+        set(behind)
+        <= set(again)
+        <= {*behind, (frozenset(ELEMENTS), 0)} | {(frozenset({"wall"}), seed) for seed in (1, 2)}
+    )
     assert set(again.values()) == {2}
 
 

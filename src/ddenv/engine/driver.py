@@ -395,8 +395,9 @@ class Driver:
             journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
 
     def _all_repeat(self, tests: Iterable[int]) -> bool:
-        """Replays what an exact reduction rests on, up to a run that differs: where some runs do not repeat, it may have been misled
-        by one that showed f, or missed it, by chance.
+        """Replays what an exact reduction rests on, up to a run that differs.
+
+        Where some runs do not repeat, one that showed or missed f by chance may have misled it.
         """
         journal = self._journal
         for test in (journal.state.tests[number - 1] for number in tests):
@@ -404,7 +405,11 @@ class Driver:
             if journal.state.search_due:
                 raise steps.Changed
             if not repeats:
-                note(journal, f"replay {test.id}", f"test {test.id}, replayed with seed {test.seed}, differs: {NOT_EXACT}")
+                note(
+                    journal,
+                    f"replay {test.id}",
+                    f"test {test.id}, replayed with seed {test.seed}, differs: {NOT_EXACT}",
+                )
                 return False
         return True
 

@@ -14,7 +14,7 @@ taken to show f, too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -341,11 +341,43 @@ def certificate_tests(
     seen = min(max(0, seen), MOST_PAIRS)
     rates = [rate, *(wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ())]
     ends = [_expected(each, certify_rate, left, at_least) for each in rates]
-    # What is not known of the rate and chance within the certificate are independent factors.
-    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
-    longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
+    shorter, longer = _factors(ends)
     most = max(ends[0], min(2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS, ends[0] * longer))
     return math.floor(ends[0] / shorter), round(ends[0]), math.ceil(most)
+
+
+def _factors(ends: Sequence[float]) -> tuple[float, float]:
+    """It takes one of `ends` tests by what may be the rates, the first one probably: how many times fewer or more it may take."""
+    # What is not known of the rates and chance within the certificate are independent factors.
+    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
+    return shorter, math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
+
+
+def certificate_from_here(
+    made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int
+) -> tuple[int, int, int]:
+    """The same once removals have shown something: `made` tests so far, `left_runs` of them of what is left.
+
+    Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all removals were as `seen`.
+    """
+    with_it, second = (seen.both + seen.second) / runs, max(seen.second, 0.5) / runs
+    ends = []
+    for share in (second, *wilson_interval(seen.second, runs, EIGHT_OF_TEN)):
+        each = _removal_pairs(max(0.0, with_it - share), seen.first / runs, max(share, 0.01))
+        ends.append(sum(max(1.0, each - pairs) for pairs in open_pairs) + max(1.0, each - left_runs))
+    shorter, longer = _factors(ends)
+    # A model that is not needed ends the certificate.
+    fewest = ends[0] / shorter if seen.share < NEEDED_SHARE else 0.0
+    return made + math.floor(fewest), made + round(ends[0]), made + math.ceil(longer * ends[0])
+
+
+def _removal_pairs(both: float, first: float, second: float) -> float:
+    """After how many pairs a claim about a model is decided, where pairs have these shares."""
+    kinds = both, first, second
+    needed = _until(NEEDS, kinds, (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
+    refuted = _until(REFUTED, kinds, (1.0 / NEEDED_SHARE - 1.0, 1.0 / NEEDED_SHARE, -1.0))
+    given_up = FEWEST_PAIRS if min(needed, refuted) > HOPE * MOST_REMOVAL_PAIRS else MOST_REMOVAL_PAIRS
+    return min(needed, refuted, float(given_up))
 
 
 def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> float:

@@ -298,12 +298,10 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
         if high - low > max(asked.resolution, NEAR * high) and middle not in by_value:
             return middle
     goal = next((one.value for one in near if one.verdict == "goal"), None)
-    for value in () if goal is None else beyond(asked, up, goal):
-        if value not in by_value:
-            return value
-        if by_value[value].verdict != "goal":
-            break
-    return None
+    farther = () if goal is None else beyond(asked, up, goal)
+    to_try = (value for value in farther if value not in by_value or by_value[value].verdict != "goal")
+    first = next(to_try, None)
+    return None if first in by_value else first
 
 
 def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER) -> Iterator[tuple[float, int]]:

@@ -104,7 +104,9 @@ def seeds_of(certificate: Certificate) -> str:
 
 def kept(certificate: Certificate) -> str:
     """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
-    return f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
+    return (
+        f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
+    )
 
 
 def _kept(certificate: Certificate) -> float:
@@ -216,8 +218,9 @@ def _there(there: Claim) -> str:
 
 
 def still_fails(fails: bool | None, certificate: Certificate) -> str:
-    """What new runs of what is left show: `fails` is what `rates.shows_at` says of them at the low end of its interval, or whether it
-    fails with each of the chosen seeds.
+    """What new runs of what is left show.
+
+    `fails` is what `rates.shows_at` says of them at the low end of its interval, or whether it fails with each chosen seed.
     """
     if fails is None:
         return "the runs do not decide"
@@ -350,7 +353,10 @@ def promise(state: RunState, certificate: Certificate) -> str:
             "minimal means: for the chosen seeds this is exact, since a seed repeats its run exactly; for other seeds, fresh "
             "runs measure how often f shows, and nothing more"
         )
-    kept, pinned = f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
+    kept, pinned = (
+        f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}",
+        never_left_out(state, certificate),
+    )
     often = _as_often(_at_most(certificate))
     return (
         f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f shows {often}; "

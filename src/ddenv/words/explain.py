@@ -6,7 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import FreshRuns, current, failing_instead, fresh_runs, fresh_runs_made, has_dropped, only_helping
+from ddenv.evidence.claims import (
+    FreshRuns,
+    current,
+    failing_instead,
+    fresh_runs,
+    fresh_runs_made,
+    has_dropped,
+    only_helping,
+)
 from ddenv.runfile.deeds import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.progress import Certificate
@@ -429,7 +437,7 @@ def _certifying(snapshot: Snapshot) -> tuple[str, ...]:
     return (
         *(() if certificate.seeds else (f"{bar(shown, aim)} {kept}, aim {percent(aim)}",)),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
-        f"By the rate of the whole world, this takes about {usual_runs(state, certificate)}; {done}.",
+        f"By the rates seen so far, this takes about {usual_runs(state, certificate)}; {done}.",
         *_so_far(rows),
         *_now(snapshot, certificate),
     )
