@@ -8,6 +8,9 @@ import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
 
+# 100 * 0.29 is a bit less than 29.
+ROUNDING = 1e-9
+
 
 def printable(text: str) -> str:
     """`text` with control characters replaced, since parts of it may come from untrusted files."""
@@ -131,3 +134,13 @@ def percent(part: float) -> str:
     if value == 100 and part < 1:
         return ">99 %"
     return f"{value} %"
+
+
+def percent_at_least(bound: float) -> str:
+    """A lower bound as a whole percentage, rounded to the side on which it still holds."""
+    return f"{math.floor(100.0 * bound + ROUNDING)} %"
+
+
+def percent_at_most(bound: float) -> str:
+    """An upper bound as a whole percentage, rounded to the side on which it still holds."""
+    return f"{math.ceil(100.0 * bound - ROUNDING)} %"

@@ -12,8 +12,8 @@ from tests.command import is_one_line
 from tests.workbench import fake_moments
 
 FRICTION = (
-    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the farthest value tried; f up to 0.2 (5 of 5 runs), the robot "
-    "reaches its goal from 0.4 (7 of 7 runs)"
+    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the end of its range; f up to 0.2 (5 of 5 runs), the robot "
+    "reaches its goal at 0.4 (7 of 7 runs)"
 )
 FIX = (
     "The nearest fix found: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot reaches its goal in 20 of 20 "
@@ -27,8 +27,8 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, tmp_path, co
     asked = {"margins": '["crate_0*"]', "most_runs": 300, "cluster": None}
     assert (done.returncode, started) == (0, [(run.path, 1, asked)])
     said = done.stdout.splitlines()
-    assert said[0].split() == ["number", "now", "f", "until", "goal", "from", "runs"]
-    assert said[1].split() == ["crate_00.friction", "0.1", "0", "(all)", "…", "0.2", "goal", "≥", "0.4", "17"]
+    assert said[0].split() == ["number", "now", "f", "until", "instead", "runs"]
+    assert said[1].split() == ["crate_00.friction", "0.1", "0", "(end)", "…", "0.2", "goal", "at", "0.4", "17"]
     assert f"{FRICTION}." in said
     assert "no f at 0.31 (0 of 7 runs), where the robot was lost in 7" in done.stdout
     assert "1.25 is not possible: crate_01 would be 0.20 m inside crate_00" in done.stdout

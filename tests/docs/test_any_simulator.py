@@ -60,7 +60,7 @@ def test_another_simulator_is_told_from_the_one_of_the_run(reduced, tmp_path):
         found = json.loads(ddenv("test", reduced[0], *words, cwd=tmp_path).stdout)["elsewhere"]
         said[name] = [(each["without"], each["fails"]) for each in found]
     assert said["drive.py"] == [(None, True), ("shelf_left", False), ("shelf_right", False)]
-    assert said["open.py"] == [(None, False), ("shelf_left", False), ("shelf_right", False)]
+    assert said["open.py"] == [(None, False), ("shelf_left", None), ("shelf_right", None)]
 
 
 @pytest.mark.examples
@@ -81,7 +81,7 @@ def test_a_test_for_pytest_fails_as_long_as_the_robot_fails(reduced, tmp_path):
         test,
     ]
     said = subprocess.run(pytest_, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert said.returncode == 1 and "it fails as it did: f in 7 of 7 runs" in said.stdout, said.stdout
+    assert said.returncode == 1 and "it still fails, at " in said.stdout, said.stdout
     test.write_text(test.read_text().replace("is False", "is True"))
     assert subprocess.run(pytest_, cwd=tmp_path, capture_output=True, check=False).returncode == 0
 

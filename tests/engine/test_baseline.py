@@ -39,7 +39,7 @@ def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1, chose: int = 0):
         tests.append(Ran(run + 1, 0, "baseline", None, None, run, run, outcome, kind, end_pose=end))
         if rows is not None:
             ways[run + 1] = rows
-    return fix_failure(tests, ways, spec, 3, wanted, chose)
+    return fix_failure(tests, ways, spec, 3, wanted, chose, usual=len(tests))
 
 
 def stuck(x: float, kind: str = "stuck"):

@@ -117,6 +117,31 @@ def test_that_runs_repeat_is_asked_once(tmp_path):
     )
 
 
+@pytest.mark.parametrize("what", ["what is left", "a removal"])
+def test_where_a_run_behind_the_result_does_not_repeat_nothing_exact_is_said(tmp_path, what):
+    """The wall alone stops the robot; the first run of a certain world ended otherwise, by chance."""
+    odd = frozenset({"wall"}) if what == "what is left" else frozenset()
+    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep else "pass", 1)
+    pool.aside = lambda keep, seed: 1e-9 * pool.made.count((keep, seed)) if keep == odd else 0.0
+    state = drive(exact_run(tmp_path), pool)
+    assert (state.status, state.minimal, state.environment) == ("finished", False, ("wall",))
+    assert state.reason.startswith("not shown that each model is needed: undecided without wall")
+    assert any("differs: runs do not repeat" in words for _, words in state.notes)
+
+
+def test_each_run_behind_the_result_is_replayed_once(tmp_path):
+    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep else "pass", 1)
+    drive(exact_run(tmp_path, exact_seeds=3), pool)
+    again = {test: number for test in pool.made if (number := pool.made.count(test)) > 1}
+    behind = [(frozenset({"wall"}), 0), *((frozenset(), seed) for seed in range(3))]
+    assert (
+        set(behind)
+        <= set(again)
+        <= {*behind, (frozenset(ELEMENTS), 0)} | {(frozenset({"wall"}), seed) for seed in (1, 2)}
+    )
+    assert set(again.values()) == {2}
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_it_can_be_chosen_during_a_run(tmp_path, monkeypatch, jobs):
     # With two workers one of them still runs a test when the new search begins.

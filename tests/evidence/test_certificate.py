@@ -1,6 +1,7 @@
 """What fresh runs may claim: rarely anything wrong, and the same whatever finishes first."""
 
 import random
+from collections import Counter
 
 import pytest
 from hypothesis import given
@@ -11,9 +12,11 @@ from ddenv.evidence.certificate import (
     ALONE_FIRST,
     ALONE_SHARE,
     ERROR,
+    HELPING,
     HELPS_AFTER,
     MOST_BROKEN,
     MOST_PAIRS,
+    REFUTED,
     Pairs,
     Terms,
     error_of,
@@ -167,13 +170,22 @@ def test_the_whole_world_runs_with_all_seeds_where_what_is_left_shows_f_less_oft
     assert sorted(left) == sorted(whole)
 
 
-def test_a_model_without_which_f_is_a_little_rarer_helps():
+def test_without_a_model_that_helps_f_is_shown_to_be_rarer():
     """As in the paper's friction world: 204 of 240 without one wall, 240 of 240 with it."""
     terms = Terms(2 / 3, 0.8, FIRST, 10)
     claims = [settle(falls(REST, LEFT, terms.error), outcomes((1.0, 1.0, 0.85), salt)) for salt in range(60)]
-    helps = [claim for claim in claims if claim.verdict == "helps"]
+    helps = [claim for claim in claims if claim.verdict in HELPING]
     assert len(helps) >= 45
     assert sum(len(claim.rests_on) <= 2 * HELPS_AFTER for claim in helps) >= 0.9 * len(helps)
+
+
+@pytest.mark.parametrize(("rate", "without"), [(0.05, 0.0), (0.1, 0.3), (0.3, 0.7)])
+def test_a_model_is_said_to_help_only_a_little_where_f_is_shown_to_stay_frequent(rate, without):
+    """Too rare for a verdict, f is shown to be rarer without a needed model, and by how much is not shown."""
+    rates = (rate, rate, without * rate)
+    verdicts = Counter(settle(falls(REST, LEFT, FIRST), outcomes(rates, salt)).verdict for salt in range(60))
+    assert verdicts["helps"] <= 60 / REFUTED
+    assert verdicts["rarer"] + verdicts["needed"] + verdicts["not shown"] >= 45
 
 
 def share_claimed(verdict, procedure, rates, simulated, together=0.0, breaks=0.0):

@@ -4,6 +4,8 @@ import json
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.evidence.claims import never_left_out
@@ -12,6 +14,7 @@ from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
+from ddenv.text import percent_at_least, percent_at_most
 from ddenv.words.claims import promise, verdict_on
 from ddenv.words.explain import explain
 from ddenv.words.news import news
@@ -62,10 +65,22 @@ def test_screen_report_json_and_console_say_that_a_pinned_model_was_never_left_o
 def test_the_sentence_says_how_many_were_left_out(pinned):
     said = fold(pinned.file.events()).reason
     assert said.startswith("no other single model can be removed: f in 23 of 23 fresh runs")
-    assert f"without any one of these 2, f in none of 11 fresh runs each (upper bound: 54 % as often); {PINNED}" in said
+    assert f"without any one of these 2, f in none of 11 fresh runs each (upper bound: 55 % as often); {PINNED}" in said
 
 
 def test_a_single_model_that_was_left_out_is_named(pinned):
     found = fold(pinned.file.events()).certificate
     said = verdict_on(replace(found, claims=found.claims[:2]))
-    assert said.endswith("; without crate_01, f in none of 11 fresh runs (upper bound: 54 % as often)")
+    assert said.endswith("; without crate_01, f in none of 11 fresh runs (upper bound: 55 % as often)")
+
+
+@given(st.floats(0.0, 1.0))
+def test_a_bound_is_rounded_to_the_side_on_which_it_holds(bound):
+    said_least, said_most = (float(said(bound)[:-2]) / 100.0 for said in (percent_at_least, percent_at_most))
+    assert bound - 0.01 < said_least <= bound + 1e-9
+    assert bound - 1e-9 <= said_most < bound + 0.01
+
+
+def test_a_bound_of_whole_percents_is_said_as_it_is():
+    assert [percent_at_least(part / 100.0) for part in range(101)] == [f"{part} %" for part in range(101)]
+    assert [percent_at_most(part / 100.0) for part in range(101)] == [f"{part} %" for part in range(101)]

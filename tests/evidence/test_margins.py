@@ -88,11 +88,27 @@ def test_nothing_is_assumed_between_the_values_or_beyond_them():
     margin = explored(PLACE, 1.0, lambda value, _: "pass" if value in goals else "similar")
     assert margin.up.goal.value == goals[0]
     assert margin.up.until.value < goals[0]
-    # It stopped there: the end of the range is not claimed.
-    assert PLACE.high not in [value.value for value in margin.up.tried]
+    # What is beyond was tried, so the goal is not said to be reached to the end of the range.
+    assert margin.up.again.value == PLACE.high
+    assert not margin.up.to_end
     assert (margin.down.until.value, margin.down.gone) == (PLACE.low, None)
     other = explored(PLACE, 1.0, lambda value, _: "other" if value in goals else "similar")
     assert (other.up.gone.value, other.up.again.value, other.up.goal) == (goals[0], PLACE.high, None)
+
+
+@given(limit=st.floats(0.6, 3.2), window=st.floats(0.2, 3.0))
+@examples(2)
+def test_the_goal_is_said_to_be_reached_to_the_end_only_where_runs_beyond_reached_it(limit, window):
+    """`window` m farther than from where it is reached, it is not."""
+
+    def outcome(value, _):
+        return "similar" if value < limit else "pass" if value < limit + window else "other"
+
+    side = explored(PLACE, 1.0, outcome).up
+    assert side.goal is None or side.to_end == (limit + window > PLACE.high and side.goal.value < PLACE.high)
+    if side.to_end:
+        values = [one.value for one in side.tried if one.value >= side.goal.value]
+        assert PLACE.high in values and len(values) >= 4
 
 
 def test_a_value_that_is_not_possible_costs_no_run_and_bounds_the_search():

@@ -5,7 +5,17 @@ from statistics import median
 
 import pytest
 
-from ddenv.evidence.certificate import Terms, certificate_tests, error_of, falls, keeps, settle
+from ddenv.environment import Environment
+from ddenv.evidence.certificate import (
+    Pairs,
+    Terms,
+    certificate_from_here,
+    certificate_tests,
+    error_of,
+    falls,
+    keeps,
+    settle,
+)
 from ddenv.runs.tests_left import LATE, left_said, remaining, rough_run, search_tests
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
@@ -194,3 +204,28 @@ def test_each_forecast_narrows_the_one_before_unless_they_contradict_each_other(
         run.write("forecast", round=1, tests=tests, tests_done=done)
         seen.append(run.state.forecast.tests)
     assert seen == [(10, 20, 40), (10, 30, 40), (20, 40, 40), (50, 60, 70)]
+
+
+@pytest.mark.parametrize(("left", "without"), [(1.0, 0.5), (0.9, 0.7), (0.4, 0.0)])
+def test_once_removals_have_shown_something_the_rest_is_forecast_from_that(left, without):
+    """Where a removal only lowers the rate, it takes many more pairs than one after which f never shows."""
+    rest, whole = Environment.whole(1), Environment.whole(2)
+    took, low, high = [], [], []
+    for salt in range(30):
+        draw = Random(salt)
+        cache = {}
+
+        def shown(environment, run, draw=draw, cache=cache):
+            rate = left if environment == whole else left * without
+            return cache.setdefault((environment, run), draw.random() < rate)
+
+        claim = settle(falls(rest, whole, 0.9 * error_of(1)), shown)
+        seen = Pairs()
+        for run in range(10):
+            seen = seen.after(shown(rest, run), shown(whole, run))
+        forecast = certificate_from_here(20, 10, [10], seen, 10)
+        took.append(max(20, len(claim.rests_on)))
+        low.append(forecast[0])
+        high.append(forecast[2])
+    inside = sum(least <= number <= most for least, number, most in zip(low, took, high, strict=True))
+    assert inside >= 22

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out
+from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out, only_helping
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.slices import simulated
 from ddenv.runfile.progress import Node
@@ -125,7 +125,8 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         f"run file: {path}",
     ]
     if state.status == "finished" and found is not None:
-        out = f", and H in it leaves {helps[0]} out" if helps else ""
+        could_go = only_helping(found)
+        out = f", and H in it leaves {could_go[0]} out" if could_go else ""
         run, bundle = attach_name(path), shlex.quote(f"{path.stem}.zip")
         passing = "" if state.isolated is not None else f"'ddenv isolate {run}' finds a nearest world that passes, "
         said.append(

@@ -150,18 +150,45 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
 def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[dict[str, Any]]:
     """What runs in another simulator show of what is left, of which the certificate says `here`, and of that without each model.
 
-    `fails` says whether they show f at the certificate's rate, or at less than half of it; None if they do not decide. `said` has
-    the same in words. An environment without a run that ended is left out.
+    What is left `fails` if f shows there at the certificate's rate, and not if at less than half of it. Without a model it fails if
+    f shows nearly as often as with it there, and not if the model is needed; None where the runs do not decide. `said` has the same
+    in words. An environment without a run that ended is left out.
     """
     from ddenv.evidence.rates import shows_at
     from ddenv.runfile.state import BROKEN
-    from ddenv.words.claims import in_another_simulator
+    from ddenv.words.claims import in_another_simulator, without_in_another_simulator
 
     found = []
     for row in (each for each in summary(results) if each["runs"]):
-        ended = [each for each in results if each["without"] == row["without"] and each["outcome"] not in BROKEN]
-        fails = shows_at((each["outcome"] == "similar" for each in ended), here.low)
         there = replace(here, **{key: row[key] for key in ("without", "shown", "runs", "low", "high")})
-        said = in_another_simulator(simulator, fails, there, here)
+        if row["without"] is None:
+            ended = (each for each in results if each["without"] is None and each["outcome"] not in BROKEN)
+            fails = shows_at((each["outcome"] == "similar" for each in ended), here.low)
+            said = in_another_simulator(simulator, fails, there, here)
+        else:
+            verdict = _needed_there(results, row["without"])
+            fails = {"needed": False, "helps": True, "not needed": True}.get(verdict)
+            said = without_in_another_simulator(simulator, verdict, there)
         found.append({"without": row["without"], "fails": fails, "said": said})
     return found
+
+
+def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
+    """What pairs of runs with the same seed show of a model, as in a certificate; "" if they do not decide."""
+    from ddenv.environment import Environment
+    from ddenv.evidence.certificate import ERROR, falls, settle
+    from ddenv.evidence.rates import Shown
+    from ddenv.runfile.state import BROKEN
+
+    rest, left = Environment.whole(1), Environment.whole(2)
+    outcomes: dict[Environment, dict[int, Shown]] = {rest: {}, left: {}}
+    for one in results:
+        if one["without"] in (None, without):
+            shown: Shown = "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"
+            outcomes[left if one["without"] is None else rest][one["seed"]] = shown
+    seeds = [seed for seed in outcomes[left] if seed in outcomes[rest]]
+
+    def shown_in(environment: Environment, run: int) -> Shown:
+        return outcomes[environment][seeds[run]] if run < len(seeds) else None
+
+    return settle(falls(rest, left, ERROR), shown_in).verdict

@@ -158,13 +158,16 @@ class Bench:
         self._journal.record(Compared(result is None))
 
     def made_again(self, test: KnownTest) -> RunResult | Broken | None:
-        """Makes a run of the whole world again, once all workers are idle; returns how it ended unless it repeats bit for bit."""
+        """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit."""
         while self._busy:
             # A search that is due begins after this.
             self._look_around(WAIT)
-        journal = self._journal
+        journal, state = self._journal, self._journal.state
         journal.record(Comparing(test.id))
-        self._pool.submit(0, Run(frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state)))
+        keep = frozenset(state.environments[test.environment].names(state.elements))
+        # It ends as the one that was simulated.
+        simulated = test if test.implied_by is None else state.tests[test.implied_by - 1]
+        self._pool.submit(0, Run(keep, test.seed, journal.is_full(simulated.phase), wall_limit(state)))
         while not (ended := self._pool.finished(WAIT)):
             self._control.poll()
         result = ended[0][1]

@@ -48,6 +48,7 @@ OTHER_WAY = (
     "round {} would now differ: the run was started with other versions of ddenv, scikit-learn or a package of schemas; "
     "continue with those, or start a new run"
 )
+NOT_EXACT = "runs do not repeat, so nothing exact can be said of them; keep the rate of f instead: --accept-rate kept"
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
@@ -258,7 +259,8 @@ class Driver:
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         spec, asked = self._scenario.failure, self._reduction
-        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose)
+        usual = asked.baseline_runs
+        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose, usual)
         if isinstance(found, str):
             return None
         f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)
@@ -386,10 +388,30 @@ class Driver:
     def certified(self, made: steps.Certified) -> None:
         if not self._certificate.claims:
             first, journal = made.certificate.first_run, self._journal
-            claims = tuple(self._claim_made(claim, first) for claim in made.claims)
+            chosen = [test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact)]
+            exactly = not chosen or self._all_repeat(chosen)
+            claims = tuple(self._claim_made(claim, first, exactly) for claim in made.claims)
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
-            chosen = (test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact))
             journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
+
+    def _all_repeat(self, tests: Iterable[int]) -> bool:
+        """Replays what an exact reduction rests on, up to a run that differs.
+
+        Where some runs do not repeat, one that showed or missed f by chance may have misled it.
+        """
+        journal = self._journal
+        for test in (journal.state.tests[number - 1] for number in tests):
+            repeats = self._bench.made_again(test) is None
+            if journal.state.search_due:
+                raise steps.Changed
+            if not repeats:
+                note(
+                    journal,
+                    f"replay {test.id}",
+                    f"test {test.id}, replayed with seed {test.seed}, differs: {NOT_EXACT}",
+                )
+                return False
+        return True
 
     @property
     def _certificate(self) -> Certificate:
@@ -397,7 +419,7 @@ class Driver:
             raise Stopped(CHANGED)
         return self._journal.state.certificate
 
-    def _claim_made(self, named: steps.NamedClaim, first: int) -> events.ClaimMade:
+    def _claim_made(self, named: steps.NamedClaim, first: int, exactly: bool) -> events.ClaimMade:
         journal, runs = self._journal, named.exact or [first + run for run in named.runs]
         tests = journal.tests(named.environment, runs, full=not named.exact)
         outcomes = Counter(journal.state.tests[test - 1].outcome for test in tests)
@@ -405,9 +427,8 @@ class Driver:
         number, claim = journal.number(named.environment), named.claim
         share = shown / max(1, sound)
         interval = (share, share) if named.exact else anytime_interval(shown, sound)
-        return events.ClaimMade(
-            named.model, number, claim.verdict, shown, sound, *interval, dict(outcomes), claim.bound
-        )
+        verdict = "not shown" if named.exact and not exactly else claim.verdict
+        return events.ClaimMade(named.model, number, verdict, shown, sound, *interval, dict(outcomes), claim.bound)
 
     def stepped_back(
         self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]

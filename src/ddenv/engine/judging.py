@@ -15,7 +15,7 @@ import numpy as np
 from ddenv.engine.journal import Journal
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
-from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
+from ddenv.evidence.rates import anytime_interval, iterations_needed, miss_chance, wilson_interval
 from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
@@ -24,11 +24,14 @@ from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import ROBOT, Motions, RunFile
 from ddenv.runs.playback import table
-from ddenv.text import count
+from ddenv.text import count, percent_at_most
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
 from ddenv.world.pose import headings
 from ddenv.world.scenario import FailureSpec
+
+# Where no run failed, so many times as many are proposed.
+FURTHER = 3
 
 
 def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
@@ -129,13 +132,15 @@ def fix_failure(
     iterations: int,
     wanted: int = 1,
     chose: int = 0,
+    usual: int = 0,
 ) -> BaselineFinished | str:
     """The event that ends the baseline, or a line that says why there is no f. `tests` are in the order of runs, `trajectories`
     those of the failing ones, by id.
 
     f is the failure number `wanted`, by how many runs show each; its end is that of the run which shares its failure with most
     others. The rate counts f only; runs that broke are not in it. With `chose` so many first runs choose f, and only the others
-    give its rate; where f shows in none of these, all do.
+    give its rate; where f shows in none of these, all do. If there are more than the `usual` number of tests, what they showed
+    decided that, so the interval of the rate is one for that.
     """
     failed = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]
     failing = [test for test in failed if not chose or test.run < chose]
@@ -169,7 +174,8 @@ def fix_failure(
     similar = sum(test.id in shown for test in sound)
     rate = similar / len(sound)
     broken = sum(test.outcome in BROKEN and test.run >= chose for test in tests)
-    shows = len(sound), similar, rate, *wilson_interval(similar, len(sound)), failing[f].id, failures[f].position
+    interval = anytime_interval if len(tests) > usual else wilson_interval
+    shows = len(sound), similar, rate, *interval(similar, len(sound)), failing[f].id, failures[f].position
     chance, needed = miss_chance(rate, iterations), iterations_needed(rate)
     return BaselineFinished(*shows, chance, needed, _outcomes(judged), broken, seen=tuple(seen), chose=chose)
 
@@ -185,7 +191,12 @@ def _no_failure(tests: Sequence[Test]) -> str:
         return f"no baseline run finished: {broken[0].failure}"
     reached = len(tests) - len(broken)
     also = f" ({len(broken)} more broke: {broken[0].failure})" if broken else ""
-    return f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce"
+    # One that shows more often than this would have shown with a chance of 95 %.
+    below = percent_at_most(1.0 - 0.05 ** (1.0 / reached))
+    return (
+        f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce; if there is one, it "
+        f"shows in less than {below} of all runs (95 %): --baseline-runs {FURTHER * reached} looks further"
+    )
 
 
 def trajectory_of(rows: np.ndarray) -> np.ndarray:

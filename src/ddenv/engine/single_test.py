@@ -22,6 +22,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import count
+from ddenv.words.claims import still_fails
 from ddenv.world.scenario import Oracle, seed_of
 
 
@@ -124,19 +125,17 @@ MOST_BROKEN = 5
 @dataclass(frozen=True)
 class Reproduction:
     """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f shows at the rate that the
-    certificate expects (True), or at less than half of it (False); None while that is open.
+    certificate expects (True), or at less than half of it (False); None while that is open. `said` has it in words.
     """
 
     fails: bool | None
     shown: int
     runs: int
     broken: int
+    said: str
 
     def __str__(self) -> str:
-        said = "the runs do not decide"
-        if self.fails is not None:
-            said = "it fails as it did" if self.fails else "it does not fail as it did"
-        return f"{said}: f in {self.shown} of {count(self.runs, 'run')}"
+        return f"{self.said}: f in {self.shown} of {count(self.runs, 'run')}"
 
 
 def subject_in(run: Path, folder: Path | None) -> Subject:
@@ -185,6 +184,6 @@ def reproduce(
             shown.append(result["outcome"] == "similar")
         exact = None if all(shown) and len(shown) < len(seeds) else all(shown)
         fails = exact if seeds else shows_at(shown, rate)
-        yield result, Reproduction(fails, sum(shown), len(shown), broken)
+        yield result, Reproduction(fails, sum(shown), len(shown), broken, still_fails(fails, certificate))
         if fails is not None or broken > MOST_BROKEN:
             return

@@ -14,7 +14,7 @@ taken to show f, too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -23,8 +23,10 @@ from ddenv.environment import Environment
 from ddenv.evidence.rates import HIGHEST_RATE, Shown, wilson_interval
 
 Verdict = Literal[
-    "", "kept", "lost", "exact", "needed", "helps", "not needed", "passes", "fails", "not shown", "unknown"
+    "", "kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "passes", "fails", "not shown", "unknown"
 ]
+# Without these models f is rarer, but not shown to be rare enough. "helps": it is shown not to be that rare.
+HELPING = ("helps", "rarer")
 
 # The chance that any claim of a run is wrong, over all its certificates. It is not divided by the number of models: "each model is
 # needed" is wrong only if a certain one is not, and its own bet won by chance.
@@ -43,8 +45,9 @@ ALONE_SHARE, ALONE_FIRST = 0.7, 10
 # The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
 # many times as fast as they did.
 MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
-# A model without which f is shown to be rarer, and seems to keep so much of its rate, helps after so many pairs.
-HELPS_AFTER, HELPS_SHARE = 60, 0.75
+# Where f is shown to be rarer without a model and seems to keep so much of its rate, more than so many pairs would decide little,
+# unless the bet that it does has won such a part of what it needs.
+HELPS_AFTER, HELPS_SHARE, NEARLY = 60, 0.75, 0.2
 # If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
 ABOUT_AS_OFTEN = 0.9
 # Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
@@ -269,8 +272,9 @@ def falls(
 ) -> Procedure:
     """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
-    "needed" is wrong with a probability of at most `error`. "helps": f is rarer, but not by so much; "not needed": it
-    shows about as often, which the next certificate has to show.
+    "needed" is wrong with a probability of at most `error`. "rarer": f is rarer than in `left`; "helps": that, and more
+    frequent than `share`, each wrong in at most 1 / `REFUTED` of the cases. "not needed": it seems to show about as often; that
+    has no error, and the next certificate has to show it.
     """
     assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
     for run in range(MOST_REMOVAL_PAIRS):
@@ -282,13 +286,15 @@ def falls(
             return "needed", bound
         rarer = rarer or assumed.below(1.0) >= REFUTED
         often = sound.above(share)
-        if often >= REFUTED or (rarer and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE):
+        if often >= REFUTED:
             return "helps" if rarer else "not needed", bound
+        if rarer and often < NEARLY * REFUTED and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE:
+            return "rarer", bound
         likeliest = max(often * error * REFUTED, assumed.below(share))
         if run + 1 >= FEWEST_PAIRS and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / error:
             break
     about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
-    return ("helps" if rarer else "not needed" if about_as_often else "not shown"), bound
+    return ("rarer" if rarer else "not needed" if about_as_often else "not shown"), bound
 
 
 def often(environment: Environment, runs: int) -> Procedure:
@@ -335,11 +341,43 @@ def certificate_tests(
     seen = min(max(0, seen), MOST_PAIRS)
     rates = [rate, *(wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ())]
     ends = [_expected(each, certify_rate, left, at_least) for each in rates]
-    # What is not known of the rate and chance within the certificate are independent factors.
-    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
-    longer = math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
+    shorter, longer = _factors(ends)
     most = max(ends[0], min(2 * MOST_PAIRS + left * MOST_REMOVAL_PAIRS, ends[0] * longer))
     return math.floor(ends[0] / shorter), round(ends[0]), math.ceil(most)
+
+
+def _factors(ends: Sequence[float]) -> tuple[float, float]:
+    """It takes one of `ends` tests by what may be the rates, the first one probably: how many times fewer or more it may take."""
+    # What is not known of the rates and chance within the certificate are independent factors.
+    shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
+    return shorter, math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
+
+
+def certificate_from_here(
+    made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int
+) -> tuple[int, int, int]:
+    """The same once removals have shown something: `made` tests so far, `left_runs` of them of what is left.
+
+    Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all removals were as `seen`.
+    """
+    with_it, second = (seen.both + seen.second) / runs, max(seen.second, 0.5) / runs
+    ends = []
+    for share in (second, *wilson_interval(seen.second, runs, EIGHT_OF_TEN)):
+        each = _removal_pairs(max(0.0, with_it - share), seen.first / runs, max(share, 0.01))
+        ends.append(sum(max(1.0, each - pairs) for pairs in open_pairs) + max(1.0, each - left_runs))
+    shorter, longer = _factors(ends)
+    # A model that is not needed ends the certificate.
+    fewest = ends[0] / shorter if seen.share < NEEDED_SHARE else 0.0
+    return made + math.floor(fewest), made + round(ends[0]), made + math.ceil(longer * ends[0])
+
+
+def _removal_pairs(both: float, first: float, second: float) -> float:
+    """After how many pairs a claim about a model is decided, where pairs have these shares."""
+    kinds = both, first, second
+    needed = _until(NEEDS, kinds, (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
+    refuted = _until(REFUTED, kinds, (1.0 / NEEDED_SHARE - 1.0, 1.0 / NEEDED_SHARE, -1.0))
+    given_up = FEWEST_PAIRS if min(needed, refuted) > HOPE * MOST_REMOVAL_PAIRS else MOST_REMOVAL_PAIRS
+    return min(needed, refuted, float(given_up))
 
 
 def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> float:

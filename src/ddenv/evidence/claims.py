@@ -8,15 +8,28 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from ddenv.environment import Environment
+from ddenv.evidence.certificate import (
+    HELPING,
+    Pairs,
+    Terms,
+    certificate_from_here,
+    certificate_tests,
+    falls,
+    keeps,
+    often,
+    settle,
+)
 from ddenv.evidence.certificate import Claim as Settled
-from ddenv.evidence.certificate import Terms, certificate_tests, falls, keeps, often, settle
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
 from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
-from ddenv.text import percent
+from ddenv.text import percent_at_least, percent_at_most
+
+# After so many pairs without a model, what a certificate still takes is forecast from what it has seen.
+PAIRS_THAT_SHOW = 10
 
 
 def is_minimal(certificate: Certificate) -> bool:
@@ -30,10 +43,16 @@ def helping(certificate: Certificate) -> tuple[str, ...]:
     """The models but for which a certificate shows the end to be minimal; the one without which f shows most often comes first."""
     left, *removals = certificate.claims
     helps = [claim for claim in removals if claim.verdict != "needed"]
-    if left.verdict != "kept" or {claim.verdict for claim in helps} != {"helps"}:
+    if left.verdict != "kept" or not all(claim.verdict in HELPING for claim in helps):
         return ()
     helps.sort(key=lambda claim: -claim.shown / max(1, claim.runs))
     return tuple(claim.without for claim in helps if claim.without is not None)
+
+
+def only_helping(certificate: Certificate) -> tuple[str, ...]:
+    """Those of them without which f is shown to be not much rarer: a user may leave one out."""
+    little = {claim.without for claim in certificate.claims if claim.verdict == "helps"}
+    return tuple(name for name in helping(certificate) if name in little)
 
 
 def terms_of(state: RunState, certificate: Certificate) -> Terms:
@@ -49,17 +68,12 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     has left out yet are missing.
     """
     node, whole = state.nodes[certificate.node], state.environments[origin(state, certificate.node).id]
-    left, outcomes = state.environments[node.id], dict[tuple[Environment, int], Shown]()
-    rests = dict[str, Environment]()
-    for test in state.confirm_tests:
-        if test.run < certificate.first_run or not test.is_finished:
-            continue
-        tested = state.environments[test.environment]
-        outcomes[tested, test.run - certificate.first_run] = (
-            "broken" if test.outcome in BROKEN else test.outcome == "similar"
-        )
-        if test.node == certificate.node and test.without is not None:
-            rests[test.without] = tested
+    left, outcomes = state.environments[node.id], _outcomes(state, certificate)
+    rests = {
+        test.without: state.environments[test.environment]
+        for test in state.confirm_tests
+        if test.run >= certificate.first_run and test.is_finished and test.node == certificate.node and test.without
+    }
 
     def shown(environment: Environment, run: int) -> Shown:
         return outcomes.get((environment, run))
@@ -70,6 +84,17 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     kept = settle(keeps(left, whole, terms), shown)
     error = terms.error_of_models(kept.bound)
     return {None: kept, **{name: settle(falls(rest, left, error), shown) for name, rest in rests.items()}}
+
+
+def _outcomes(state: RunState, certificate: Certificate) -> dict[tuple[Environment, int], Shown]:
+    """What its finished runs showed, by environment and run, counted from its first one."""
+    return {
+        (state.environments[test.environment], test.run - certificate.first_run): "broken"
+        if test.outcome in BROKEN
+        else test.outcome == "similar"
+        for test in state.confirm_tests
+        if test.run >= certificate.first_run and test.is_finished
+    }
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
@@ -145,7 +170,24 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, in
         return now.at_least, now.at_least, now.at_least
     left = len(state.environment) - len(state.pinned.intersection(state.environment))
     before = 0 if state.baseline is None else state.baseline.runs
-    return certificate_tests(now.rate, now.certify_rate, left, now.at_least, before)
+    expected = certificate_tests(now.rate, now.certify_rate, left, now.at_least, before)
+    if now is not in_the_making(state):
+        return expected
+    outcomes, claims = _outcomes(state, now), so_far(state, now)
+    removals = [claim for name, claim in claims.items() if name is not None]
+    pairs = [len(claim.rests_on) // 2 for claim in removals]
+    if max(pairs, default=0) < PAIRS_THAT_SHOW:
+        return expected
+    seen = Pairs()
+    for claim in removals:
+        # Each pair is a run without the model and one with it.
+        shown = [outcomes[test] is True for test in claim.rests_on]
+        for without, with_it in zip(shown[::2], shown[1::2], strict=True):
+            seen = seen.after(without, with_it)
+    undecided = [made for made, claim in zip(pairs, removals, strict=True) if not claim.verdict]
+    undecided += [0] * (left - len(removals))
+    left_runs = sum(environment == state.environments[state.nodes[now.node].id] for environment, _ in outcomes)
+    return certificate_from_here(len(outcomes), left_runs, undecided, seen, sum(pairs))
 
 
 def has_dropped(state: RunState) -> bool:
@@ -189,15 +231,16 @@ class FreshRuns:
         """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
-        return f"{'≤' if self.without else '≥'} {percent(self.bound)}"
+        return f"≤ {percent_at_most(self.bound)}" if self.without else f"≥ {percent_at_least(self.bound)}"
 
     @property
     def shows(self) -> str:
         """The same in words."""
         if self.bound is None or not self.shows_at_least:
             return ""
-        share = percent(self.bound)
-        return f"at most {share} as often" if self.without else f"keeps at least {share} of the rate"
+        if self.without:
+            return f"at most {percent_at_most(self.bound)} as often"
+        return f"keeps at least {percent_at_least(self.bound)} of the rate"
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:

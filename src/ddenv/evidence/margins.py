@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count, takewhile
 from typing import Literal
 
@@ -25,13 +25,15 @@ SHOWS, GONE, REACHED, MISSED = 0.9, 0.1, 0.9, 0.25
 # The chance that any claim of a call is wrong is at most this.
 ERROR = 0.05
 # The maximum number of runs of a value, of a number, and of that in a first look where several share a budget.
-MOST_RUNS, MOST_OF_NUMBER, FIRST_LOOK = 16, 60, 32
+MOST_RUNS, MOST_OF_NUMBER, FIRST_LOOK = 16, 120, 32
 # Where f shows more rarely than this in what is left, no few runs say where it is gone.
 RAREST = 0.25
 # So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction, its certificates and isolations.
 FIX_RUNS, MOST_FIXES, FIRST_FIX_RUN = 20, 3, 500_000_000
 # Values are tried outward from the present one by growing steps: so many to the end of the range, the first as a share of it.
 STEPS, FIRST_SHARE = 3, 1.0 / 16.0
+# The values between the nearest one at which the goal is reached and the end of the range, as parts of the way.
+BEYOND = (1.0 / 3.0, 2.0 / 3.0)
 # A limit is known well enough within this share of its distance from the present value.
 NEAR = 0.1
 
@@ -115,8 +117,8 @@ class Side:
     """The values tried above (`up`) or below the present one, the nearest first; `end` is where the range ends.
 
     `until`: the farthest up to which f shows at all values that were decided; None: the present one. `gone`: the nearest at which
-    it does not show, or which is not possible. `goal`: the nearest at which the robot reaches its goal. `again`: the farthest at
-    which f shows beyond `gone`.
+    it does not show, or which is not possible. `goal`: the nearest at which the robot reaches its goal. `to_end`: it does at all
+    values `beyond` it as well. `again`: the farthest at which f shows beyond `gone`.
     """
 
     up: bool
@@ -126,6 +128,7 @@ class Side:
     gone: Value | None = None
     goal: Value | None = None
     again: Value | None = None
+    to_end: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,15 +151,21 @@ def margin_of(asked: NumberAsked, rule: Rule, known: Known) -> Margin:
     down = [one for one in reversed(values) if one.value < asked.now]
     up = [one for one in values if one.value > asked.now]
     runs = sum(map(len, known.outcomes.values()))
-    return Margin(asked, _side(False, down, asked.low), _side(True, up, asked.high), runs)
+    return Margin(asked, _side(asked, False, down), _side(asked, True, up), runs)
 
 
-def _side(up: bool, tried: Sequence[Value], end: float) -> Side:
+def _side(asked: NumberAsked, up: bool, tried: Sequence[Value]) -> Side:
     gone = next((at for at, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")), len(tried))
     shows = [[one for one in part if one.verdict == "f"] for part in (tried[:gone], tried[gone:])]
     until, again = (part[-1] if part else None for part in shows)
-    goal = next((one for one in tried if one.verdict == "goal"), None)
-    return Side(up, tuple(tried), end, until, None if gone == len(tried) else tried[gone], goal, again)
+    side = Side(up, tuple(tried), asked.high if up else asked.low, until, None if gone == len(tried) else tried[gone])
+    first = next((at for at, one in enumerate(tried) if one.verdict == "goal"), None)
+    if first is None:
+        return replace(side, again=again)
+    farther = {*beyond(asked, up, tried[first].value)}
+    reached = all(one.verdict == "goal" for one in tried[first:])
+    to_end = bool(farther) and reached and farther <= {one.value for one in tried}
+    return replace(side, goal=tried[first], again=again, to_end=to_end)
 
 
 def known_of(margins: Margins, name: str) -> Known:
@@ -223,7 +232,7 @@ def pairs_of(margins: Margins) -> tuple[NumberAsked, ...]:
     gone.sort(key=lambda each: abs(each[2].value - each[0].now) / each[0].scale)
     first = next(iter(gone), None)
     second = next((each for each in gone if first and each[0].name != first[0].name), None)
-    if first is None or second is None or any(fix.confirmed is not False for fix in fixes_of(margins)):
+    if first is None or second is None or any(fix.confirmed is not False for fix in fixes_of(margins)[:MOST_FIXES]):
         return ()
     parts = tuple((asked.name, asked.now, side.end) for asked, side, _ in (first, second))
     return (NumberAsked(" & ".join(name for name, *_ in parts), 0.0, 0.0, 100.0, 100.0, 2.0, "%", parts),)
@@ -255,6 +264,17 @@ def _at(asked: NumberAsked, up: bool, distance: float) -> float:
     return min(asked.high, max(asked.low, float(f"{value:.9g}")))
 
 
+def beyond(asked: NumberAsked, up: bool, value: float) -> tuple[float, ...]:
+    """Where the goal has to be reached, too, so that it is said to be reached from `value` on: at the end of the range, and at two
+    values between.
+    """
+    end, distance = asked.high if up else asked.low, abs(value - asked.now)
+    left = abs(end - value)
+    if left <= asked.resolution:
+        return ()
+    return end, *(_at(asked, up, distance + part * left) for part in BEYOND)
+
+
 def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float | None:
     """The next value to try on one side, after those `tried` there, of which one may be open; None if enough is known."""
     by_value = {one.value: one for one in tried}
@@ -277,7 +297,11 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
         middle = _at(asked, up, math.sqrt(low * high) if low > 0.0 and high > 2.0 * low else (low + high) / 2.0)
         if high - low > max(asked.resolution, NEAR * high) and middle not in by_value:
             return middle
-    return None
+    goal = next((one.value for one in near if one.verdict == "goal"), None)
+    farther = () if goal is None else beyond(asked, up, goal)
+    to_try = (value for value in farther if value not in by_value or by_value[value].verdict != "goal")
+    first = next(to_try, None)
+    return None if first in by_value else first
 
 
 def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER) -> Iterator[tuple[float, int]]:

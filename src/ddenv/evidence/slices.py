@@ -69,12 +69,14 @@ def implies(took_part: Environment, there: Environment, keep: Environment, ties:
 
 
 def fresh_chance(met: Sequence[Environment]) -> float:
-    """The chance that a fresh run meets a model that none of these runs `met`, by the models that only one met (Good, 1953)."""
+    """About the chance that a fresh run meets a model that none of these runs `met`: the share of them that met one which no other
+    met (leaving each out in turn; after Good, 1953).
+    """
     once, more = NOTHING, NOTHING
     for models in met:
         more |= once & models
         once = (once | models) - more
-    return min(1.0, len(once) / len(met)) if met else 1.0
+    return sum(not once.isdisjoint(models) for models in met) / len(met) if met else 1.0
 
 
 # Who took part in the runs of a run file.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, dataclass_transform, get_args
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, fresh_runs_made, helping, in_the_making
+from ddenv.evidence.claims import current, fresh_runs_made, in_the_making, only_helping
 from ddenv.runfile.deeds import deed
 from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.reading import Invalid, plain, read
@@ -495,7 +495,7 @@ class LeaveOut(Asked):
     def evidence(self, state: RunState) -> Test | None:
         """A fresh run without the model that showed f; None if the model does not only help."""
         found, names = current(state), _names_of(state, (self.model,)) or ()
-        if found is None or not set(names) & set(helping(found)):
+        if found is None or not set(names) & set(only_helping(found)):
             return None
         fresh = (test for test in state.confirm_tests if test.node == found.node and test.run >= found.first_run)
         return next((test for test in fresh if test.without in names and test.outcome == "similar"), None)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import current, helping
+from ddenv.evidence.claims import current, only_helping
 from ddenv.guiding import commands as c
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
 from ddenv.runfile.tested import adoptable
@@ -124,7 +124,7 @@ def _try(now: c.Situation, pointed: Pointed, keep: frozenset[str]) -> c.Command 
 
 def _leave_out(now: c.Situation, _: Pointed) -> c.Command:
     found = current(now.state)
-    helps = () if found is None else helping(found)
+    helps = () if found is None else only_helping(found)
     if not helps:
         raise UserError(c.NONE_HELPS)
     return c.LeaveOut(c.numbers_of(now.state, helps[:1])[0])

@@ -22,7 +22,7 @@ from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState
 from ddenv.schemas import nearest
-from ddenv.text import first_of, percent
+from ddenv.text import first_of, percent, percent_at_least, percent_at_most
 from ddenv.words import claims
 from ddenv.words.slices import slice_words
 
@@ -72,7 +72,7 @@ def _bound(state: RunState, without: str | None = None) -> str:
     claim = made.get(without) if made else so_far(state, now).get(without)
     if claim is None:
         raise UserError(f"at this step, no fresh run has yet left '{without}' out")
-    return percent(claim.bound or 0.0)
+    return percent_at_least(claim.bound or 0.0) if without is None else percent_at_most(claim.bound or 0.0)
 
 
 def _left(state: RunState) -> str:

@@ -19,6 +19,7 @@ from typing import Protocol, TypeVar
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
+    HELPING,
     MOST_PAIRS,
     Claim,
     Procedure,
@@ -334,6 +335,9 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
     if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
         made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
+    if rests and {one.claim.verdict for one in made} <= {"kept", "needed", *HELPING} and any(map(_helps, made)):
+        # "Minimal but for these": the runs chose about which models this is said.
+        made = yield from settled(driver, claims(error / len(rests)), ends, certificate.first_run, "certify")
     if certificate.exact:
         # The search has made these runs.
         for model, rest in rests.items():
@@ -344,6 +348,10 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     certified = Certified(certificate, made)
     driver.certified(certified)
     return certified
+
+
+def _helps(claim: NamedClaim) -> bool:
+    return claim.claim.verdict in HELPING
 
 
 def settled(

@@ -61,9 +61,11 @@ class RateClaim:
     """A claim about what is left, or, if `without` is an element, about that without it.
 
     `verdict`: what is left is "kept" (it keeps the rate) or "lost"; an element is "needed" (without it the rate falls below what
-    must be kept), "helps" (without it the failure is rarer, but not that rare) or "not needed"; "not shown" if the runs do not
-    decide. `shown` of `runs` fresh runs showed the failure; `low`..`high` is the 95 % interval of the rate. What is left keeps at
-    least `bound` of the rate of all elements; without an element the failure shows at most `bound` times as often as with it.
+    must be kept), "helps" (the failure is rarer without it, but not that rare), "rarer" (by how much is not shown) or "not needed"
+    (it seems to show as often); "not shown" if the runs do not decide.
+
+    `shown` of `runs` fresh runs showed the failure; `low`..`high` is the 95 % interval of the rate. What is left keeps at least
+    `bound` of the rate of all elements; without an element the failure shows at most `bound` times as often as with it.
     """
 
     without: str | None

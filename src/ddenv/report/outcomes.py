@@ -57,7 +57,7 @@ def _baseline(state: RunState) -> list[Block]:
         return [say("The baseline has not ended: how often the whole world fails is not known yet.")]
     words = (
         f"In the whole world the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')}: "
-        f"{percent(base.rate)}, 95 % interval (Wilson) {percent(base.low)} to {percent(base.high)}."
+        f"{percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}."
     )
     if base.broken:
         words += f" {count(base.broken, 'more run')} broke, and {'is' if base.broken == 1 else 'are'} not counted."

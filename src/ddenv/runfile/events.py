@@ -60,7 +60,7 @@ class Cluster(Event):
 
 
 class Comparing(Event):
-    """A test is made again, because this engine computes with something else than the earlier ones."""
+    """A test is made again, because this engine computes with something else than the earlier ones, or since runs have to repeat."""
 
     test: Number
 
@@ -389,7 +389,9 @@ class ClaimMade:
 
     without: Natural | None
     environment: Natural
-    verdict: Annotated[str, OneOf("kept", "lost", "exact", "needed", "helps", "not needed", "not shown", "unknown")]
+    verdict: Annotated[
+        str, OneOf("kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "not shown", "unknown")
+    ]
     shown: Natural
     runs: Natural
     low: Share

@@ -130,7 +130,8 @@ class Certificate:
 class Claim:
     """One claim of a certificate, as in `ClaimMade`: about what is left, or, if `without` is a model, about that without it.
     `verdict`: what is left is "kept" (it keeps the rate), "lost", or "exact" (its rate was only measured); a model is "needed"
-    (without it f is rare enough), "helps" (f is rarer, but not that rare) or "not needed"; "not shown" if the runs do not decide,
+    (without it f is rare enough), "helps" (f is rarer, but not that rare), "rarer" (by how much is not shown) or "not needed" (f
+    seems to show as often); "not shown" if the runs do not decide,
     "unknown" if they broke. A claim that `is_exact` is about these runs of the search, and about no rate.
     """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from ddenv.evidence.certificate import NEEDED_SHARE
 from ddenv.evidence.claims import (
     FreshRuns,
     current,
@@ -21,7 +22,7 @@ from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import stack_with
-from ddenv.text import between, count, first_of, percent
+from ddenv.text import between, count, first_of, percent, percent_at_least, percent_at_most
 from ddenv.words.signs import metres
 
 MOST_NAMES, MOST_SEEDS = 3, 4
@@ -39,10 +40,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         )
     if left.verdict != "kept" and not certificate.seeds:
         aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
-        shown = f"; it keeps at least {percent(left.bound)}" if left.bound else ""
+        shown = f"; it keeps at least {percent_at_least(left.bound)}" if left.bound else ""
         return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
     verdicts = {str(claim.without): claim.verdict for claim in removals}
-    if doubt := _doubt(verdicts, "not shown that each model is needed", "not minimal: f shows", "without"):
+    if doubt := _doubt(verdicts, "not shown that each model is needed", "not minimal: f seems to show", "without"):
         return f"{doubt}; with everything that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
     if certificate.seeds:
@@ -59,7 +60,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
         _at_most(certificate),
     )
-    often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent(bound)} as often)"
+    often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 
@@ -103,7 +104,9 @@ def seeds_of(certificate: Certificate) -> str:
 
 def kept(certificate: Certificate) -> str:
     """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
-    return f"{rate(certificate.claims[0])}, at least {percent(_kept(certificate))} of {_whole_rate(certificate)}"
+    return (
+        f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
+    )
 
 
 def _kept(certificate: Certificate) -> float:
@@ -119,7 +122,7 @@ def _at_most(certificate: Certificate) -> float | None:
 
 
 def _as_often(bound: float | None) -> str:
-    return "rarer" if bound is None else f"at most {percent(bound)} as often"
+    return "rarer" if bound is None else f"at most {percent_at_most(bound)} as often"
 
 
 def shown(state: RunState) -> str:
@@ -130,7 +133,7 @@ def shown(state: RunState) -> str:
     if (now := state.certificate) is not None:
         bounds = {name: claim.bound for name, claim in so_far(state, now).items() if claim.bound is not None}
         if share := bounds.pop(None, 0.0):
-            said.append(f"so far at least {percent(share)} of {_whole_rate(now)} is kept")
+            said.append(f"so far at least {percent_at_least(share)} of {_whole_rate(now)} is kept")
         less = [f"without {name} f shows {_as_often(share)}" for name, share in bounds.items() if share < 1.0]
         said += less[:MOST_NAMES]
     return "; ".join(said)
@@ -183,24 +186,50 @@ def for_everyone(certificate: Certificate) -> str:
     if certificate.seeds:
         return f"{said}; none of the {most.runs} chosen runs failed like this without {one}"
     seldom = f"at most {most.shown}" if most.shown else "none"
-    return f"{said}; with {one} removed, in {seldom} of {most.runs} (at most {percent(most.high)})"
+    return f"{said}; with {one} removed, in {seldom} of {most.runs} (at most {percent_at_most(most.high)})"
 
 
 def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
-    """What runs `there`, in another simulator, show of what is left, or of that without a model; without a full stop.
+    """What runs `there`, in another simulator, show of what is left; without a full stop.
 
     The certificate says `here` of what is left. `fails` is what `rates.shows_at` says of the runs at the low end of its interval.
     """
-    share = f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
-    if there.without is not None:
-        verdicts = {True: f"not needed in {name}", False: f"needed in {name}, too", None: f"not shown for {name}"}
-        return f"{there.without}: {verdicts[fails]}: without it {share}"
     verdicts = {
         True: f"fails in {name}, too",
         False: f"does not fail in {name} as it did",
         None: f"the runs do not show whether it fails in {name} as it did",
     }
-    return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
+    return f"{verdicts[fails]}: {_there(there)}; by its certificate {rate(here)}"
+
+
+def without_in_another_simulator(name: str, verdict: str, there: Claim) -> str:
+    """What runs without a model show in another simulator, beside those of what is left there; without a full stop."""
+    verdicts = {
+        "needed": f"needed in {name}, too",
+        "helps": f"helps in {name}",
+        "rarer": f"rarer without it in {name}, too, but by how much is not shown",
+        "not needed": f"seems not needed in {name}",
+    }
+    return f"{there.without}: {verdicts.get(verdict, f'not shown for {name}')}: without it {_there(there)}"
+
+
+def _there(there: Claim) -> str:
+    return f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
+
+
+def still_fails(fails: bool | None, certificate: Certificate) -> str:
+    """What new runs of what is left show.
+
+    `fails` is what `rates.shows_at` says of them at the low end of its interval, or whether it fails with each chosen seed.
+    """
+    if fails is None:
+        return "the runs do not decide"
+    if certificate.seeds:
+        return f"it {'still fails' if fails else 'does not fail'} with each chosen seed"
+    low = certificate.claims[0].low
+    if fails:
+        return f"it still fails, at {percent_at_least(low / 2.0)} or more"
+    return f"it no longer fails at {percent(low)} or more"
 
 
 def means(state: RunState, certificate: Certificate, claim: Claim) -> str:
@@ -213,15 +242,16 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
     rate, bound = _whole_rate(certificate), claim.bound
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
-        return f"shown to keep at least {percent(bound)} of {rate}, not {percent(certificate.certify_rate)}"
+        return f"shown to keep at least {percent_at_least(bound)} of {rate}, not {percent(certificate.certify_rate)}"
     often = "with none of these seeds" if claim.is_exact else _as_often(bound)
     return {
         "exact": f"f shows with {seeds_of(certificate)} each time",
-        "kept": f"keeps at least {percent(certificate.certify_rate if bound is None else bound)} of {rate}",
+        "kept": f"keeps at least {percent_at_least(certificate.certify_rate if bound is None else bound)} of {rate}",
         "lost": f"keeps less than {percent(certificate.keep_rate)} of {rate}",
         "needed": f"needed: without it f shows {often}",
-        "helps": "helps: without it f is rarer, but not by much",
-        "not needed": "not needed: f shows about as often without it",
+        "helps": f"helps: without it f is rarer, but not by much: more than {percent(NEEDED_SHARE)} as often",
+        "rarer": f"rarer without it: {'by how much is not shown' if bound == 1.0 else often}",
+        "not needed": "seems not needed: without it f showed about as often",
         "not shown": "not shown: the runs are inconclusive",
         "unknown": "unknown: too many runs broke",
     }.get(claim.verdict, "")
@@ -245,10 +275,12 @@ def of_passing(state: RunState, one: Isolation) -> str:
     names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(one, first)}"
-    said = f"a nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(one, first)}"
+    tested = "" if one.asked.chosen else f", tested above {percent(one.asked.rather_than)}"
+    without = "it" if len(gone) == 1 else "them"
+    said = f"a nearest world that passes lacks {names}: without {without} {_reaching(one, first)}{tested}"
     verdicts = {str(claim.back): claim.verdict for claim in backs}
     if doubt := _doubt(
-        verdicts, "not shown that each of them has to go", "not a nearest one: the robot passes", "with"
+        verdicts, "not shown that each of them has to go", "not a nearest one: the robot seems to pass", "with"
     ):
         return f"{said}; {doubt} put back"
     most = max(backs, key=lambda claim: claim.high)
@@ -302,7 +334,8 @@ def instead(state: RunState, certificate: Certificate, claim: Claim) -> str:
 
 
 def short(claim: Claim) -> str:
-    return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
+    other_words = {"lost": "too rare", "not needed": "seems not needed", "unknown": "tests broke"}
+    return other_words.get(claim.verdict, claim.verdict)
 
 
 def terms(certificate: Certificate, pinned: int = 0) -> str:
@@ -320,7 +353,10 @@ def promise(state: RunState, certificate: Certificate) -> str:
             "minimal means: for the chosen seeds this is exact, since a seed repeats its run exactly; for other seeds, fresh "
             "runs measure how often f shows, and nothing more"
         )
-    kept, pinned = f"{percent(_kept(certificate))} of {_whole_rate(certificate)}", never_left_out(state, certificate)
+    kept, pinned = (
+        f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}",
+        never_left_out(state, certificate),
+    )
     often = _as_often(_at_most(certificate))
     return (
         f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f shows {often}; "

@@ -6,7 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import FreshRuns, current, failing_instead, fresh_runs, fresh_runs_made, has_dropped, helping
+from ddenv.evidence.claims import (
+    FreshRuns,
+    current,
+    failing_instead,
+    fresh_runs,
+    fresh_runs_made,
+    has_dropped,
+    only_helping,
+)
 from ddenv.runfile.deeds import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.progress import Certificate
@@ -14,7 +22,7 @@ from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runfile.tested import adoptable
-from ddenv.text import as_sentence, count, first_of, percent, plain, shortened
+from ddenv.text import as_sentence, count, first_of, percent, percent_at_least, plain, shortened
 from ddenv.words.baseline import baseline
 from ddenv.words.claims import (
     drift,
@@ -348,7 +356,7 @@ def _finished(state: RunState) -> Happening:
     base = baseline(state)
     if not state.certified:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
-        helps = () if (found := current(state)) is None else helping(found)
+        helps = () if (found := current(state)) is None else only_helping(found)
         out = (f"{plain(helps[0])} only helps: press H to leave it out and search again.",) if helps else ()
         return "returned", (_reason(state, "The run ended early."), *out, *_out_of_budget(state), left)
     if not state.environment:
@@ -425,11 +433,11 @@ def _certifying(snapshot: Snapshot) -> tuple[str, ...]:
     done = f"{made} {'is' if made == 1 else 'are'} done"
     rows, aim = fresh_runs(state), certificate.certify_rate
     shown = rows[0].bound or 0.0 if rows else 0.0
-    kept = f"at least {percent(shown)} is kept" if shown else "nothing is shown yet"
+    kept = f"at least {percent_at_least(shown)} is kept" if shown else "nothing is shown yet"
     return (
         *(() if certificate.seeds else (f"{bar(shown, aim)} {kept}, aim {percent(aim)}",)),
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
-        f"By the rate of the whole world, this takes about {usual_runs(state, certificate)}; {done}.",
+        f"By the rates seen so far, this takes about {usual_runs(state, certificate)}; {done}.",
         *_so_far(rows),
         *_now(snapshot, certificate),
     )

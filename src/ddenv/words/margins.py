@@ -25,7 +25,7 @@ from ddenv.runfile.state import RunState
 from ddenv.text import count, duration, percent
 
 FINDING = "finding margins"
-HEAD = ("number", "now", "f until", "goal from", "runs")
+HEAD = ("number", "now", "f until", "instead", "runs")
 # What a bar shows. It is drawn over the root of the change, so that small changes are seen.
 BAR_WORDS = (
     "█ f, + goal, · something else or undecided, x not possible; between two values tried: as at the farther one. "
@@ -49,39 +49,40 @@ def rows(margins: Margins) -> tuple[Row, ...]:
     for one in margins_of(margins):
         name, now = one.asked.name, f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
         sides = [side for side in one.sides if side.tried]
-        until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_all(side)}" for side in sides)
+        until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_end(side)}" for side in sides)
         instead = ", ".join(words for side in sides if (words := _from(side)))
         sentence = f"{name} ({now}): {'; '.join(_said(side) for side in sides)}"
         found.append(Row((name, now, until, instead or "-", str(one.runs)), sentence, one))
     return tuple(found)
 
 
-def _all(side: Side) -> str:
-    return " (all)" if side.gone is None and side.until is not None and side.until.value == side.end else ""
+def _end(side: Side) -> str:
+    return " (end)" if side.gone is None and side.until is not None and side.until.value == side.end else ""
 
 
 def _from(side: Side) -> str:
-    """From where the robot reaches its goal, else what happens where f no longer shows; "" if neither is known."""
-    sign = "≥" if side.up else "≤"
+    """Where the robot reaches its goal, else what happens where f no longer shows; "" if neither is known."""
     if side.goal is not None:
-        return f"goal {sign} {side.goal.value:.4g}"
+        to_end = "≥" if side.up else "≤"
+        return f"goal {to_end if side.to_end else 'at'} {side.goal.value:.4g}"
     if side.gone is None or side.gone.verdict != "other":
         return ""
     failed = [how for how, outcome in zip(side.gone.failures, side.gone.outcomes, strict=True) if outcome == "other"]
-    return f"{max(failed, key=failed.count, default='f at times')} {sign} {side.gone.value:.4g}"
+    return f"{max(failed, key=failed.count, default='f at times')} at {side.gone.value:.4g}"
 
 
 def _said(side: Side) -> str:
     words = []
     if side.until is not None:
-        all_of_them = ", the farthest value tried" if _all(side) else ""
+        all_of_them = ", the end of its range" if _end(side) else ""
         words.append(f"f {'up' if side.up else 'down'} to {_in(side.until, 'similar')}{all_of_them}")
     if side.gone is not None and side.gone.verdict == "impossible":
         words.append(f"{side.gone.value:.4g} is not possible: {side.gone.why}")
     elif side.gone is not None and side.gone.verdict == "other":
         words.append(f"no f at {_in(side.gone, 'similar')}, where the robot {_instead(side.gone)}")
     if side.goal is not None:
-        words.append(f"the robot reaches its goal {'from' if side.up else 'at'} {_in(side.goal, 'pass')}")
+        to_end = f", and beyond at all values tried, to the end of its range ({side.end:.4g})" if side.to_end else ""
+        words.append(f"the robot reaches its goal at {_in(side.goal, 'pass')}{to_end}")
     if side.again is not None:
         words.append(f"f again at {_in(side.again, 'similar')}")
     if undecided := [f"{each.value:.4g}" for each in side.tried if each.verdict in ("undecided", "")]:

@@ -90,7 +90,7 @@ def _engine_started(before: RunState, after: RunState) -> str:
 
 def _comparing(_: RunState, after: RunState) -> str:
     if after.physics.now == after.physics.proven:
-        return "a failing run is rerun with its seed, to see whether it repeats exactly"
+        return "a run is made again with its seed, to see whether it repeats exactly"
     return f"made with {after.physics.proven}, now {after.physics.now}: the first run is repeated and compared"
 
 

@@ -53,6 +53,7 @@ CLAIM = {
     "lost": "✗",
     "needed": "●",
     "helps": "◐",
+    "rarer": "◐",
     "not needed": "○",
     "not shown": "?",
     "unknown": "✗",

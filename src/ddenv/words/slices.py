@@ -38,7 +38,7 @@ def slice_in_short(state: RunState, node: Node) -> str:
 
 def _chance(met: list[Environment]) -> str:
     chance = fresh_chance(met)
-    return f"at most about {percent(chance)}" if chance else f"probably below {percent(min(1.0, RARE / len(met)))}"
+    return f"about {percent(chance)}" if chance else f"probably below {percent(min(1.0, RARE / len(met)))}"
 
 
 def refuted_words(state: RunState) -> str:

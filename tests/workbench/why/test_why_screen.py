@@ -232,7 +232,7 @@ async def test_margins_are_one_key_away(run, size):
         await opened(session)
         await session.press("m")
         shown = picture_of(session)
-        for said in ("crate_00.friction", "███|███", "f until 0 (all) … 0.2; then goal ≥"):
+        for said in ("crate_00.friction", "███|███", "f until 0 (end) … 0.2; then goal at"):
             assert said in " ".join(shown.split())
         await session.press("escape")
         assert isinstance(session.app.screen, WhyScreen)
@@ -248,7 +248,7 @@ async def test_a_number_is_shown_at_its_limits_and_played_beside_what_is_left(ru
         assert rows[-2:] == [["crate_00.friction", "goal", "at", "0.4"], ["crate_01.y", "no", "f", "at", "0.31"]]
         await session.press("up", "up")
         said = words(screen, "#why-said")
-        assert "the robot reaches its goal from 0.4" in said
+        assert "the robot reaches its goal at 0.4" in said
         assert f"ddenv test {run.path.stem} --minimal --margin crate_00.friction=0.4 --repeat 10" in said
         assert f"ddenv export {run.path.stem} --margin crate_00.friction=0.4 --output changed.sdf" in said
         assert [way.name for way in screen.map.shown.ways] == ["now", "at 0.4"]
