@@ -10,7 +10,7 @@ from ddenv.learn.reading import Places
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
-from ddenv.text import percent
+from ddenv.text import percent_at_least, percent_at_most
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
             shown = pairs.keeps_at_least(state.certificate.error * IN_TURN, shown)
         figures = Figures(position.end, state)
         assert figures("here_left") == f"{sum(ran[state.node, run] for run in mine)} of {len(mine)} runs"
-        assert figures("here_bound") == percent(shown) and before < shown < 2 / 3
+        assert figures("here_bound") == percent_at_least(shown) and before < shown < 2 / 3
         before = shown
     with pytest.raises(UserError, match="no fresh run has yet left 'gate' out"):
         figures("here_bound without gate")
@@ -81,7 +81,7 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
     assert (ended("here_aim"), ended("here_bound")) == ("80 %", "80 %")
     # What the certificate said at its end.
     gate = next(claim for claim in position.end.certificate.claims if claim.without == "gate")
-    assert (gate.shown, ended("here_bound without gate")) == (0, percent(gate.bound))
+    assert (gate.shown, ended("here_bound without gate")) == (0, percent_at_most(gate.bound))
 
 
 def test_how_often_f_showed_in_the_whole_world_is_told_if_it_ran_with_all_seeds(events, position):

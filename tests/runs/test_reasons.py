@@ -10,7 +10,7 @@ from ddenv.evidence.certificate import Pairs
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import APART, GOAL, End, F, Parting, parted, parting_sentence, reasons, sentence
-from ddenv.text import percent
+from ddenv.text import percent_at_least, percent_at_most
 from tests.conftest import ROOT
 from tests.workbench import fake_moments
 
@@ -110,6 +110,6 @@ def test_of_an_unfinished_certificate_it_says_what_is_shown_so_far(run):
     with pytest.raises(UserError) as refused:
         reasons(run.file, run.state)
     assert str(refused.value) == (
-        f"{run.path}: its certificate is not finished; so far at least {percent(kept)} of the whole world's rate is kept; "
-        f"without crate_00 f shows at most {percent(often)} as often; make a certificate first: ddenv resume {run.path}"
+        f"{run.path}: its certificate is not finished; so far at least {percent_at_least(kept)} of the whole world's rate is kept; "
+        f"without crate_00 f shows at most {percent_at_most(often)} as often; make a certificate first: ddenv resume {run.path}"
     )

@@ -60,7 +60,7 @@ class Cluster(Event):
 
 
 class Comparing(Event):
-    """A test is made again, because this engine computes with something else than the earlier ones, or since runs have to repeat."""
+    """A test is made again, because this engine computes with something else than the earlier ones, or as runs must repeat."""
 
     test: Number
 
