@@ -30,7 +30,7 @@ from ddenv.reduction.verdict import Acceptance
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
-from ddenv.runfile.fold_decisions import exact_runs
+from ddenv.runfile.fold_decisions import broken_runs, exact_runs
 from ddenv.runfile.progress import Certificate, Node
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
@@ -177,7 +177,7 @@ class Driver:
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
+        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back, broke=broken_runs(state))
         rule = self._bench.rule = Acceptance(len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         search = leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again

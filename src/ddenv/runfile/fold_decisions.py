@@ -10,7 +10,7 @@ from ddenv.environment import Environment
 from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
+from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.text import count, first_of, plain, truncated
 
 if TYPE_CHECKING:
@@ -224,6 +224,15 @@ def exact_runs(state: RunState) -> tuple[int, ...]:
         return ()
     tests = (test for test in rested_on(state) if test.environment == whole and test.outcome == "similar")
     return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
+
+
+def broken_runs(state: RunState) -> tuple[int, ...]:
+    """The runs of the baseline that broke each time, ascending."""
+    runs: dict[int, bool] = {}
+    for test in state.tests:
+        if test.phase == "baseline" and test.is_finished:
+            runs[test.run] = runs.get(test.run, True) and test.outcome in BROKEN
+    return tuple(sorted(run for run, broke in runs.items() if broke))
 
 
 def rested_on(state: RunState) -> tuple[Test, ...]:
