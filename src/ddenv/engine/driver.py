@@ -13,13 +13,14 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
-from ddenv.engine.limits import limit_after, note, note_rare
+from ddenv.engine.limits import limit_after, note, note_ends, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import RUNS_BESIDE, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
+from ddenv.evidence.ends import elsewhere, ends_of, of_baseline
 from ddenv.evidence.rates import anytime_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
@@ -32,7 +33,7 @@ from ddenv.runfile import events
 from ddenv.runfile.fold import digest
 from ddenv.runfile.fold_decisions import broken_runs, exact_runs
 from ddenv.runfile.progress import Certificate, Node
-from ddenv.runfile.state import BROKEN
+from ddenv.runfile.state import BROKEN, CERTIFY
 from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
@@ -48,6 +49,7 @@ OTHER_WAY = (
     "round {} would now differ: the run was started with other versions of ddenv, scikit-learn or a package of schemas; "
     "continue with those, or start a new run"
 )
+SCATTERED = "f is a small part of what fails; choose a wider epsilon, or resume the run to go on with this one"
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
@@ -268,7 +270,10 @@ class Driver:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
+        scatters = note_ends(self._journal)
         note_rare(self._journal)
+        if scatters and self._reduction.accept_rate == "kept":
+            raise Stopped(SCATTERED)
         self._control.round_finished()
         return self._first_leg()
 
@@ -389,7 +394,18 @@ class Driver:
             claims = tuple(self._claim_made(claim, first) for claim in made.claims)
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
             chosen = (test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact))
-            journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
+            tests = tuple(sorted({*rested_on, *chosen}))
+            journal.record(events.CertificateFinished(claims, tests, self._elsewhere(tests)))
+
+    def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
+        """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
+        state, epsilon = self._journal.state, self._scenario.failure.epsilon
+        # Where another failure counts as f, the baseline says nothing of its ends.
+        if self._certificate.branch or len(state.failures) > 1:
+            return None
+        left = state.nodes[state.node].id
+        fresh = [test for test in state.tests_of(tests) if test.phase == CERTIFY and test.environment == left]
+        return elsewhere(ends_of(of_baseline(state), "similar"), ends_of(fresh, "similar"), epsilon)
 
     @property
     def _certificate(self) -> Certificate:

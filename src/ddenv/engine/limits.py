@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
+from ddenv.evidence.ends import ends_of, groups_of, joining, of_baseline, one_place
 from ddenv.runfile import events
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runfile.store import Live
@@ -97,11 +98,42 @@ def note(journal: Journal, about: str, words: str) -> None:
         journal.record(events.Noted(about, words))
 
 
+def note_ends(journal: Journal) -> bool:
+    """Notes where the ends of the baseline are those of two failures, or scatter. Returns whether they scatter so much that f, the
+    part of them within epsilon of one, shows in less than half of the runs that failed: nothing would be found for it.
+    """
+    state = journal.state
+    epsilon = float(str(read(state.scenario, SETTINGS["epsilon"])))
+    tests = of_baseline(state)
+    similar = ends_of(tests, "similar")
+    failed = ends_of(tests, "similar", "other")
+    if (groups := groups_of(similar, epsilon)) is not None:
+        sizes = ", ".join(str(len(group)) for group in groups.groups)
+        words = {2: "two"}.get(len(groups.groups), str(len(groups.groups)))
+        note(
+            journal,
+            "two failures",
+            f"the ends of f form {words} groups {groups.apart:.2g} m apart ({sizes} runs): these may be different failures; "
+            f"--epsilon {groups.epsilon:g} tells them apart",
+        )
+    reach = one_place(failed, epsilon)
+    if reach is None or len(similar) == len(failed):
+        return False
+    note(journal, "scatter", scattered(len(failed), reach))
+    return 2 * len(similar) < len(failed)
+
+
+def scattered(runs: int, reach: float) -> str:
+    """What to do where runs end within so many metres of one place."""
+    near = f"all {runs} runs that failed ended within {reach:.2g} m of one place"
+    return f"{near}: --epsilon {joining(reach):g} makes them one failure"
+
+
 def note_rare(journal: Journal) -> None:
     """Offers to reduce the failing runs themselves where f shows in few runs, with the costs of both ways."""
     state, base = journal.state, journal.state.baseline
     asked = Reduction.model_validate(state.scenario["reduction"])
-    if base is None or base.rate >= RARE or asked.accept_rate != "kept":
+    if base is None or base.rate >= RARE or asked.accept_rate != "kept" or "scatter" in dict(state.notes):
         return
     ways = asked, asked.model_copy(update={"accept_rate": "exact"})
     tests = (rough_run(len(state.elements), way, base.rate).tests for way in ways)

@@ -20,10 +20,10 @@ from ddenv.text import percent
 
 
 def is_minimal(certificate: Certificate) -> bool:
-    """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
+    """Whether a certificate shows that what is left keeps the rate of the same failure, and that each model in it is needed."""
     claims = certificate.claims
     kept = bool(claims) and (claims[0].verdict == "kept" or bool(certificate.seeds))
-    return kept and all(claim.verdict == "needed" for claim in claims[1:])
+    return kept and certificate.elsewhere is None and all(claim.verdict == "needed" for claim in claims[1:])
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
