@@ -3,9 +3,13 @@
 import pytest
 
 from ddenv.engine.control import Stopped
+from ddenv.engine.driver import Driver
+from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
 from ddenv.words.claims import verdict_on
-from tests.engine.fake import FakePool, drive, new_run
+from ddenv.world.scenario import Oracle
+from tests.engine.fake import FakePool, drive, engine, new_run
+from tests.engine.oracles import needs
 from tests.engine.reading import state_of
 
 
@@ -55,3 +59,41 @@ def test_ends_that_scatter_stop_the_run_with_the_epsilon_that_joins_them(tmp_pat
     assert {test.phase for test in state.tests} == {"baseline"}
     # Who resumes it wants this one.
     assert drive(path, pool).status == "finished"
+
+
+def warm(pool, shows=lambda made: made <= 10):
+    """An oracle of which the calls decide: it shows f in its first ones alone."""
+    return lambda keep, _: "similar" if shows(len(pool.made)) else "pass"
+
+
+def simulated_elsewhere(path, pool):
+    """To its end, where the simulator is not ddenv's own."""
+    with engine(path, pool) as one:
+        there = one.scenario.model_copy(update={"oracle": Oracle(command="true")})
+        Driver(there, *one[1:]).reduce()
+        return one.journal.state
+
+
+def test_a_failure_that_stops_to_show_ends_the_search_after_a_round_in_vain(tmp_path):
+    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(lambda *_: "", 1)
+    pool.oracle = warm(pool)
+    with pytest.raises(
+        UserError, match=r"f does not repeat: it showed only in the first 10 runs, and in none of 3 replays; does"
+    ):
+        simulated_elsewhere(path, pool)
+    assert len(pool.made) <= 30
+    # A failure that repeats is replayed once a round.
+    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(needs("wall", "ball", "deck"), 1)
+    state = simulated_elsewhere(path, pool)
+    assert state.environment == ("deck", "wall", "ball")
+    assert len(pool.made) - len(state.tests) <= state.rounds_done
+
+
+def test_a_certificate_ends_once_f_does_not_show_any_more(tmp_path):
+    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(lambda *_: "", 1)
+    pool.oracle = warm(pool)
+    state = drive(path, pool)
+    assert state.reason.startswith(
+        "f does not repeat: it showed only in the first 10 runs; not shown that what is left keeps "
+    )
+    assert [(claim.without, claim.shown, claim.runs) for claim in state.certificate.claims] == [(None, 0, 30)]

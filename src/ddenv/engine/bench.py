@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -157,13 +157,16 @@ class Bench:
             )
         self._journal.record(Compared(result is None))
 
-    def made_again(self, test: KnownTest) -> RunResult | Broken | None:
-        """Makes a run of the whole world again, once all workers are idle; returns how it ended unless it repeats bit for bit."""
+    def made_again(self, test: KnownTest, tells: bool = True) -> RunResult | Broken | None:
+        """Makes a run of the whole world again, once all workers are idle; returns how it ended unless it repeats bit for bit.
+        `tells`: views say so.
+        """
         while self._busy:
             # A search that is due begins after this.
             self._look_around(WAIT)
         journal = self._journal
-        journal.record(Comparing(test.id))
+        if tells:
+            journal.record(Comparing(test.id))
         self._pool.submit(0, Run(frozenset(journal.state.elements), test.seed, limit=wall_limit(journal.state)))
         while not (ended := self._pool.finished(WAIT)):
             self._control.poll()
@@ -253,12 +256,20 @@ class Bench:
                 self._journal.file.set_live([test for test, _ in live])
             self._live_shown = bool(live)
 
-    def _record(self, test: int, result: RunResult | Broken) -> None:
+    def outcome_of(self, result: RunResult | Broken) -> str:
+        """What a run showed, judged by what counts as f now."""
+        return str(self._judged(result)["outcome"])
+
+    def _judged(self, result: RunResult | Broken) -> dict[str, Any]:
         journal = self._journal
         if self._failed != journal.state.failures:
             spec = FailureSpec.model_validate(journal.state.scenario["failure"])
             self._failures, self._failed = failures_of(journal.file, journal.state, spec), journal.state.failures
-        data = result_data(result, self._failures)
+        return result_data(result, self._failures)
+
+    def _record(self, test: int, result: RunResult | Broken) -> None:
+        journal = self._journal
+        data = self._judged(result)
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
             started = journal.state.tests[test - 1]

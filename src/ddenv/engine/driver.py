@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from itertools import cycle, islice
 from typing import Any, NoReturn
 
 from ddenv.engine.bench import Bench
@@ -18,10 +19,10 @@ from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import RUNS_BESIDE, error_of
+from ddenv.evidence.certificate import RUNS_BESIDE, SURELY, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
 from ddenv.evidence.ends import elsewhere, ends_of, of_baseline
-from ddenv.evidence.rates import anytime_interval
+from ddenv.evidence.rates import anytime_interval, estimated_rate, iterations_needed
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
@@ -38,7 +39,7 @@ from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
 from ddenv.text import count
-from ddenv.words.claims import verdict_on
+from ddenv.words.claims import no_more, verdict_on
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
@@ -50,6 +51,9 @@ OTHER_WAY = (
     "continue with those, or start a new run"
 )
 SCATTERED = "f is a small part of what fails; choose a wider epsilon, or resume the run to go on with this one"
+# Of a rarer f no few replays say whether it still shows.
+FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
+LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
@@ -355,9 +359,29 @@ class Driver:
         assert journal.state.leg is not None
         past = journal.state.leg.past[-1]
         self._learn(past.tests, past.evidence_test)
+        if winner is None and self._scenario.oracle is not None:
+            self._check_shows(number)
         if winner is not None and slice_environment(journal):
             # The search goes on in the slice.
             raise steps.Changed
+
+    def _check_shows(self, round: int) -> None:
+        """Replays runs that showed f, if no test of a round did. Raises UserError if f does not show any more.
+
+        Only another simulator can change in the course of time.
+        """
+        state = self._journal.state
+        shown = [test for test in state.tests if test.outcome == "similar"]
+        failing = [test for test in shown if test.phase == "baseline"]
+        base = known_failure(state)
+        replays = max(FEWEST_REPLAYS, 1 + iterations_needed(estimated_rate(base.failures, base.runs), SURELY))
+        if not failing or replays > MOST_REPLAYS or any(test.round == round for test in shown):
+            return
+        for replay, test in enumerate(islice(cycle(failing), replays)):
+            result = self._bench.made_again(test, tells=not replay)
+            if result is None or self._bench.outcome_of(result) == "similar":
+                return
+        raise UserError(f"{no_more(state)}, and in none of {count(replays, 'replay')}; {LEFT_OVER}")
 
     def search_ended(self, environment: Environment) -> None:
         self._audit_slice()
@@ -451,7 +475,8 @@ class Driver:
         stacks = stacks_of(journal.state, journal.state.environment)
         together = self._reduction.keep_supports or any(len(stack) > 1 for stack in stacks)
         pinned = self._leg.pinned & journal.environment
-        reason = verdict_on(certificate, len(pinned), "stack" if together else "single model")
+        vanished = "" if certificate.claims[0].shown else f"{no_more(journal.state)}; "
+        reason = vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
             reason += "; leaving it out was vetoed or rejected"

@@ -99,8 +99,8 @@ def note(journal: Journal, about: str, words: str) -> None:
 
 
 def note_ends(journal: Journal) -> bool:
-    """Notes where the ends of the baseline are those of two failures, or scatter. Returns whether they scatter so much that f, the
-    part of them within epsilon of one, shows in less than half of the runs that failed: nothing would be found for it.
+    """Notes where the ends of the baseline are those of two failures, or scatter so much that f, the part of them within epsilon of
+    one, shows in less than half of the runs that failed. Returns whether they scatter: nothing would be found for such an f.
     """
     state = journal.state
     epsilon = float(str(read(state.scenario, SETTINGS["epsilon"])))
@@ -117,16 +117,11 @@ def note_ends(journal: Journal) -> bool:
             f"--epsilon {groups.epsilon:g} tells them apart",
         )
     reach = one_place(failed, epsilon)
-    if reach is None or len(similar) == len(failed):
+    if reach is None or 2 * len(similar) >= len(failed):
         return False
-    note(journal, "scatter", scattered(len(failed), reach))
-    return 2 * len(similar) < len(failed)
-
-
-def scattered(runs: int, reach: float) -> str:
-    """What to do where runs end within so many metres of one place."""
-    near = f"all {runs} runs that failed ended within {reach:.2g} m of one place"
-    return f"{near}: --epsilon {joining(reach):g} makes them one failure"
+    near = f"all {len(failed)} runs that failed ended within {reach:.2g} m of one place"
+    note(journal, "scatter", f"{near}: --epsilon {joining(reach):g} makes them one failure")
+    return True
 
 
 def note_rare(journal: Journal) -> None:

@@ -9,7 +9,7 @@ from statistics import median
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import Claim as Settled
-from ddenv.evidence.certificate import Terms, certificate_tests, falls, keeps, often, settle
+from ddenv.evidence.certificate import Terms, certificate_tests, falls, keeps, often, settle, vain_after
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
 from ddenv.runfile.fold_decisions import exact_runs, origin, rested_on
 from ddenv.runfile.progress import Certificate, Claim, Isolation
@@ -40,7 +40,12 @@ def terms_of(state: RunState, certificate: Certificate) -> Terms:
     """The terms of a certificate of a run, which may go on with the runs of an earlier one."""
     first = next(one for one in state.certificates if one.first_run == certificate.first_run)
     return Terms(
-        certificate.certify_rate, certificate.keep_rate, certificate.error, certificate.at_least, first.certify_rate
+        certify_rate=certificate.certify_rate,
+        keep_rate=certificate.keep_rate,
+        error=certificate.error,
+        at_least=certificate.at_least,
+        first_rate=first.certify_rate,
+        vain=vain_after(certificate.rate),
     )
 
 

@@ -328,7 +328,8 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
-            return claim.claim.verdict == "lost"
+            fresh = (driver.shown(left, certificate.first_run + run, full=True) for run in claim.runs)
+            return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in fresh)
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
     # Models are taken to be in turn, until the rate turns out not to be kept.

@@ -66,6 +66,12 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 
+def no_more(state: RunState) -> str:
+    """That f has stopped to show: "f does not repeat: it showed only in the first 3 runs"."""
+    last = max((test.id for test in state.tests if test.outcome == "similar"), default=0)
+    return f"f does not repeat: it showed only in the first {count(last, 'run')}"
+
+
 def _elsewhere(ends: EndsElsewhere) -> str:
     """Which other failure took the place of f."""
     return (
