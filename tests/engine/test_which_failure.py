@@ -6,9 +6,12 @@ from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
+from ddenv.runfile.store import RunFile
+from ddenv.runs.subject import read_subject
 from ddenv.words.claims import verdict_on
 from ddenv.world.scenario import Oracle
 from tests.engine.fake import FakePool, drive, engine, new_run
+from tests.engine.guided import Guided, until
 from tests.engine.oracles import needs
 from tests.engine.reading import state_of
 
@@ -51,7 +54,7 @@ def test_ends_that_scatter_stop_the_run_with_the_epsilon_that_joins_them(tmp_pat
     path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
     pool = FakePool(lambda keep, _: "similar" if "wall" in keep else "pass", 1)
     pool.shifted = lambda _, seed: 0.02 * (seed * 37 % 127)
-    with pytest.raises(Stopped, match="choose a wider epsilon"):
+    with pytest.raises(Stopped, match="goes on with a wider epsilon"):
         drive(path, pool)
     state = state_of(path)
     assert "--epsilon 1.4 makes them one failure" in dict(state.notes)["scatter"]
@@ -97,3 +100,63 @@ def test_a_certificate_ends_once_f_does_not_show_any_more(tmp_path):
         "f does not repeat: it showed only in the first 10 runs; not shown that what is left keeps "
     )
     assert [(claim.without, claim.shown, claim.runs) for claim in state.certificate.claims] == [(None, 0, 30)]
+
+
+def widened(tmp_path, before, epsilon, jobs=1, algorithm="ddenv"):
+    """A run whose epsilon the user changes at the end of round 2, and the runs that were made."""
+
+    def guide():
+        yield from until(lambda state: state.round is not None and state.round.number == 2)
+        yield "change", {"settings": {"epsilon": epsilon}}
+
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8, algorithm=algorithm)
+    with RunFile(path) as file:
+        assert read_subject(file).scenario.failure.epsilon == before
+    pool = Guided(path, two, guide(), jobs)
+    pool.shifted = where
+    return path, drive(path, pool), pool.made
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeated(tmp_path, monkeypatch, jobs):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+    path, state, made = widened(tmp_path, 0.4, 0.15, jobs)
+    # Now only the failure of the wall is f, and the beam's is another one.
+    assert (state.baseline.failures, state.baseline.runs, len(state.baseline.seen)) == (6, 10, 2)
+    assert state.environment == ("wall",)
+    assert state.certificate.elsewhere is None
+    assert {test.outcome for test in state.tests if abs(test.end_pose[0] - 2.3) < 0.01} == {"other"}
+    assert len(made) == len(set(made))
+    assert [decision.words for decision in state.decisions] == ["changed epsilon from 0.4 to 0.15"]
+    # All that is read from the file has it.
+    with RunFile(path) as file:
+        assert read_subject(file).scenario.failure.epsilon == 0.15
+    assert state_of(path).failures == state.failures
+
+
+def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+
+    def guide():
+        yield from until(lambda state: len(state.tests) == 3)
+        yield "change", {"settings": {"epsilon": 0.15}}
+
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
+    pool = Guided(path, two, guide())
+    pool.shifted = where
+    assert drive(path, pool).baseline.failures == 6
+
+
+def test_a_very_rare_failure_asks_how_to_go_on_and_can_be_reduced_exactly(tmp_path):
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=70)
+    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep and seed in (20, 30, 40) else "pass", 1)
+    with pytest.raises(
+        Stopped, match="f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces"
+    ):
+        drive(path, pool)
+    with RunFile(path) as file:
+        file.send("change", settings={"accept_rate": "exact"})
+    state = drive(path, pool)
+    assert state.environment == ("wall",)
+    assert state.certificate.seeds == (20, 30, 40)
+    assert sum(test.phase == "baseline" for test in state.tests) == 70

@@ -28,7 +28,7 @@ from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
 from ddenv.text import count
-from ddenv.world.scenario import FailureSpec, Reduction, seed_of
+from ddenv.world.scenario import Reduction, seed_of
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -50,7 +50,8 @@ class Bench:
         self, journal: Journal, pool: Workers, control: Control, others: Mapping[Key, Place] | None = None
     ) -> None:
         self._failures: tuple[Failure, ...] = ()
-        self._failed: tuple[int, ...] = ()
+        # What the failures were made of.
+        self._failed: object = None
         self._journal = journal
         self._pool = pool
         self._control = control
@@ -262,9 +263,10 @@ class Bench:
 
     def _judged(self, result: RunResult | Broken) -> dict[str, Any]:
         journal = self._journal
-        if self._failed != journal.state.failures:
-            spec = FailureSpec.model_validate(journal.state.scenario["failure"])
-            self._failures, self._failed = failures_of(journal.file, journal.state, spec), journal.state.failures
+        failed = journal.state.failures, journal.state.scenario["failure"]["epsilon"]
+        if self._failed != failed:
+            self._failures = failures_of(journal.file, journal.state)
+            self._failed = failed
         return result_data(result, self._failures)
 
     def _record(self, test: int, result: RunResult | Broken) -> None:

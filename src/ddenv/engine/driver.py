@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
+from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
 from ddenv.engine.limits import limit_after, note, note_ends, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
@@ -50,7 +50,14 @@ OTHER_WAY = (
     "round {} would now differ: the run was started with other versions of ddenv, scikit-learn or a package of schemas; "
     "continue with those, or start a new run"
 )
-SCATTERED = "f is a small part of what fails; choose a wider epsilon, or resume the run to go on with this one"
+SCATTERED = (
+    "f is a small part of what fails: 'ddenv resume RUN --epsilon NUMBER' goes on with a wider epsilon, 'ddenv resume RUN' with "
+    "this one"
+)
+VERY_RARE = (
+    "f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces its failing runs, 'ddenv resume RUN' "
+    "keeps its rate"
+)
 # Of a rarer f no few replays say whether it still shows.
 FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
 LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
@@ -263,7 +270,7 @@ class Driver:
         journal, whole = self._journal, self._journal.state.environments[0]
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
-        spec, asked = self._scenario.failure, self._reduction
+        spec, asked = spec_of(journal.state), self._reduction
         found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose)
         if isinstance(found, str):
             return None
@@ -274,10 +281,10 @@ class Driver:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
-        scatters = note_ends(self._journal)
-        note_rare(self._journal)
-        if scatters and self._reduction.accept_rate == "kept":
+        if note_ends(self._journal) and self._reduction.accept_rate == "kept":
             raise Stopped(SCATTERED)
+        if note_rare(self._journal):
+            raise Stopped(VERY_RARE)
         self._control.round_finished()
         return self._first_leg()
 
@@ -423,7 +430,7 @@ class Driver:
 
     def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
         """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
-        state, epsilon = self._journal.state, self._scenario.failure.epsilon
+        state, epsilon = self._journal.state, spec_of(self._journal.state).epsilon
         # Where another failure counts as f, the baseline says nothing of its ends.
         if self._certificate.branch or len(state.failures) > 1:
             return None

@@ -641,9 +641,10 @@ class WentBack(Event):
 
 
 class Changed(Event):
-    """New values of keys in the scenario's section `reduction`."""
+    """New values of settings. Where they say anew which failures are the same, `baseline` is fixed again, and judges all tests."""
 
     settings: dict[str, Any]
+    baseline: BaselineFinished | None = None
 
 
 class CommandRefused(Event):
