@@ -308,6 +308,7 @@ class Failure:
         least=0.001,
         most=1000,
         shown="basic",
+        may_change=True,
         cost="Wider accepts more failures as the same one; narrower misses f more often.",
     )
     similarity: Literal["end-pose", "trajectory"] = setting(

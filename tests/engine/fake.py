@@ -80,6 +80,8 @@ class FakePool:
         self.settling = 0
         self.settled = Settled()
         self.limits: list[float | None] = []
+        # Where else than it says a run ends, m.
+        self.shifted: Callable[[frozenset[str], int], float] = lambda *_: 0.0
         # How far running tests are, and how long they took so far, s.
         self.pace: list[tuple[Live, float]] = []
         # What a run with other values of numbers shows.
@@ -111,7 +113,7 @@ class FakePool:
         if shown == "error":
             return [(test, Broken("error", "it broke"))]
         outcome, x = ENDS[shown]
-        made = result(outcome, seed, x, bool(cut))
+        made = result(outcome, seed, x + self.shifted(keep, seed), bool(cut))
         made.trajectory[1, 2] = self.aside(keep, seed)
         motions = {name: made.trajectory.copy() for name in self.moves & keep}
         more = {"took_part": self.took_part(keep, seed), "first_sensed": self.sensed(keep, seed)}

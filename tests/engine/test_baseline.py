@@ -209,3 +209,18 @@ def test_a_search_judges_by_the_rate_of_the_runs_that_chose_nothing(tmp_path):
 def test_the_papers_baseline_never_goes_on(tmp_path):
     state = drive(new_run(tmp_path, baseline_runs=4, iterations=1), FakePool(rare(0.2, 2), 2))
     assert sum(test.phase == "baseline" for test in state.tests) == 4
+
+
+def test_a_failure_that_crashes_now_and_then_stops_no_search(tmp_path):
+    def oracle(keep, seed):
+        if "wall" not in keep:
+            return "pass"
+        # In and beyond the baseline.
+        return "error" if seed in (1, 4, 12) else "similar" if seed % 3 else "pass"
+
+    state = drive(new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 2))
+    assert state.baseline.broken == 2
+    assert state.environment == ("wall",)
+    runs = {test.run for test in state.tests if test.phase == "round"}
+    assert not runs & {1, 4}
+    assert max(runs) < 12 or 12 in runs

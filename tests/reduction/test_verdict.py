@@ -11,7 +11,10 @@ from ddenv.reduction.verdict import MOST_RUNS, Acceptance, decided_by, standing
 from tests.tiers import slow
 
 firsts = st.builds(Acceptance, st.integers(1, 4))
-keeping = st.builds(Acceptance, st.integers(1, 12), st.floats(0.05, 1), st.floats(0.3, 0.95), st.integers(0, 3))
+broke = st.sets(st.integers(0, 9), max_size=4).map(lambda runs: tuple(sorted(runs)))
+keeping = st.builds(
+    Acceptance, st.integers(1, 12), st.floats(0.05, 1), st.floats(0.3, 0.95), st.integers(0, 3), broke=broke
+)
 rules = firsts | keeping
 rates = st.lists(st.sampled_from([0.0, 0.3, 0.8, 1.0]), min_size=1, max_size=5)
 salts = st.integers(0, 10**6)
@@ -31,11 +34,14 @@ def in_order(shown, candidates, rule):
     """What one worker finds: the winner, the verdicts, and the tests it makes."""
     made, verdicts = [], []
     for candidate in candidates:
-        hits = misses = 0
+        hits = misses = broken = 0
         while not (verdict := rule.verdict(hits, misses)):
-            made.append((candidate, hits + misses))
+            made.append((candidate, rule.run(hits + misses + broken)))
             result = shown(*made[-1])
             if result == "broken":
+                broken += 1
+                if rule.passes_over(broken, hits + misses + broken):
+                    continue
                 verdict = "unknown"
                 break
             hits, misses = hits + result, misses + (not result)
@@ -79,8 +85,7 @@ def test_the_runs_that_decided_are_those_that_one_worker_makes(rates, salt, rule
     _, verdicts, made = in_order(shown, range(len(rates)), rule)
     for candidate in range(len(verdicts)):
         results = [shown(*test) for test in made if test[0] == candidate]
-        runs, hits = decided_by(shown, candidate, rule)
-        assert (runs, hits) == (len(results), results.count(True))
+        assert decided_by(shown, candidate, rule) == (len(results), results.count(True), results.count("broken"))
 
 
 @given(rates=rates, salt=salts, rule=rules, refused=st.sets(st.integers(0, 4)))
@@ -109,6 +114,25 @@ def test_no_more_is_looked_at_than_workers_can_do():
 
     assert len(standing(candidates(), lambda *_: None, Acceptance(4), enough=8)[1]) == 8
     assert seen == [0, 1]
+
+
+@given(broke=broke, places=st.integers(1, 20))
+def test_runs_that_broke_in_the_whole_world_are_left_out_of_the_search_and_no_others(broke, places):
+    rule = Acceptance(4, 0.5, broke=broke)
+    assert [rule.run(place) for place in range(places)] == [run for run in range(40) if run not in broke][:places]
+
+
+def test_a_broken_run_is_passed_over_where_few_broke_and_in_no_exact_reduction():
+    sound = [True, True, True]
+
+    def verdict(results, **rule):
+        return standing([0], lambda _, run: results[run], Acceptance(4, 0.5, **rule))[0][0]
+
+    assert verdict([*sound, "broken", *sound]) == verdict([*sound, *sound]) == "similar"
+    assert verdict(["broken", *sound, *sound]) == "unknown"
+    # A simulator that no longer works costs one run of each candidate.
+    assert standing([0, 1], lambda _, run: None if run else "broken", Acceptance(4)) == (["unknown", "unknown"], [])
+    assert verdict([False, False, False, "broken"], exact=(0, 1, 2, 3)) == "unknown"
 
 
 ORDER = {"dissimilar": 0, "": 1, "similar": 2}

@@ -12,7 +12,7 @@ from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, run_path
-from ddenv.settings import SETTINGS
+from ddenv.settings import CHANGEABLE, SETTINGS, Value
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_world
 
@@ -79,15 +79,27 @@ def announce_needs(sdf: Path, uris: list[str]) -> None:
 @click.option("--mixed", is_flag=True, help="Continue even if other versions or another processor change results.")
 @click.option("--anyway", is_flag=True, help="Continue even if the engine has died again and again.")
 @click.option("--again", is_flag=True, help="Repeat all tests in a new run of the same scenario.")
+@options.setting_options(only=CHANGEABLE)
 @options.engine_options
 def resume_command(
-    run: str, jobs: int, cluster: str | None, mixed: bool, anyway: bool, again: bool, trust: bool, as_json: bool
+    run: str,
+    jobs: int,
+    cluster: str | None,
+    mixed: bool,
+    anyway: bool,
+    again: bool,
+    trust: bool,
+    as_json: bool,
+    **given: Value,
 ) -> int:
     """Continues RUN (a name or a file) without a screen; no finished test is repeated.
+
+    With new settings it goes on as key c of the workbench does; with another epsilon all stored ends are judged again.
 
     If Drake, Python or the processor has changed, the first run of the whole world is repeated and compared.
     """
     from ddenv.cli.follow import follow_to_summary
+    from ddenv.guiding.commands import Change, Situation, send
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
@@ -98,20 +110,33 @@ def resume_command(
     path = find_run(run)
     if mixed and again:
         raise UserError("--mixed and --again: give one of them")
+    # 0 takes back a limit.
+    new = {
+        name: None if value == 0 and SETTINGS[name].none else value
+        for name, value in given.items()
+        if value is not None
+    }
+    if new and again:
+        raise UserError("--again repeats the tests of the same scenario: leave out the new settings")
     with RunFile(path) as file:
         scenario = trusted_scenario(file, asking(trust), cluster)
         if not again:
             with engine_lock(path):
+                if new:
+                    change = Change(new)
+                    if why := change.refusal(Situation(fold(file.events()))):
+                        raise UserError(why)
+                    send(file, change)
                 # Going back while no engine works ends in a pause, and without a screen nobody can end it.
                 if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
                     file.send("resume")
     # Without a screen there is nobody to ask.
     how = {"bits": "mixed" if mixed else "same", "anyway": "yes" if anyway else "no", "accept_mode": "automatic"}
     if again:
-        new = run_path(scenario.name, None, path.parent)
-        create_like(path, scenario, new)
-        announce(f"repeating the tests of {path} in {new}")
-        path, how = new, {}
+        copy = run_path(scenario.name, None, path.parent)
+        create_like(path, scenario, copy)
+        announce(f"repeating the tests of {path} in {copy}")
+        path, how = copy, {}
     return follow_to_summary(path, start_engine(path, jobs, cluster=cluster, **how), as_json)[0]
 
 

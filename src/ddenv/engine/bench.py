@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
 from ddenv.text import count
-from ddenv.world.scenario import FailureSpec, Reduction, seed_of
+from ddenv.world.scenario import Reduction, seed_of
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -50,7 +50,8 @@ class Bench:
         self, journal: Journal, pool: Workers, control: Control, others: Mapping[Key, Place] | None = None
     ) -> None:
         self._failures: tuple[Failure, ...] = ()
-        self._failed: tuple[int, ...] = ()
+        # What the failures were made of.
+        self._failed: object = None
         self._journal = journal
         self._pool = pool
         self._control = control
@@ -157,13 +158,17 @@ class Bench:
             )
         self._journal.record(Compared(result is None))
 
-    def made_again(self, test: KnownTest) -> RunResult | Broken | None:
-        """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit."""
+    def made_again(self, test: KnownTest, tells: bool = True) -> RunResult | Broken | None:
+        """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit.
+
+        `tells`: views say so.
+        """
         while self._busy:
             # A search that is due begins after this.
             self._look_around(WAIT)
         journal, state = self._journal, self._journal.state
-        journal.record(Comparing(test.id))
+        if tells:
+            journal.record(Comparing(test.id))
         keep = frozenset(state.environments[test.environment].names(state.elements))
         # It ends as the one that was simulated.
         simulated = test if test.implied_by is None else state.tests[test.implied_by - 1]
@@ -191,7 +196,7 @@ class Bench:
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
             if verdict:
-                runs, _ = decided_by(self._journal.shown, environment, self.rule)
+                runs, *_ = decided_by(self._journal.shown, environment, self.rule)
                 tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
                 self._journal.record(TrialJudged(trial.number, verdict, tests))
             for _, run in wanted:
@@ -256,12 +261,21 @@ class Bench:
                 self._journal.file.set_live([test for test, _ in live])
             self._live_shown = bool(live)
 
+    def outcome_of(self, result: RunResult | Broken) -> str:
+        """What a run showed, judged by what counts as f now."""
+        return str(self._judged(result)["outcome"])
+
+    def _judged(self, result: RunResult | Broken) -> dict[str, Any]:
+        journal = self._journal
+        failed = journal.state.failures, journal.state.scenario["failure"]["epsilon"]
+        if self._failed != failed:
+            self._failures = failures_of(journal.file, journal.state)
+            self._failed = failed
+        return result_data(result, self._failures)
+
     def _record(self, test: int, result: RunResult | Broken) -> None:
         journal = self._journal
-        if self._failed != journal.state.failures:
-            spec = FailureSpec.model_validate(journal.state.scenario["failure"])
-            self._failures, self._failed = failures_of(journal.file, journal.state, spec), journal.state.failures
-        data = result_data(result, self._failures)
+        data = self._judged(result)
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
             started = journal.state.tests[test - 1]

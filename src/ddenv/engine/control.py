@@ -14,14 +14,13 @@ from contextlib import suppress
 from typing import Any
 
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failure_of, rejudged
+from ddenv.engine.judging import failure_of, fixed_again, rejudged
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.guiding import commands as c
 from ddenv.runfile import events
-from ddenv.runfile.fold_decisions import failures_at
+from ddenv.runfile.fold_decisions import failures_at, with_settings
 from ddenv.runfile.store import NoRoom, Request, RunFile
-from ddenv.world.scenario import FailureSpec
 
 # Decisions within this time start one new search, not several, s.
 SETTLE = 0.5
@@ -242,8 +241,16 @@ class Control:
 def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
     """The outcomes of all tests if the ends of `failures` count as f."""
     file, state = journal.file, journal.state
-    spec = FailureSpec.model_validate(state.scenario["failure"])
-    return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
+    return rejudged(file, state, tuple(failure_of(file, state, test) for test in failures))
+
+
+def _changed(journal: Journal, asked: c.Change) -> events.Event:
+    state, new = journal.state, asked.new(journal.state)
+    if "epsilon" not in new or state.baseline is None:
+        return events.Changed(new)
+    # Stored ends are judged again.
+    after = state.changed(scenario=with_settings(state.scenario, new))
+    return events.Changed(new, fixed_again(journal.file, after))
 
 
 def _adopted(journal: Journal, asked: c.Adopt) -> events.Event:
@@ -282,5 +289,5 @@ _EVENTS: dict[type[c.Command], Callable[[Journal, Any], events.Event]] = {
     c.Adopt: _adopted,
     c.LeaveOut: _left_out,
     c.AcceptOther: _accepted_other,
-    c.Change: lambda journal, asked: events.Changed(asked.new(journal.state)),
+    c.Change: _changed,
 }

@@ -7,20 +7,22 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from itertools import cycle, islice
 from typing import Any, NoReturn
 
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of
-from ddenv.engine.limits import limit_after, note, note_rare
+from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
+from ddenv.engine.limits import limit_after, note, note_ends, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import RUNS_BESIDE, error_of
+from ddenv.evidence.certificate import RUNS_BESIDE, SURELY, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
-from ddenv.evidence.rates import anytime_interval
+from ddenv.evidence.ends import elsewhere, ends_of, of_baseline
+from ddenv.evidence.rates import anytime_interval, estimated_rate, iterations_needed
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
@@ -30,14 +32,14 @@ from ddenv.reduction.verdict import Acceptance
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
-from ddenv.runfile.fold_decisions import exact_runs
+from ddenv.runfile.fold_decisions import broken_runs, exact_runs
 from ddenv.runfile.progress import Certificate, Node
-from ddenv.runfile.state import BROKEN
+from ddenv.runfile.state import BROKEN, CERTIFY
 from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
 from ddenv.text import count
-from ddenv.words.claims import verdict_on
+from ddenv.words.claims import no_more, verdict_on
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
@@ -49,6 +51,17 @@ OTHER_WAY = (
     "continue with those, or start a new run"
 )
 NOT_EXACT = "runs do not repeat, so nothing exact can be said of them; keep the rate of f instead: --accept-rate kept"
+SCATTERED = (
+    "f is a small part of what fails: 'ddenv resume RUN --epsilon NUMBER' goes on with a wider epsilon, 'ddenv resume RUN' with "
+    "this one"
+)
+VERY_RARE = (
+    "f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces its failing runs, 'ddenv resume RUN' "
+    "keeps its rate"
+)
+# Of a rarer f no few replays say whether it still shows.
+FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
+LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
@@ -178,7 +191,7 @@ class Driver:
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back)
+        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back, broke=broken_runs(state))
         rule = self._bench.rule = Acceptance(len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         search = leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again
@@ -258,7 +271,7 @@ class Driver:
         journal, whole = self._journal, self._journal.state.environments[0]
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
-        spec, asked = self._scenario.failure, self._reduction
+        spec, asked = spec_of(journal.state), self._reduction
         usual = asked.baseline_runs
         found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose, usual)
         if isinstance(found, str):
@@ -270,7 +283,10 @@ class Driver:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
-        note_rare(self._journal)
+        if note_ends(self._journal) and self._reduction.accept_rate == "kept":
+            raise Stopped(SCATTERED)
+        if note_rare(self._journal):
+            raise Stopped(VERY_RARE)
         self._control.round_finished()
         return self._first_leg()
 
@@ -352,9 +368,29 @@ class Driver:
         assert journal.state.leg is not None
         past = journal.state.leg.past[-1]
         self._learn(past.tests, past.evidence_test)
+        if winner is None and self._scenario.oracle is not None:
+            self._check_shows(number)
         if winner is not None and slice_environment(journal):
             # The search goes on in the slice.
             raise steps.Changed
+
+    def _check_shows(self, round: int) -> None:
+        """Replays runs that showed f, if no test of a round did. Raises UserError if f does not show any more.
+
+        Only another simulator can change in the course of time.
+        """
+        state = self._journal.state
+        shown = [test for test in state.tests if test.outcome == "similar"]
+        failing = [test for test in shown if test.phase == "baseline"]
+        base = known_failure(state)
+        replays = max(FEWEST_REPLAYS, 1 + iterations_needed(estimated_rate(base.failures, base.runs), SURELY))
+        if not failing or replays > MOST_REPLAYS or any(test.round == round for test in shown):
+            return
+        for replay, test in enumerate(islice(cycle(failing), replays)):
+            result = self._bench.made_again(test, tells=not replay)
+            if result is None or self._bench.outcome_of(result) == "similar":
+                return
+        raise UserError(f"{no_more(state)}, and in none of {count(replays, 'replay')}; {LEFT_OVER}")
 
     def search_ended(self, environment: Environment) -> None:
         self._audit_slice()
@@ -392,7 +428,18 @@ class Driver:
             exactly = not chosen or self._all_repeat(chosen)
             claims = tuple(self._claim_made(claim, first, exactly) for claim in made.claims)
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
-            journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
+            tests = tuple(sorted({*rested_on, *chosen}))
+            journal.record(events.CertificateFinished(claims, tests, self._elsewhere(tests)))
+
+    def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
+        """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
+        state, epsilon = self._journal.state, spec_of(self._journal.state).epsilon
+        # Where another failure counts as f, the baseline says nothing of its ends.
+        if self._certificate.branch or len(state.failures) > 1:
+            return None
+        left = state.nodes[state.node].id
+        fresh = [test for test in state.tests_of(tests) if test.phase == CERTIFY and test.environment == left]
+        return elsewhere(ends_of(of_baseline(state), "similar"), ends_of(fresh, "similar"), epsilon)
 
     def _all_repeat(self, tests: Iterable[int]) -> bool:
         """Replays what an exact reduction rests on, up to a run that differs.
@@ -456,7 +503,8 @@ class Driver:
         stacks = stacks_of(journal.state, journal.state.environment)
         together = self._reduction.keep_supports or any(len(stack) > 1 for stack in stacks)
         pinned = self._leg.pinned & journal.environment
-        reason = verdict_on(certificate, len(pinned), "stack" if together else "single model")
+        vanished = "" if certificate.claims[0].shown else f"{no_more(journal.state)}; "
+        reason = vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
             reason += "; leaving it out was vetoed or rejected"

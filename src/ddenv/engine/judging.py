@@ -28,7 +28,7 @@ from ddenv.text import count, percent_at_most
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
 from ddenv.world.pose import headings
-from ddenv.world.scenario import FailureSpec
+from ddenv.world.scenario import FailureSpec, Reduction
 
 # Where no run failed, so many times as many are proposed.
 FURTHER = 3
@@ -100,14 +100,19 @@ def end_of(test: Test) -> tuple[float, float, float]:
     return x, y, z
 
 
-def failures_of(file: RunFile, state: RunState, spec: FailureSpec) -> tuple[Failure, ...]:
+def spec_of(state: RunState) -> FailureSpec:
+    """What counts as the same failure now: the user may have changed it."""
+    return FailureSpec.model_validate(state.scenario["failure"])
+
+
+def failures_of(file: RunFile, state: RunState) -> tuple[Failure, ...]:
     """f first; none before it is fixed. Raises UserError for a damaged run file."""
-    return tuple(failure_of(file, state, test, spec) for test in state.failures)
+    return tuple(failure_of(file, state, test) for test in state.failures)
 
 
-def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> Failure:
+def failure_of(file: RunFile, state: RunState, test: int) -> Failure:
     """The failure that a test showed. Raises UserError for a damaged run file."""
-    f = known_failure(state)
+    f, spec = known_failure(state), spec_of(state)
     end = f.position if test == f.failure_test else end_of(state.tests[test - 1])
     return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
 
@@ -123,6 +128,21 @@ def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> O
 def rows_of(file: RunFile, test: int) -> np.ndarray:
     """The robot's trajectory in a test, shape (N, COLUMNS). Raises UserError if it is missing."""
     return table(file.trajectory(test))
+
+
+def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
+    """The baseline by what counts as the same failure now, which judges all tests. Raises UserError if it shows none."""
+    before, reduction = known_failure(state), Reduction.model_validate(state.scenario["reduction"])
+    tests = {test.run: test for test in state.tests if test.phase == "baseline" and test.is_finished}
+    failed = ("failed", "similar", "other")
+    unjudged = [replace(one, outcome="failed") if one.outcome in failed else one for _, one in sorted(tests.items())]
+    trajectories = {test.id: rows_of(file, test.id) for test in unjudged if test.outcome == "failed"}
+    spec = spec_of(state)
+    found = fix_failure(unjudged, trajectories, spec, reduction.iterations, reduction.failure, before.chose)
+    if isinstance(found, str):
+        raise UserError(found)
+    f = Failure(found.position, trajectories[found.failure_test], spec.epsilon, spec.similarity)
+    return replace(found, judged=rejudged(file, state, (f,)), wall_limit=before.wall_limit)
 
 
 def fix_failure(

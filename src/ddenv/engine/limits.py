@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
+from ddenv.evidence.ends import ends_of, groups_of, joining, of_baseline, one_place
 from ddenv.runfile import events
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runfile.store import Live
@@ -37,6 +38,8 @@ SLOW = 1.0
 KNOWN_AFTER = 10.0
 # Where f shows in less than this share of the baseline, the failing runs themselves can be reduced at much lower cost.
 RARE = 0.7
+# Below this rate a certificate takes thousands of runs, so the user is asked first.
+VERY_RARE = 0.05
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
 # So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
@@ -87,8 +90,15 @@ def check_crash_loop(journal: Journal) -> None:
 def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal) -> None:
     """Notes what the files alone show of the start, before the first test."""
     if journal.state.baseline is None:
-        for about, words in notes_on_start(world, robot, scenario.robot.spawn, (scenario.goal.x, scenario.goal.y)):
+        spawn, goal, epsilon = scenario.robot.spawn, scenario.goal, scenario.failure.epsilon
+        for about, words in notes_on_start(world, robot, spawn, (goal.x, goal.y)):
             note(journal, about, words)
+        way = math.hypot(goal.x - spawn.x, goal.y - spawn.y)
+        if epsilon > way:
+            words = (
+                f"epsilon ({epsilon:g} m) is wider than the way to the goal ({way:.3g} m): every failure counts as f"
+            )
+            note(journal, "epsilon", words)
 
 
 def note(journal: Journal, about: str, words: str) -> None:
@@ -97,12 +107,40 @@ def note(journal: Journal, about: str, words: str) -> None:
         journal.record(events.Noted(about, words))
 
 
-def note_rare(journal: Journal) -> None:
-    """Offers to reduce the failing runs themselves where f shows in few runs, with the costs of both ways."""
+def note_ends(journal: Journal) -> bool:
+    """Notes where the ends of the baseline are those of two failures, or scatter so much that f, the part of them within epsilon of
+    one, shows in less than half of the runs that failed. Returns whether they scatter: nothing would be found for such an f.
+    """
+    state = journal.state
+    epsilon = float(str(read(state.scenario, SETTINGS["epsilon"])))
+    tests = of_baseline(state)
+    similar = ends_of(tests, "similar")
+    failed = ends_of(tests, "similar", "other")
+    if (groups := groups_of(similar, epsilon)) is not None:
+        sizes = ", ".join(str(len(group)) for group in groups.groups)
+        words = {2: "two"}.get(len(groups.groups), str(len(groups.groups)))
+        note(
+            journal,
+            "two failures",
+            f"the ends of f form {words} groups {groups.apart:.2g} m apart ({sizes} runs): these may be different failures; "
+            f"--epsilon {groups.epsilon:g} tells them apart",
+        )
+    reach = one_place(failed, epsilon)
+    if reach is None or 2 * len(similar) >= len(failed):
+        return False
+    near = f"all {len(failed)} runs that failed ended within {reach:.2g} m of one place"
+    note(journal, "scatter", f"{near}: --epsilon {joining(reach):g} makes them one failure")
+    return True
+
+
+def note_rare(journal: Journal) -> bool:
+    """Offers to reduce the failing runs themselves where f shows in few runs, with the costs of both ways. Returns whether f is so
+    rare that the user should choose.
+    """
     state, base = journal.state, journal.state.baseline
     asked = Reduction.model_validate(state.scenario["reduction"])
-    if base is None or base.rate >= RARE or asked.accept_rate != "kept":
-        return
+    if base is None or base.rate >= RARE or asked.accept_rate != "kept" or "scatter" in dict(state.notes):
+        return False
     ways = asked, asked.model_copy(update={"accept_rate": "exact"})
     tests = (rough_run(len(state.elements), way, base.rate).tests for way in ways)
     kept, exact = (between(low, high) for low, _, high in tests)
@@ -110,6 +148,7 @@ def note_rare(journal: Journal) -> None:
         f"f shows in {base.failures} of {count(base.runs, 'run')}: keeping its rate takes about {kept} tests; reducing "
     )
     note(journal, "rare", f"{words}the failing runs themselves takes about {exact} (accept_rate exact, --exact)")
+    return base.rate < VERY_RARE
 
 
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:

@@ -98,7 +98,7 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
 class _Search:
     def __init__(self, parts: Parts, journal: Journal, pool: Workers, control: Control) -> None:
         self._parts, self._journal, self._pool, self._control = parts, journal, pool, control
-        self._failures = failures_of(journal.file, journal.state, parts[0].failure)
+        self._failures = failures_of(journal.file, journal.state)
         self._running: dict[int, Wanted] = {}
         self._kept = frozenset(journal.state.environments[self._now.asked.environment].names(journal.state.elements))
         self._submitted, self._broken = len(journal.state.tests), 0

@@ -96,7 +96,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     failures: tuple[Failure, ...] = ()
     if subject.run is not None and subject.state is not None:
         with RunFile(subject.run) as file:
-            failures = failures_of(file, subject.state, subject.scenario.failure)
+            failures = failures_of(file, subject.state)
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
     started = shown = 0

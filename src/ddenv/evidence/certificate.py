@@ -20,7 +20,7 @@ from functools import lru_cache
 from typing import Literal
 
 from ddenv.environment import Environment
-from ddenv.evidence.rates import HIGHEST_RATE, Shown, wilson_interval
+from ddenv.evidence.rates import HIGHEST_RATE, Shown, iterations_needed, wilson_interval
 
 Verdict = Literal[
     "", "kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "passes", "fails", "not shown", "unknown"
@@ -50,6 +50,8 @@ MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
 HELPS_AFTER, HELPS_SHARE, NEARLY = 60, 0.75, 0.2
 # If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
 ABOUT_AS_OFTEN = 0.9
+# Where f shows no more at all, a certificate ends after so many pairs; after more if f is rare, so that some would surely show it.
+VAIN, SURELY = 30, 0.999
 # Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
 RUNS_BESIDE = 20
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
@@ -67,7 +69,7 @@ class Terms:
 
     `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn. `at_once`: the runs of
     a pair are made one right after the other, and none is part of two pairs: without seeds all rates may change in the course of
-    time.
+    time. After `vain` pairs, none of which showed f at all, it ends.
     """
 
     certify_rate: float
@@ -76,6 +78,7 @@ class Terms:
     at_least: int = 1
     first_rate: float | None = None
     at_once: bool = False
+    vain: int = MOST_PAIRS
 
     @property
     def in_turn(self) -> float:
@@ -85,6 +88,11 @@ class Terms:
     def error_of_models(self, kept: float | None) -> float:
         """The chance of error of a claim about a model where so much of the rate is shown to be kept."""
         return self.error * (IN_TURN if kept is not None and kept >= self.in_turn else 1.0 - IN_TURN)
+
+
+def vain_after(rate: float) -> int:
+    """After how many runs without f a failure that showed at this rate does not show any more."""
+    return min(MOST_PAIRS, max(VAIN, 1 + iterations_needed(max(rate, 1e-6), SURELY)))
 
 
 def error_of(number: int) -> float:
@@ -226,11 +234,7 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     `REFUTED`.
     """
     if left == whole:
-        # It keeps its own rate, if f shows in it at all.
-        shown = 0
-        for run in range(max(1, terms.at_least)):
-            shown += (yield Wanted(((whole, run),), (whole,)))[0] is True
-        return ("kept", 1.0) if shown else ("not shown", None)
+        return (yield from _shows(whole, terms))
     # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
     assumed, sound, bound, run = Pairs(), Pairs(), 0.0, 0
     # The seeds with which only what is left has run, and showed f.
@@ -264,7 +268,19 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
             return "kept", bound
         if sound.below(terms.keep_rate) >= REFUTED:
             return "lost", bound
+        # What broke may have been f.
+        if run >= terms.vain and assumed.both + assumed.first + assumed.second == 0:
+            break
     return "not shown", bound
+
+
+def _shows(whole: Environment, terms: Terms) -> Procedure:
+    """The whole world keeps its own rate, if f shows in it at all."""
+    shown = run = 0
+    while run < max(1, terms.at_least) or (not shown and run < terms.vain < MOST_PAIRS):
+        shown += (yield Wanted(((whole, run),), (whole,)))[0] is True
+        run += 1
+    return ("kept", 1.0) if shown else ("not shown", None)
 
 
 def falls(

@@ -18,6 +18,7 @@ from ddenv.evidence.certificate import (
     keeps,
     often,
     settle,
+    vain_after,
 )
 from ddenv.evidence.certificate import Claim as Settled
 from ddenv.evidence.rates import Shown, anytime_interval, wilson_interval
@@ -33,10 +34,10 @@ PAIRS_THAT_SHOW = 10
 
 
 def is_minimal(certificate: Certificate) -> bool:
-    """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
+    """Whether a certificate shows that what is left keeps the rate of the same failure, and that each model in it is needed."""
     claims = certificate.claims
     kept = bool(claims) and (claims[0].verdict == "kept" or bool(certificate.seeds))
-    return kept and all(claim.verdict == "needed" for claim in claims[1:])
+    return kept and certificate.elsewhere is None and all(claim.verdict == "needed" for claim in claims[1:])
 
 
 def helping(certificate: Certificate) -> tuple[str, ...]:
@@ -59,7 +60,12 @@ def terms_of(state: RunState, certificate: Certificate) -> Terms:
     """The terms of a certificate of a run, which may go on with the runs of an earlier one."""
     first = next(one for one in state.certificates if one.first_run == certificate.first_run)
     return Terms(
-        certificate.certify_rate, certificate.keep_rate, certificate.error, certificate.at_least, first.certify_rate
+        certify_rate=certificate.certify_rate,
+        keep_rate=certificate.keep_rate,
+        error=certificate.error,
+        at_least=certificate.at_least,
+        first_rate=first.certify_rate,
+        vain=vain_after(certificate.rate),
     )
 
 

@@ -235,7 +235,9 @@ class GoBack(Asked):
 
 
 class Change(Asked):
-    """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
+    """Go on with other settings; all names are in `CHANGEABLE`. With another epsilon all ends are judged again, and a new search
+    begins from the whole world.
+    """
 
     settings: dict[str, Any]
 
@@ -253,7 +255,8 @@ class Change(Asked):
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
         words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
-        then = f". {new_search(state)}" if self.begins_anew(state) else ""
+        size = len(state.elements) if "epsilon" in self.new(state) else None
+        then = f". {new_search(state, size)}" if self.begins_anew(state) else ""
         return Words("change settings", f"from now on: {words}{then}")
 
     def begins_anew(self, state: RunState) -> bool:
@@ -271,23 +274,26 @@ CHANGEABLE = {one.name: one for one in SETTINGS.values() if one.may_change}
 ONLY_CHANGEABLE = f"only {', '.join(CHANGEABLE)} can be changed during a run"
 
 
-def typed(name: str, text: str) -> int | str | None:
+def typed(name: str, text: str) -> int | float | str | None:
     """The value that was typed or chosen; None for no limit. Raises UserError."""
     if CHANGEABLE[name].choices:
         return text
     if not text.strip() and CHANGEABLE[name].none:
         return None
+    kind = CHANGEABLE[name].kind
     try:
-        return int(text.strip())
+        number: int | float = kind(text.strip())
     except ValueError:
-        raise UserError(f"{name}: expected a whole number, found '{text[:20]}'") from None
+        expected = "a whole number" if kind is int else "a number"
+        raise UserError(f"{name}: expected {expected}, found '{text[:20]}'") from None
+    return number
 
 
 def _wrong(name: str, value: Any) -> str:
     """Why the setting cannot have a value, or ""."""
     one = CHANGEABLE[name]
     if not one.allows(value):
-        expected = one.range if one.kind is int else " or ".join(one.choices) or "a name"
+        expected = one.range if one.kind in (int, float) else " or ".join(one.choices) or "a name"
         return f"{name}: expected {expected}, found {printable(str(value)[:20])}"
     try:
         if name == "pair":

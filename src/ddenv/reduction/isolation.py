@@ -52,6 +52,10 @@ class Passing:
         """The runs are those of the search, from its first one."""
         return place
 
+    def passes_over(self, broken: int, runs: int) -> bool:
+        """A world in which a run broke is not called one that passes."""
+        return False
+
     def verdict(self, shown: int, missed: int) -> Verdict:
         """Of a world in which `shown` runs reached the goal and `missed` did not: "similar" if it passes; "" while it is open."""
         passes = leans_to(shown, missed, self.wanted, self.rather_than, self.error)
@@ -69,6 +73,10 @@ class Each:
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""
         return self.exact[place]
+
+    def passes_over(self, broken: int, runs: int) -> bool:
+        """As `Passing.passes_over`."""
+        return False
 
     def verdict(self, shown: int, missed: int) -> Verdict:
         """As `Passing.verdict`."""

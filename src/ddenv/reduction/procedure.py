@@ -301,8 +301,9 @@ def judge(
                     driver.judged(judged, environment, "missed", 0)
             else:
                 # By these runs alone: more of them may have ended.
-                runs, hits = decided_by(driver.shown, environment, rule)
-                missed = verdict == "dissimilar" and usual is not None and not usual.verdict(hits, runs - hits)
+                runs, hits, broken = decided_by(driver.shown, environment, rule)
+                misses = runs - hits - broken
+                missed = verdict == "dissimilar" and usual is not None and not usual.verdict(hits, misses)
                 driver.judged(judged, environment, "missed" if missed else verdict, runs)
             if verdict == "similar":
                 return judged
@@ -328,7 +329,8 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
-            return claim.claim.verdict == "lost"
+            fresh = (driver.shown(left, certificate.first_run + run, full=True) for run in claim.runs)
+            return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in fresh)
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
     # Models are taken to be in turn, until the rate turns out not to be kept.

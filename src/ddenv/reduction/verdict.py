@@ -18,6 +18,8 @@ FEWEST_SHOWN, LONGEST_BASELINE = 3, 60
 FEW_MISSED = 0.02
 # After this many runs the likelier side counts.
 MOST_RUNS = 40
+# A run that broke is passed over while no more than one in so many runs of its candidate broke.
+BREAKS_RARELY = 4
 
 
 class Rule(Protocol):
@@ -29,6 +31,9 @@ class Rule(Protocol):
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""
 
+    def passes_over(self, broken: int, runs: int) -> bool:
+        """Whether a candidate stays open after `broken` of its first `runs` runs broke; else it is unknown."""
+
 
 @dataclass(frozen=True)
 class Acceptance:
@@ -37,7 +42,8 @@ class Acceptance:
     With `rate` 0 the first run with f makes it similar, as in the paper. Otherwise `rate` is the estimated rate of f in the
     whole world, and Bayes decides between three rates of the candidate: that one, one clearly below `keep_rate` of it, and
     `SPURIOUS`; stricter after each of `steps_back`. It bounds no error by itself, the certificate does. With `exact` the runs of
-    these numbers decide, and no others.
+    these numbers decide, and no others. Else the runs `broke`, ascending, are left out: they broke in the whole world, so they
+    would leave each candidate unknown. The certificate counts such runs against its claims.
     """
 
     most_misses: int
@@ -45,10 +51,19 @@ class Acceptance:
     keep_rate: float = 0.8
     steps_back: int = 0
     exact: tuple[int, ...] = ()
+    broke: tuple[int, ...] = ()
 
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""
-        return self.exact[place] if self.exact else place
+        if self.exact:
+            return self.exact[place]
+        for broken in self.broke:
+            place += broken <= place
+        return place
+
+    def passes_over(self, broken: int, runs: int) -> bool:
+        """Few broken runs stop no search: the certificate counts such runs against its claims. None of the exact runs may miss."""
+        return not self.exact and BREAKS_RARELY * broken <= runs
 
     def verdict(self, shown: int, missed: int) -> Verdict:
         """The verdict after `shown` runs with f and `missed` without it, if no fewer of them decided; "" while it is open."""
@@ -103,13 +118,13 @@ def standing(
     tests still needed, as (candidate, run), in the order in which a single worker would make them if none showed f.
 
     `shown(candidate, run)` returns whether a finished run showed f. The rule decides from the runs of a candidate, in their order;
-    a broken run makes it unknown. `refused` candidates count as dissimilar. `candidates` begin with number `first`. They are
+    where too many broke it is unknown. `refused` candidates count as dissimilar. `candidates` begin with number `first`. They are
     looked at up to the first one that is sure to be similar, since no later one is worth a test, or until there are `enough` tests.
     """
     verdicts: list[Verdict] = []
     wanted: list[tuple[int, int]] = []
     for index, candidate in enumerate(candidates, first):
-        verdict, missing, _, _ = ("dissimilar", [], 0, 0) if refused(candidate) else _row(shown, candidate, rule)
+        verdict, missing, *_ = ("dissimilar", [], 0, 0, 0) if refused(candidate) else _row(shown, candidate, rule)
         verdicts.append("" if missing else verdict)
         wanted += [(index, run) for run in missing]
         if verdict == "similar" or (enough is not None and len(wanted) >= enough):
@@ -119,24 +134,26 @@ def standing(
 
 def _row(
     shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule
-) -> tuple[Verdict, list[int], int, int]:
-    """The verdict if no missing run shows f, the missing runs up to there, and how many runs decided and how many showed f.
+) -> tuple[Verdict, list[int], int, int, int]:
+    """The verdict if no missing run shows f, the missing runs up to there, how many runs decided, how many of them showed f, and
+    how many broke.
 
     A later run that showed f decides nothing while an earlier one is open: else the verdict would depend on timing.
     """
     missing: list[int] = []
-    runs = hits = 0
-    while not (verdict := rule.verdict(hits, runs - hits)):
+    runs = hits = broken = 0
+    while not (verdict := rule.verdict(hits, runs - hits - broken)):
         known = shown(candidate, rule.run(runs))
         if known is None:
             missing.append(rule.run(runs))
         runs += 1
-        if known == "broken":
-            return "unknown", missing, runs, hits
+        broken += known == "broken"
+        if known == "broken" and not rule.passes_over(broken, runs):
+            return "unknown", missing, runs, hits, broken
         hits += known is True
-    return verdict, missing, runs, hits
+    return verdict, missing, runs, hits, broken
 
 
-def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[int, int]:
-    """How many runs of a candidate decided its verdict, and how many of them showed f; all of them are finished."""
+def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[int, int, int]:
+    """How many runs of a candidate decided its verdict, how many of them showed f, and how many broke; all of them are finished."""
     return _row(shown, candidate, rule)[2:]

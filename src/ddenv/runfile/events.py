@@ -400,11 +400,26 @@ class ClaimMade:
     bound: Share | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class EndsElsewhere:
+    """Of the ends of f, `whole` of `of_whole` in the baseline are in a group, and `left` of `of_left` fresh ones of what is left.
+    Other groups are `apart` from it, m; an `epsilon` that tells them apart, m.
+    """
+
+    apart: Positive
+    epsilon: Positive
+    whole: Natural
+    of_whole: Natural
+    left: Natural
+    of_left: Natural
+
+
 class CertificateFinished(Event):
-    """What fresh runs show; the claims rest on these tests."""
+    """What fresh runs show; the claims rest on these tests. `elsewhere`: what is left shows another failure within epsilon."""
 
     claims: tuple[ClaimMade, ...]
     tests: tuple[Number, ...]
+    elsewhere: EndsElsewhere | None = None
 
 
 class RateLost(Event):
@@ -628,9 +643,10 @@ class WentBack(Event):
 
 
 class Changed(Event):
-    """New values of keys in the scenario's section `reduction`."""
+    """New values of settings. Where they say anew which failures are the same, `baseline` is fixed again, and judges all tests."""
 
     settings: dict[str, Any]
+    baseline: BaselineFinished | None = None
 
 
 class CommandRefused(Event):

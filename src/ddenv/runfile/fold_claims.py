@@ -36,7 +36,7 @@ def certificate_finished(state: RunState, event: e.CertificateFinished, _: float
             raise ValueError(made)
         special = {"without": _name(state, made.without), "outcomes": tuple(made.outcomes.items())}
         claims.append(Claim(**shared(made, Claim) | special))
-    last = replace(state.certificates[-1], claims=tuple(claims))
+    last = replace(state.certificates[-1], claims=tuple(claims), elsewhere=event.elsewhere)
     unknown = any(claim.verdict == "unknown" for claim in claims)
     return {"certificates": (*state.certificates[:-1], last), "left_unknown": state.left_unknown or unknown}
 

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import Environment
-from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
+from ddenv.runfile.fold_tests import (
+    Changes,
+    baseline_finished,
+    counted_again,
+    same_runs,
+    seen,
+    with_node,
+    with_outcomes,
+    with_trial,
+)
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
+from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, RunState, Test, Trial
+from ddenv.settings import SETTINGS, read
 from ddenv.text import count, first_of, plain, truncated
 
 if TYPE_CHECKING:
@@ -120,14 +130,44 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
 
 
 def changed(state: RunState, event: e.Changed, at: float) -> Changes:
-    before = dict(state.scenario["reduction"])
-    said = {key: [before.get(key), value] for key, value in event.settings.items()}
+    said = {key: [read(state.scenario, SETTINGS[key]), value] for key, value in event.settings.items()}
     limits = {key: ["no limit" if one is None else one for one in both] for key, both in said.items()}
     words = ", ".join(f"{key} from {old} to {new}" for key, (old, new) in limits.items())
-    scenario = {**state.scenario, "reduction": before | event.settings}
+    changes: Changes = {"scenario": with_settings(state.scenario, event.settings)}
+    changes |= decision(state, at, "change", f"changed {words}")
+    if event.baseline is not None:
+        return changes | _judged_anew(state, event.baseline, at)
     # The budget does not affect the search.
-    anew = {} if set(event.settings) == {"budget"} else searched_anew(state)
-    return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
+    return changes if set(event.settings) == {"budget"} else changes | searched_anew(state)
+
+
+def with_settings(scenario: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """A scenario as plain data with new values of settings. Raises KeyError for a setting that there is not."""
+    sections = {SETTINGS[name].section for name in new}
+    return scenario | {
+        section: scenario[section] | {name: one for name, one in new.items() if SETTINGS[name].section == section}
+        for section in sections
+    }
+
+
+def _judged_anew(state: RunState, baseline: e.BaselineFinished, at: float) -> Changes:
+    """Other runs show f now, so the search begins from the whole world again; tests keep their ends."""
+    state = state.changed(**left_round(state))
+    state = state.changed(**baseline_finished(state, baseline, at))
+    nodes = counted_again(state.nodes, state.tests)
+    return {
+        **{
+            name: getattr(state, name)
+            for name in ("tests", "tally", "baseline", "certificates", "isolations", "margins")
+        },
+        **{name: getattr(state, name) for name in ("round", "status", "waiting_candidate", "confirming", "failures")},
+        **at_node(state, nodes[0]),
+        "nodes": nodes,
+        "search_due": True,
+        "lost": (),
+        "steps_back": 0,
+        "again": (),
+    }
 
 
 def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
@@ -224,6 +264,15 @@ def exact_runs(state: RunState) -> tuple[int, ...]:
         return ()
     tests = (test for test in rested_on(state) if test.environment == whole and test.outcome == "similar")
     return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
+
+
+def broken_runs(state: RunState) -> tuple[int, ...]:
+    """The runs of the baseline that broke each time, ascending."""
+    runs: dict[int, bool] = {}
+    for test in state.tests:
+        if test.phase == "baseline" and test.is_finished:
+            runs[test.run] = runs.get(test.run, True) and test.outcome in BROKEN
+    return tuple(sorted(run for run, broke in runs.items() if broke))
 
 
 def rested_on(state: RunState) -> tuple[Test, ...]:

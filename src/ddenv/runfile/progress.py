@@ -110,6 +110,7 @@ class Certificate:
     """What fresh runs show of the environment of `node`; number 1 is the run's first certificate. Its terms are those of
     `CertificateStarted`, and `first_run` is the number of its first run. `claims` are empty while its tests are made. `past`: a
     search began since. `branch`: f is another failure there, so the rate where that branch begins stands for the whole world's.
+    `elsewhere`: its runs end elsewhere than f, within epsilon.
     """
 
     number: int
@@ -124,6 +125,7 @@ class Certificate:
     past: bool = False
     branch: bool = False
     seeds: tuple[int, ...] = ()
+    elsewhere: e.EndsElsewhere | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from ddenv.runs.folder import named
 from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
-from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
+from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
 from ddenv.text import first_of, shortened
 from ddenv.world.access import MissingFiles, is_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
@@ -244,7 +244,10 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
 
 def read_subject(file: RunFile) -> Subject:
     """The scenario, world and robot of a run, and its state. Raises UserError."""
-    return Subject(*read_parts(file), file.path, fold(file.events()))
+    scenario, world, robot = read_parts(file)
+    state = fold(file.events())
+    failure = scenario.failure.model_copy(update={"epsilon": read(state.scenario, SETTINGS["epsilon"])})
+    return Subject(scenario.model_copy(update={"failure": failure}), world, robot, file.path, state)
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:

@@ -18,6 +18,7 @@ from ddenv.evidence.claims import (
     so_far,
 )
 from ddenv.runfile.deeds import deed
+from ddenv.runfile.events import EndsElsewhere
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState
@@ -43,6 +44,8 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         shown = f"; it keeps at least {percent_at_least(left.bound)}" if left.bound else ""
         return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
     verdicts = {str(claim.without): claim.verdict for claim in removals}
+    if certificate.elsewhere is not None:
+        return f"{_elsewhere(certificate.elsewhere)}; with everything that is left {rate(left)}"
     if doubt := _doubt(verdicts, "not shown that each model is needed", "not minimal: f seems to show", "without"):
         return f"{doubt}; with everything that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
@@ -62,6 +65,21 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     )
     often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
+
+
+def no_more(state: RunState) -> str:
+    """That f has stopped to show: "f does not repeat: it showed only in the first 3 runs"."""
+    last = max((test.id for test in state.tests if test.outcome == "similar"), default=0)
+    return f"f does not repeat: it showed only in the first {count(last, 'run')}"
+
+
+def _elsewhere(ends: EndsElsewhere) -> str:
+    """Which other failure took the place of f."""
+    return (
+        f"another failure within epsilon took the place of f: {ends.whole} of {ends.of_whole} runs of the whole world with f "
+        f"ended together, {ends.left} of {ends.of_left} fresh runs of what is left did there, and others "
+        f"{ends.apart:.2g} m away; --epsilon {ends.epsilon:g} tells them apart"
+    )
 
 
 def _doubt(verdicts: Mapping[str, str], unsure: str, refuted: str, how: str) -> str:

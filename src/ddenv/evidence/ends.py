@@ -1,0 +1,108 @@
+"""Where runs that failed ended: whether their ends form groups, scatter around one place, or lie elsewhere than other ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from ddenv.runfile.events import EndsElsewhere, Place
+from ddenv.runfile.state import RunState, Test
+
+# Groups of ends are so many times farther apart than each is wide: a cloud of ends hardly ever falls apart like that by chance.
+APART = 3.0
+# Nearer than this part of epsilon, groups are noise.
+NEAR = 0.25
+# With fewer ends nothing is said; more of them take too long. Of fewer than `FEW` ends nobody knows how wide their group is.
+FEWEST, MOST, FEW = 5, 100, 2
+# Ends farther than so many epsilons from each of them are not those of one failure.
+ONE_PLACE = 4.0
+# The chance that ends from one distribution are said to lie elsewhere.
+ERROR = 0.05
+
+
+def ends_of(tests: Iterable[Test], *outcomes: str) -> list[Place]:
+    """Where those of some tests with one of these outcomes ended, in their order."""
+    poses = (test.end_pose for test in tests if test.outcome in outcomes)
+    return [(pose[0], pose[1], pose[2]) for pose in poses if pose is not None]
+
+
+def of_baseline(state: RunState) -> list[Test]:
+    """The runs of the baseline."""
+    return [test for test in state.tests if test.phase == "baseline"]
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Ends in groups, by their places in a list, the largest group first; no two groups are nearer than `apart`, m."""
+
+    groups: tuple[tuple[int, ...], ...]
+    apart: float
+
+    @property
+    def epsilon(self) -> float:
+        """It tells these groups apart, m."""
+        return float(f"{self.apart / 2:.2g}")
+
+
+def groups_of(ends: Sequence[Place], epsilon: float) -> Groups | None:
+    """The coarsest groups of ends (m) that are far apart; None if the ends form a single one."""
+    ends = ends[:MOST]
+    if len(ends) < FEWEST:
+        return None
+
+    def distance(pair: tuple[int, int]) -> float:
+        return math.dist(ends[pair[0]], ends[pair[1]])
+
+    found = None
+    groups: dict[int, tuple[int, ...]] = {one: (one,) for one in range(len(ends))}
+    # The nearest two groups are joined, until there is one.
+    for pair in sorted(combinations(range(len(ends)), 2), key=distance):
+        joined = groups[pair[0]] + groups[pair[1]]
+        if groups[pair[0]] is groups[pair[1]]:
+            continue
+        apart = distance(pair)
+        large = [group for group in set(groups.values()) if len(group) >= FEW]
+        if len(large) > 1 and apart >= NEAR * epsilon:
+            widest = max(distance(inside) for group in large for inside in combinations(group, 2))
+            if apart >= APART * widest:
+                large.sort(key=lambda group: (-len(group), group))
+                found = Groups(tuple(large), apart)
+        groups |= dict.fromkeys(joined, joined)
+    return found
+
+
+def one_place(ends: Sequence[Place], epsilon: float) -> float | None:
+    """How far the others are from one of these ends at most, m, where they scatter around it by more than epsilon."""
+    ends = ends[:MOST]
+    if len(ends) < FEWEST or groups_of(ends, epsilon):
+        return None
+    reach = min(max(math.dist(end, centre) for end in ends) for centre in ends)
+    return reach if epsilon < reach <= ONE_PLACE * epsilon else None
+
+
+def joining(reach: float) -> float:
+    """An epsilon that joins ends which scatter by so much, m: a little more, since other runs may end a little farther off."""
+    more = 1.1 * reach
+    step = 10.0 ** -max(1, -math.floor(math.log10(more)))
+    return float(f"{math.ceil(more / step - 1e-9) * step:.3g}")
+
+
+def elsewhere(whole: Sequence[Place], left: Sequence[Place], epsilon: float) -> EndsElsewhere | None:
+    """Where the runs of the whole world often ended with f, and those of what is left hardly do; None if there is no such place.
+
+    For each group of all these ends the exact test of Fisher compares how many of both are in it.
+    """
+    whole, left = whole[: MOST // 2], left[: MOST // 2]
+    found = groups_of((*whole, *left), epsilon)
+    if found is None:
+        return None
+    for group in found.groups:
+        there = sum(one < len(whole) for one in group)
+        here = len(group) - there
+        # By chance no more than `here` of the ends in this group would be of what is left.
+        ways = sum(math.comb(len(left), one) * math.comb(len(whole), len(group) - one) for one in range(here + 1))
+        if ways / math.comb(len(whole) + len(left), len(group)) <= ERROR / len(found.groups):
+            return EndsElsewhere(found.apart, found.epsilon, there, len(whole), here, len(left))
+    return None

@@ -1,0 +1,162 @@
+"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, and another epsilon midway."""
+
+import pytest
+
+from ddenv.engine.control import Stopped
+from ddenv.engine.driver import Driver
+from ddenv.errors import UserError
+from ddenv.evidence.claims import is_minimal
+from ddenv.runfile.store import RunFile
+from ddenv.runs.subject import read_subject
+from ddenv.words.claims import verdict_on
+from ddenv.world.scenario import Oracle
+from tests.engine.fake import FakePool, drive, engine, new_run
+from tests.engine.guided import Guided, until
+from tests.engine.oracles import needs
+from tests.engine.reading import state_of
+
+
+def two(keep, seed):
+    """The wall stops most runs; else the beam stops the robot a little farther."""
+    return "similar" if ("wall" in keep and seed % 10 < 6) or "beam" in keep else "pass"
+
+
+def where(keep, seed):
+    return 0.0 if "wall" in keep and seed % 10 < 6 else 0.3
+
+
+def slipped(path, jobs=1):
+    pool = FakePool(two, jobs)
+    pool.shifted = where
+    return drive(path, pool)
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_other_unnoticed(tmp_path, jobs):
+    state = slipped(new_run(tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8), jobs)
+    assert dict(state.notes)["two failures"] == (
+        "the ends of f form two groups 0.3 m apart (6, 4 runs): these may be different failures; --epsilon 0.15 tells them apart"
+    )
+    assert state.environment == ("beam",)
+    certificate = state.certificate
+    runs = certificate.claims[0].shown
+    # However many work.
+    assert (certificate.elsewhere.whole, certificate.elsewhere.left, certificate.elsewhere.of_left) == (6, 0, runs)
+    assert not is_minimal(certificate)
+    assert not state.minimal
+    assert verdict_on(certificate).startswith(
+        f"another failure within epsilon took the place of f: 6 of 10 runs of the whole world with f ended together, 0 of {runs} "
+        "fresh runs of what is left did there, and others 0.3 m away; --epsilon 0.15 tells them apart; "
+    )
+
+
+def test_ends_that_scatter_stop_the_run_with_the_epsilon_that_joins_them(tmp_path):
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
+    pool = FakePool(lambda keep, _: "similar" if "wall" in keep else "pass", 1)
+    pool.shifted = lambda _, seed: 0.02 * (seed * 37 % 127)
+    with pytest.raises(Stopped, match="goes on with a wider epsilon"):
+        drive(path, pool)
+    state = state_of(path)
+    assert "--epsilon 1.4 makes them one failure" in dict(state.notes)["scatter"]
+    assert "rare" not in dict(state.notes)
+    assert {test.phase for test in state.tests} == {"baseline"}
+    # Who resumes it wants this one.
+    assert drive(path, pool).status == "finished"
+
+
+def warm(pool, shows=lambda made: made <= 10):
+    """An oracle of which the calls decide: it shows f in its first ones alone."""
+    return lambda keep, _: "similar" if shows(len(pool.made)) else "pass"
+
+
+def simulated_elsewhere(path, pool):
+    """To its end, where the simulator is not ddenv's own."""
+    with engine(path, pool) as one:
+        there = one.scenario.model_copy(update={"oracle": Oracle(command="true")})
+        Driver(there, *one[1:]).reduce()
+        return one.journal.state
+
+
+def test_a_failure_that_stops_to_show_ends_the_search_after_a_round_in_vain(tmp_path):
+    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(lambda *_: "", 1)
+    pool.oracle = warm(pool)
+    with pytest.raises(
+        UserError, match=r"f does not repeat: it showed only in the first 10 runs, and in none of 3 replays; does"
+    ):
+        simulated_elsewhere(path, pool)
+    assert len(pool.made) <= 30
+    # A failure that repeats is replayed once a round.
+    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(needs("wall", "ball", "deck"), 1)
+    state = simulated_elsewhere(path, pool)
+    assert state.environment == ("deck", "wall", "ball")
+    assert len(pool.made) - len(state.tests) <= state.rounds_done
+
+
+def test_a_certificate_ends_once_f_does_not_show_any_more(tmp_path):
+    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(lambda *_: "", 1)
+    pool.oracle = warm(pool)
+    state = drive(path, pool)
+    assert state.reason.startswith(
+        "f does not repeat: it showed only in the first 10 runs; not shown that what is left keeps "
+    )
+    assert [(claim.without, claim.shown, claim.runs) for claim in state.certificate.claims] == [(None, 0, 30)]
+
+
+def widened(tmp_path, before, epsilon, jobs=1, algorithm="ddenv"):
+    """A run whose epsilon the user changes at the end of round 2, and the runs that were made."""
+
+    def guide():
+        yield from until(lambda state: state.round is not None and state.round.number == 2)
+        yield "change", {"settings": {"epsilon": epsilon}}
+
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8, algorithm=algorithm)
+    with RunFile(path) as file:
+        assert read_subject(file).scenario.failure.epsilon == before
+    pool = Guided(path, two, guide(), jobs)
+    pool.shifted = where
+    return path, drive(path, pool), pool.made
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeated(tmp_path, monkeypatch, jobs):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+    path, state, made = widened(tmp_path, 0.4, 0.15, jobs)
+    # Now only the failure of the wall is f, and the beam's is another one.
+    assert (state.baseline.failures, state.baseline.runs, len(state.baseline.seen)) == (6, 10, 2)
+    assert state.environment == ("wall",)
+    assert state.certificate.elsewhere is None
+    assert {test.outcome for test in state.tests if abs(test.end_pose[0] - 2.3) < 0.01} == {"other"}
+    assert len(made) == len(set(made))
+    assert [decision.words for decision in state.decisions] == ["changed epsilon from 0.4 to 0.15"]
+    # All that is read from the file has it.
+    with RunFile(path) as file:
+        assert read_subject(file).scenario.failure.epsilon == 0.15
+    assert state_of(path).failures == state.failures
+
+
+def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+
+    def guide():
+        yield from until(lambda state: len(state.tests) == 3)
+        yield "change", {"settings": {"epsilon": 0.15}}
+
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
+    pool = Guided(path, two, guide())
+    pool.shifted = where
+    assert drive(path, pool).baseline.failures == 6
+
+
+def test_a_very_rare_failure_asks_how_to_go_on_and_can_be_reduced_exactly(tmp_path):
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=70)
+    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep and seed in (20, 30, 40) else "pass", 1)
+    with pytest.raises(
+        Stopped, match="f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces"
+    ):
+        drive(path, pool)
+    with RunFile(path) as file:
+        file.send("change", settings={"accept_rate": "exact"})
+    state = drive(path, pool)
+    assert state.environment == ("wall",)
+    assert state.certificate.seeds == (20, 30, 40)
+    assert sum(test.phase == "baseline" for test in state.tests) == 70
