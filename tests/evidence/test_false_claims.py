@@ -14,11 +14,16 @@ import pytest
 from scipy.stats import binomtest
 
 import ddenv
-from ddenv.environment import Environment
-from ddenv.evidence.certificate import ERROR, REFUTED, Terms, error_of, falls, keeps, settle
-from ddenv.evidence.rates import anytime_interval
+from ddenv.cli.test import elsewhere
+from ddenv.environment import NOTHING, Environment
+from ddenv.evidence.certificate import ERROR, HELPING, REFUTED, Terms, error_of, falls, keeps, settle
+from ddenv.evidence.margins import MOST_OF_NUMBER, Known, Rule, error_each, margin_of, wanted
+from ddenv.evidence.rates import anytime_interval, shows_at
+from ddenv.evidence.slices import fresh_chance
 from ddenv.reduction.isolation import Passing, passes
-from ddenv.reduction.procedure import procedure
+from ddenv.reduction.procedure import certify, procedure
+from ddenv.runfile.events import NumberAsked
+from ddenv.runfile.progress import Claim
 from ddenv.words.slices import _chance
 from tests.reduction import driving
 
@@ -266,3 +271,87 @@ def sentences(world, driver):
                     yield "first lost", not lost or rate < terms.keep_rate * world.rate
             elif left:
                 yield "bound", claim.bound >= rate / left
+
+
+TOO_RARE = {"hardly ever": World(0.05, 0.05, 0.0), "rare": World(0.3, 0.3, 0.21), "usual": World(0.9, 0.9, 0.72)}
+
+
+@pytest.mark.parametrize("world", TOO_RARE.values(), ids=TOO_RARE)
+def test_without_a_model_that_is_said_to_help_f_is_rarely_as_rare_as_without_a_needed_one(world):
+    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    check(claims.count("helps"), 1.0 / REFUTED)
+
+
+@pytest.mark.parametrize("share", [0.801, 0.82])
+def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_not(share):
+    """The runs choose of which of ten models "minimal but for" is said: the error is that of all of them."""
+    false = 0
+    for seed in range(SIMULATED):
+        ten = driving.World(
+            tuple(range(10)), NOTHING, Environment.whole(10), "ddenv", seed, 1.0, share, keeps_rate=False
+        )
+        driver = driving.Driver(ten)
+        made = driver.drive(certify(driver, driver.leg(), (ten.whole,)))
+        _, *verdicts = (named.claim.verdict for named in made.claims)
+        false += "needed" in verdicts and {*verdicts} <= {"needed", *HELPING}
+    check(false, error_of(1))
+
+
+@pytest.mark.parametrize(("rate", "without"), [(0.0, 0.0), (0.15, 0.15), (0.9, 0.73), (1.0, 0.805)])
+def test_a_model_is_rarely_needed_in_another_simulator_where_it_is_not(rate, without):
+    here, said = Claim(None, "kept", 29, 29, 0.88, 1.0), 0
+    for salt in range(SIMULATED):
+        draw = random.Random(salt)
+        results = [
+            {"without": name, "models": 2, "outcome": "similar" if draw.random() < one else "pass", "seed": seed}
+            for name, one in ((None, rate), ("crate", without))
+            for seed in range(40)
+        ]
+        said += "needed in MuJoCo, too" in elsewhere(results, here, "MuJoCo")[1]["said"]
+    check(said, ERROR)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.4])
+def test_what_still_fails_rarely_fails_at_half_the_rate_that_is_said(share):
+    low, said = 0.8, 0
+    for salt in range(SIMULATED):
+        draw = random.Random(salt)
+        said += shows_at((draw.random() < share * low for _ in range(60)), low) is True
+    check(said, 0.01)
+
+
+@pytest.mark.parametrize("rate", [1.0, 0.7])
+def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate):
+    """In a window of values alone, as wide as half of the range: beyond it f shows again."""
+    asked, false = NumberAsked("x", 0.5, 0.0, 1.0, 1.0, 0.01), 0
+    rule = Rule(rate, error_each(rate, MOST_OF_NUMBER))
+    for salt in range(SIMULATED // 3):
+        draw, outcomes = random.Random(salt), {}
+        first = draw.uniform(0.52, 0.9)
+        window = first, draw.uniform(first + 0.02, 1.0)
+        while asks := list(wanted(asked, rule, Known(outcomes, outcomes))):
+            for value, _ in asks:
+                goal, f = window[0] <= value < window[1], draw.random() < rate
+                outcomes.setdefault(value, []).append("pass" if goal else "similar" if f else "other")
+        false += margin_of(asked, rule, Known(outcomes, outcomes)).up.to_end
+    check(false, ERROR, SIMULATED // 3)
+
+
+# What a run meets beside five usual models: the chance, of how many groups of models one, and how many are in each.
+MEETS = {"a detour": (0.1, 1, 12), "one of many": (0.3, 300, 1), "another group": (0.2, 50, 10)}
+
+
+@pytest.mark.parametrize("world", MEETS.values(), ids=MEETS)
+def test_the_chance_that_a_run_meets_another_model_is_about_what_is_said(world):
+    chance, groups, size = world
+    said = true = 0.0
+    for salt in range(10 * SIMULATED):
+        draw, met, seen = random.Random(salt), [], set()
+        for _ in range(10):
+            group = draw.randrange(groups) if draw.random() < chance else None
+            others = () if group is None else range(5 + size * group, 5 + size * (group + 1))
+            met.append(Environment.of((*range(5), *others)))
+            seen |= {group} - {None}
+        said += fresh_chance(met)
+        true += chance * (groups - len(seen)) / groups
+    assert 0.8 * true - SIMULATED / 10 < said < 1.3 * true + SIMULATED / 10
