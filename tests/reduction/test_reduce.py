@@ -126,6 +126,28 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
         assert claim.low <= claim.shown / claim.runs <= claim.high
 
 
+def test_the_certificate_calls_each_world_once_in_a_block_and_draws_the_order():
+    """Six needed elements and a failure that always shows: 11 pairs for the rate, 7 for each element, 64 calls in all."""
+    needed, first = set("abcdef"), set()
+    for seed in range(8):
+        made = []
+        found = ddenv.reduce(
+            ELEMENTS, lambda kept, made=made: made.append(kept) or kept >= needed, iterations=3, seed=seed, **ALL
+        )
+        assert found.minimal
+        fresh = made[-found.certificate_tests :]
+        assert len(fresh) == 64
+        blocks = [[]]
+        for kept in fresh:
+            if kept in blocks[-1]:
+                blocks.append([])
+            blocks[-1].append(kept)
+        assert all(frozenset(needed) in block for block in blocks)
+        first.update(block[0] for block in blocks)
+        assert found == ddenv.reduce(ELEMENTS, needs(*needed), iterations=3, seed=seed, **ALL)
+    assert first == {frozenset(ELEMENTS), frozenset(needed), *(frozenset(needed - {name}) for name in needed)}
+
+
 @cache
 def stepping_back(salt):
     """A reduction that drifts: what is found, its rounds, and the environments to which it went back."""

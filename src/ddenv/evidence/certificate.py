@@ -62,9 +62,11 @@ class Terms:
     """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
     of all claims together, and the minimum number of runs of what is left.
 
-    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn. `at_once`: the runs of
-    a pair are made one right after the other, and none is part of two pairs: without seeds all rates may change in the course of
-    time.
+    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn.
+
+    With `order_seed` runs are made in blocks: one run of each environment with an open claim, in an
+    order that this seed draws. Without seeds runs only have in common when they are made, and rates
+    may change from one run to the next. After `most_tests` what is open is not shown.
     """
 
     certify_rate: float
@@ -72,7 +74,8 @@ class Terms:
     error: float
     at_least: int = 1
     first_rate: float | None = None
-    at_once: bool = False
+    order_seed: int | None = None
+    most_tests: int | None = None
 
     @property
     def in_turn(self) -> float:
@@ -235,7 +238,7 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     mine: Shown = True
     while run < MOST_PAIRS or hits:
         shows_often = run < ALONE_FIRST or assumed.both + assumed.first >= ALONE_SHARE * run
-        alone = shows_often and run < MOST_PAIRS and not terms.at_once
+        alone = shows_often and run < MOST_PAIRS and terms.order_seed is None
         theirs: Shown = None
         if hits and not alone:
             mine = True

@@ -12,14 +12,16 @@ what is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice, zip_longest
+from random import Random
 from typing import Protocol, TypeVar
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
-    MOST_PAIRS,
+    NEEDED_SHARE,
     Claim,
     Procedure,
     Settling,
@@ -37,6 +39,8 @@ from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
 # rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
 MOST_STEPS_BACK = 5
+# In blocks, claims about models begin once so much of the rate is shown to be kept: where f always shows, after 4 of 11 pairs.
+LOOKS_KEPT_BOUND = 1 / 3
 
 Result = TypeVar("Result", covariant=True)
 
@@ -322,18 +326,21 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
 
     def claims(error: float) -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
-        for number, (model, rest) in enumerate(() if certificate.exact else rests.items(), 1):
-            yield model, rest, falls(rest, left, error, first=number * MOST_PAIRS if terms.at_once else 0)
+        for model, rest in () if certificate.exact else rests.items():
+            yield model, rest, falls(rest, left, error)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
             return claim.claim.verdict == "lost"
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
-    # Models are taken to be in turn, until the rate turns out not to be kept.
-    made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
-    if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
-        made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
+    if terms.order_seed is not None:
+        made = yield from _settled_in_blocks(driver, certificate, left, whole, rests, ends)
+    else:
+        # Models are taken to be in turn, until the rate turns out not to be kept.
+        made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
+        if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
+            made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
     if certificate.exact:
         # The search has made these runs.
         for model, rest in rests.items():
@@ -381,6 +388,68 @@ def settled(
         if not wants:
             return tuple(named)
         yield tuple(wants)
+
+
+def _settled_in_blocks(
+    driver: Driver,
+    certificate: Certificate,
+    left: Environment,
+    whole: Environment,
+    rests: Mapping[int, Environment],
+    ends: Callable[[NamedClaim], bool],
+) -> Work[tuple[NamedClaim, ...]]:
+    """The claims of a certificate without seeds, up to one that `ends` them. One run of `left` serves all claims of its block.
+
+    Models have their turn once it looks as if `left` kept the rate: until then their runs may be for nothing.
+    """
+    first_run, terms = certificate.first_run, certificate.terms
+
+    def fresh(environment: Environment, run: int) -> Shown:
+        return driver.shown(environment, first_run + run, full=True)
+
+    def in_drawn_order(test: tuple[Environment, int]) -> float:
+        return Random(f"{terms.order_seed} {test[1]} {test[0].bits}").random()
+
+    without = {rest: model for model, rest in rests.items()}
+    kept = Settling(keeps(left, whole, terms))
+    models: dict[int, Settling] = {}
+    error = terms.error_of_models(1.0)
+    made = 0
+    # The last one that has begun.
+    block = -1
+    while True:
+        named = [NamedClaim(None, left, kept.claim(fresh))]
+        named += [NamedClaim(model, rests[model], one.claim(fresh)) for model, one in models.items()]
+        of_left = named[0].claim
+        ended = next(filter(ends, named), None)
+        if of_left.verdict and ended is not None:
+            return tuple(dict.fromkeys((named[0], ended)))
+        if made == terms.most_tests:
+            return tuple(replace(one, claim=_given_up(one.claim)) for one in named)
+        if of_left.verdict and terms.error_of_models(of_left.bound) < error:
+            # They were taken to be in turn.
+            error = terms.error_of_models(of_left.bound)
+            models = {}
+        if rests and not models and (of_left.verdict or _looks_kept(of_left, left, fresh)):
+            models = {model: Settling(falls(rest, left, error, first=block + 1)) for model, rest in rests.items()}
+            continue
+        wanted = {test for one in named for test in one.claim.wanted}
+        if not wanted:
+            return tuple(named)
+        block = min(run for _, run in wanted)
+        order = sorted((test for test in wanted if test[1] == block), key=in_drawn_order)
+        made += 1
+        yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+
+
+def _looks_kept(claim: Claim, left: Environment, fresh: Callable[[Environment, int], Shown]) -> bool:
+    """Whether what is left seems to keep the rate that the search aims at, and is shown to keep a part of it."""
+    shown = Counter(environment == left for environment, run in claim.rests_on if fresh(environment, run) is True)
+    return (claim.bound or 0.0) >= LOOKS_KEPT_BOUND and shown[True] >= NEEDED_SHARE * shown[False]
+
+
+def _given_up(claim: Claim) -> Claim:
+    return claim if claim.verdict else replace(claim, verdict="not shown")
 
 
 def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified) -> Work[Leg | None]:

@@ -180,7 +180,7 @@ def reduce(
 
     keeps_rate = accept_rate == "kept"
     kept = keep_rate if keeps_rate else 0.0
-    caller = _Caller(names, test, begin, kept, certify_rate, iterations, baseline_runs, on_round)
+    caller = _Caller(names, test, begin, kept, certify_rate, iterations, baseline_runs, on_round, int(seed))
     # A missing argument is reported before the first test.
     next(begin(caller.next_leg()), None)
     if keeps_rate:
@@ -211,6 +211,7 @@ class _Caller:
     iterations: int
     baseline_runs: int
     on_round: Callable[[NamedRound], None] | None
+    seed: int
     rounds: int = 0
     claims: tuple[RateClaim, ...] = ()
     refusals: int = 0
@@ -313,7 +314,7 @@ class _Caller:
     def certificate_due(self) -> steps.Certificate:
         self._certificates += 1
         error = error_of(self._certificates)
-        terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, at_once=True)
+        terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, order_seed=self.seed)
         return steps.Certificate(FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
 
     def certified(self, made: steps.Certified) -> None:
