@@ -66,7 +66,7 @@ class Terms:
 
     With `order_seed` runs are made in blocks: one run of each environment with an open claim, in an
     order that this seed draws. Without seeds runs only have in common when they are made, and rates
-    may change from one run to the next. After `most_tests` what is open is not shown.
+    may change from one run to the next. After `most_tests`, not `MOST_PAIRS`, what is open is not shown.
     """
 
     certify_rate: float
@@ -236,9 +236,10 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
     mine: Shown = True
-    while run < MOST_PAIRS or hits:
+    most_pairs = terms.most_tests or MOST_PAIRS
+    while run < most_pairs or hits:
         shows_often = run < ALONE_FIRST or assumed.both + assumed.first >= ALONE_SHARE * run
-        alone = shows_often and run < MOST_PAIRS and terms.order_seed is None
+        alone = shows_often and run < most_pairs and terms.order_seed is None
         theirs: Shown = None
         if hits and not alone:
             mine = True
@@ -363,6 +364,14 @@ def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> flo
     removal = removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER
     lost = 2.0 * _until(REFUTED, pairs, needed)
     return min(lost, max(of_left, removal if left else 0.0) + of_whole + left * removal)
+
+
+def tests_in_blocks(rate: float, certify_rate: float, left: int) -> int:
+    """How many tests a certificate without seeds takes on average, where without any of `left` models f never shows."""
+    both = rate * rate
+    blocks = _until(NEEDS, (both, rate - both, rate - both), (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0))
+    removal = _until(NEEDS, (0.0, 0.0, rate), (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
+    return round(2.0 * blocks + left * removal)
 
 
 def _until(wealth: float, shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:

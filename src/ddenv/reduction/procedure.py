@@ -41,6 +41,8 @@ from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, 
 MOST_STEPS_BACK = 5
 # In blocks, claims about models begin once so much of the rate is shown to be kept: where f always shows, after 4 of 11 pairs.
 LOOKS_KEPT_BOUND = 1 / 3
+# So many blocks decide whether a model is needed, where f shows often with it and never without it.
+ENOUGH_BLOCKS = 20
 
 Result = TypeVar("Result", covariant=True)
 
@@ -400,7 +402,8 @@ def _settled_in_blocks(
 ) -> Work[tuple[NamedClaim, ...]]:
     """The claims of a certificate without seeds, up to one that `ends` them. One run of `left` serves all claims of its block.
 
-    Models have their turn once it looks as if `left` kept the rate: until then their runs may be for nothing.
+    Models have their turn once it looks as if `left` kept the rate: until then their runs may be for nothing. They have none if the
+    tests that are left decide too little of each.
     """
     first_run, terms = certificate.first_run, certificate.terms
 
@@ -424,13 +427,14 @@ def _settled_in_blocks(
         ended = next(filter(ends, named), None)
         if of_left.verdict and ended is not None:
             return tuple(dict.fromkeys((named[0], ended)))
-        if made == terms.most_tests:
+        if terms.most_tests is not None and made >= terms.most_tests:
             return tuple(replace(one, claim=_given_up(one.claim)) for one in named)
         if of_left.verdict and terms.error_of_models(of_left.bound) < error:
             # They were taken to be in turn.
             error = terms.error_of_models(of_left.bound)
             models = {}
-        if rests and not models and (of_left.verdict or _looks_kept(of_left, left, fresh)):
+        enough = terms.most_tests is None or terms.most_tests - made >= ENOUGH_BLOCKS * len(rests)
+        if rests and not models and enough and (of_left.verdict or _looks_kept(of_left, left, fresh)):
             models = {model: Settling(falls(rest, left, error, first=block + 1)) for model, rest in rests.items()}
             continue
         wanted = {test for one in named for test in one.claim.wanted}
