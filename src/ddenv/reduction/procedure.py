@@ -12,6 +12,7 @@ what is known.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -414,28 +415,39 @@ def _settled_in_blocks(
         return Random(f"{terms.order_seed} {test[1]} {test[0].bits}").random()
 
     without = {rest: model for model, rest in rests.items()}
+
+    def opened(error: float, first: int) -> dict[int, Settling]:
+        return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
+
+    def claims_of(models: Mapping[int, Settling]) -> list[NamedClaim]:
+        return [NamedClaim(model, rests[model], one.claim(fresh)) for model, one in models.items()]
+
     kept = Settling(keeps(left, whole, terms))
     models: dict[int, Settling] = {}
     error = terms.error_of_models(1.0)
-    made = 0
+    made = first = 0
     # The last one that has begun.
     block = -1
     while True:
-        named = [NamedClaim(None, left, kept.claim(fresh))]
-        named += [NamedClaim(model, rests[model], one.claim(fresh)) for model, one in models.items()]
-        of_left = named[0].claim
+        of_left = NamedClaim(None, left, kept.claim(fresh))
+        named = [of_left, *claims_of(models)]
+        in_turn = terms.error_of_models(of_left.claim.bound)
         ended = next(filter(ends, named), None)
-        if of_left.verdict and ended is not None:
-            return tuple(dict.fromkeys((named[0], ended)))
-        if terms.most_tests is not None and made >= terms.most_tests:
+        if ended is not None or _left_of(terms, made) <= 0:
+            if models and in_turn < error:
+                named = [of_left, *claims_of(opened(in_turn, first))]
+            # To a search that goes on, claims that are still open are of no use.
+            named = [one for one in named if ended is None or one.model in (None, ended.model)]
             return tuple(replace(one, claim=_given_up(one.claim)) for one in named)
-        if of_left.verdict and terms.error_of_models(of_left.bound) < error:
-            # They were taken to be in turn.
-            error = terms.error_of_models(of_left.bound)
+        decided = bool(of_left.claim.verdict)
+        if decided and in_turn < error:
+            # Models were taken to be in turn. Blocks that are over do not go on.
+            error = in_turn
             models = {}
-        enough = terms.most_tests is None or terms.most_tests - made >= ENOUGH_BLOCKS * len(rests)
-        if rests and not models and enough and (of_left.verdict or _looks_kept(of_left, left, fresh)):
-            models = {model: Settling(falls(rest, left, error, first=block + 1)) for model, rest in rests.items()}
+        decide_something = _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests)
+        if rests and not models and decide_something and (decided or _looks_kept(of_left.claim, left, fresh)):
+            first = block + 1
+            models = opened(error, first)
             continue
         wanted = {test for one in named for test in one.claim.wanted}
         if not wanted:
@@ -444,6 +456,11 @@ def _settled_in_blocks(
         order = sorted((test for test in wanted if test[1] == block), key=in_drawn_order)
         made += 1
         yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+
+
+def _left_of(terms: Terms, made: int) -> float:
+    """How many tests of a certificate may still be made."""
+    return math.inf if terms.most_tests is None else terms.most_tests - made
 
 
 def _looks_kept(claim: Claim, left: Environment, fresh: Callable[[Environment, int], Shown]) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import Terms, Verdict, error_of, tests_in_blocks
+from ddenv.evidence.certificate import LONGER, Terms, Verdict, error_of, tests_in_blocks
 from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate, wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
@@ -444,7 +444,7 @@ class _Caller:
     def _warn_of_price(self) -> None:
         rate = self.rate()
         likely = tests_in_blocks(rate, self.certify_rate, len(self.left))
-        if likely > self.most_tests:
+        if LONGER * likely > self.most_tests:
             warnings.warn(
                 f"the failure shows in about {percent(rate)} of the calls: to certify what is left takes "
                 f"about {rounded(likely):,} of them, and most_tests allows {self.most_tests:,}; it may end not shown",
