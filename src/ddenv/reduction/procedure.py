@@ -13,8 +13,7 @@ what is known.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, zip_longest
 from random import Random
@@ -411,9 +410,6 @@ def _settled_in_blocks(
     def fresh(environment: Environment, run: int) -> Shown:
         return driver.shown(environment, first_run + run, full=True)
 
-    def in_drawn_order(test: tuple[Environment, int]) -> float:
-        return Random(f"{terms.order_seed} {test[1]} {test[0].bits}").random()
-
     without = {rest: model for model, rest in rests.items()}
 
     def opened(error: float, first: int) -> dict[int, Settling]:
@@ -439,13 +435,11 @@ def _settled_in_blocks(
             # To a search that goes on, claims that are still open are of no use.
             named = [one for one in named if ended is None or one.model in (None, ended.model)]
             return tuple(replace(one, claim=_given_up(one.claim)) for one in named)
-        decided = bool(of_left.claim.verdict)
-        if decided and in_turn < error:
+        if of_left.claim.verdict and in_turn < error:
             # Models were taken to be in turn. Blocks that are over do not go on.
             error = in_turn
             models = {}
-        decide_something = _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests)
-        if rests and not models and decide_something and (decided or _looks_kept(of_left.claim, left, fresh)):
+        if not models and _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests) > 0 and _have_turn(of_left, fresh):
             first = block + 1
             models = opened(error, first)
             continue
@@ -453,9 +447,13 @@ def _settled_in_blocks(
         if not wanted:
             return tuple(named)
         block = min(run for _, run in wanted)
-        order = sorted((test for test in wanted if test[1] == block), key=in_drawn_order)
+        order = _in_drawn_order((test for test in wanted if test[1] == block), terms.order_seed)
         made += 1
         yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+
+
+def _in_drawn_order(tests: Iterable[tuple[Environment, int]], seed: int | None) -> list[tuple[Environment, int]]:
+    return sorted(tests, key=lambda test: Random(f"{seed} {test[1]} {test[0].bits}").random())
 
 
 def _left_of(terms: Terms, made: int) -> float:
@@ -463,10 +461,14 @@ def _left_of(terms: Terms, made: int) -> float:
     return math.inf if terms.most_tests is None else terms.most_tests - made
 
 
-def _looks_kept(claim: Claim, left: Environment, fresh: Callable[[Environment, int], Shown]) -> bool:
-    """Whether what is left seems to keep the rate that the search aims at, and is shown to keep a part of it."""
-    shown = Counter(environment == left for environment, run in claim.rests_on if fresh(environment, run) is True)
-    return (claim.bound or 0.0) >= LOOKS_KEPT_BOUND and shown[True] >= NEEDED_SHARE * shown[False]
+def _have_turn(of_left: NamedClaim, fresh: Callable[[Environment, int], Shown]) -> bool:
+    """Whether what is left is judged, or seems to keep the rate that the search aims at and is shown to keep a part of it."""
+    claim = of_left.claim
+    if claim.verdict or (claim.bound or 0.0) < LOOKS_KEPT_BOUND:
+        return bool(claim.verdict)
+    with_f = [environment for environment, run in claim.rests_on if fresh(environment, run) is True]
+    of_what_is_left = with_f.count(of_left.environment)
+    return of_what_is_left >= NEEDED_SHARE * (len(with_f) - of_what_is_left)
 
 
 def _given_up(claim: Claim) -> Claim:

@@ -1,13 +1,12 @@
-"""What `ddenv.reduce` costs and finds beside Shrink Ray, on the same simulated tests.
+"""What `ddenv.reduce` costs and finds with its defaults: our columns of the table "Beside Shrink Ray".
 
-    python benchmarks/beside_shrink_ray.py [--worlds N] [--only TEXT] [--jobs N]
+    python benchmarks/library.py [--worlds N] [--only TEXT] [--jobs N]
 
 Worlds of 43, 100 and 200 models of which 2 or 5 are needed, without a robot (see tests_needed.py). A row is a kind of failure, a
 column an algorithm: the calls of the test until it ended, mean (worst); in how many % of the worlds all needed models are left,
 and nothing needless; the share of the failure rate that is really kept, and in how many % the result says that it is not shown.
 
-Shrink Ray has its column where it is installed (`pip install shrinkray`): its passes that delete lines, in this process, with its
-own handling of flaky tests.
+Shrink Ray itself has no column here: it needs a newer Python than this project has to support.
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from multiprocessing import get_context
 from statistics import fmean
 
@@ -27,7 +25,7 @@ from tests_needed import World, make_world
 import ddenv
 
 SIZES = tuple((n, k) for n in (43, 100, 200) for k in (2, 5))
-COLUMNS = ("splitting", "ddenv", "probdd", "ddmin", "Shrink Ray")
+COLUMNS = ("splitting", "ddenv", "probdd", "ddmin")
 Test = Callable[[frozenset[str]], bool]
 
 
@@ -105,12 +103,7 @@ def one(task: Task) -> tuple[float, ...] | None:
         return bool(rng.random() < failure.in_kept(kept, world, more))
 
     try:
-        if task.column == "Shrink Ray":
-            from shrink_ray import by_shrink_ray
-
-            ending = Ending(0, by_shrink_ray(world.elements, test, task.seed), "")
-        else:
-            ending = by_ddenv(world, test, task.column, task.seed)
+        ending = by_ddenv(world, test, task.column, task.seed)
     except ddenv.UserError:
         return None
     useful = set(more[:5]) if failure.less < 1.0 else set(more[:2]) if failure.drifts < 1.0 else set()
@@ -139,8 +132,6 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     columns = [name for name in COLUMNS if options.column in name]
-    if find_spec("shrinkray") is None:
-        columns = [name for name in columns if name != "Shrink Ray"]
     print("| failure | " + " | ".join(columns) + " |")
     print("|---" * (len(columns) + 1) + "|", flush=True)
     with get_context("spawn").Pool(options.jobs) as pool:
