@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 
 import numpy as np
-import picire
 
 import ddenv
 from ddenv.schemas import pairs, split_pair
@@ -100,6 +99,8 @@ def tests_of(world: World, options: dict | None, flaky: bool, seed: int) -> tupl
 
 def _picire(world: World, test: Callable[[frozenset[str]], bool], iterations: int) -> tuple[int, bool]:
     """picire asks again whether its configuration still fails before each step; what is known is not counted twice."""
+    import picire
+
     known: dict[frozenset[str], bool] = {frozenset(world.elements): True}
     made = 0
 

@@ -166,3 +166,15 @@ def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_pat
     words = notes(5)["rare"]
     assert words.startswith("f shows in 5 of 10 runs: keeping its rate takes about ")
     assert words.endswith("(accept_rate exact, --exact)")
+
+
+def test_the_price_of_a_certificate_of_a_rare_failure_is_said_before_it_begins(tmp_path):
+    def notes(tenths):
+        oracle = lambda keep, seed: "similar" if "wall" in keep and seed % 10 < tenths else "pass"  # noqa: E731
+        return dict(drive(new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 1)).notes)
+
+    words = notes(2)["price"]
+    assert words.startswith("f shows in 3 of ")
+    assert ": the certificate takes about " in words
+    assert words.endswith("(--exact)")
+    assert "price" not in notes(5)

@@ -1,6 +1,7 @@
 """The reduction as a function, without Drake."""
 
 import tomllib
+from collections import Counter
 from functools import cache
 from itertools import pairwise
 from math import comb
@@ -56,7 +57,7 @@ def test_it_counts_the_tests_it_makes_and_makes_none_twice():
         made.append(kept)
         return kept >= {"b", "g"}
 
-    found = ddenv.reduce(ELEMENTS, test, **ALL)
+    found = ddenv.reduce(ELEMENTS, test, iterations=0, **ALL)
     assert found.tests == len(made) == len(set(made))
     assert made[0] == frozenset(ELEMENTS)
     assert found.rounds > 1
@@ -126,6 +127,28 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
         assert claim.low <= claim.shown / claim.runs <= claim.high
 
 
+def test_the_certificate_calls_each_world_once_in_a_block_and_draws_the_order():
+    """Six needed elements and a failure that always shows: 11 pairs for the rate, 7 for each element, 64 calls in all."""
+    needed, first = set("abcdef"), set()
+    for seed in range(8):
+        made = []
+        found = ddenv.reduce(
+            ELEMENTS, lambda kept, made=made: made.append(kept) or kept >= needed, iterations=3, seed=seed, **ALL
+        )
+        assert found.minimal
+        fresh = made[-found.certificate_tests :]
+        assert len(fresh) == 64
+        blocks = [[]]
+        for kept in fresh:
+            if kept in blocks[-1]:
+                blocks.append([])
+            blocks[-1].append(kept)
+        assert all(frozenset(needed) in block for block in blocks)
+        first.update(block[0] for block in blocks)
+        assert found == ddenv.reduce(ELEMENTS, needs(*needed), iterations=3, seed=seed, **ALL)
+    assert first == {frozenset(ELEMENTS), frozenset(needed), *(frozenset(needed - {name}) for name in needed)}
+
+
 @cache
 def stepping_back(salt):
     """A reduction that drifts: what is found, its rounds, and the environments to which it went back."""
@@ -187,7 +210,7 @@ def test_splitting_looks_once_where_the_failure_is_flaky_and_confirms_the_end():
         options = {"algorithm": "splitting", "iterations": 3, "accept_rate": "first"}
         found = ddenv.reduce([f"m{index}" for index in range(36)], flaky, **options, **line_of(36))
         assert set(found.kept) == needed
-        assert found.minimal
+        assert found.minimal is None
         assert all(made.count(frozenset(needed - {name})) == 4 for name in needed)
         tests.append(found.search_tests)
     assert np.mean(tests) <= 1.6 * np.log2(comb(36, 3)) / 0.618
@@ -227,6 +250,70 @@ def test_what_a_search_does_not_try_again_the_certificate_does(salt):
     found = ddenv.reduce(ELEMENTS, test, iterations=1, accept_rate="kept", **ALL)
     assert found.minimal
     assert not any(test(frozenset(found.kept) - {name}) for name in found.kept)
+
+
+@given(
+    salt=st.integers(0, 2**31),
+    rate=st.sampled_from([0.3, 0.5, 0.7, 0.9]),
+    algorithm=st.sampled_from(names("algorithm")),
+)
+@examples(0.5)
+@pytest.mark.filterwarnings("ignore:the failure shows in about")
+def test_a_flaky_test_is_noticed_or_shows_the_same_in_all_replays(salt, rate, algorithm):
+    """With the defaults: one miss, even the first, neither ends the reduction nor makes it minimal."""
+    rng, made = np.random.default_rng(salt), []
+
+    def test(kept):
+        made.append((kept, bool(kept >= {"b", "g"} and rng.random() < rate)))
+        return made[-1][1]
+
+    try:
+        found = ddenv.reduce(ELEMENTS, test, algorithm=algorithm, **ALL)
+    except ddenv.UserError:
+        assert made == [(frozenset(ELEMENTS), False)] * 10
+        return
+    assert found.tests == len(made)
+    assert found.flaky == (len(set(made)) > len({kept for kept, _ in made}))
+    if found.flaky:
+        assert found.claims
+        assert not found.minimal or found.kept == ("b", "g")
+    else:
+        answers = Counter(made)
+        left = frozenset(found.kept)
+        assert answers[left, True] >= 3
+        assert found.minimal == all(answers[left - {name}, False] == 2 for name in left)
+
+
+@pytest.mark.parametrize("options", [{"iterations": 0}, {"iterations": 3, "accept_rate": "first"}])
+def test_where_one_call_decides_minimal_is_not_said(options):
+    assert ddenv.reduce(ELEMENTS, needs("b", "g"), **options, **ALL).minimal is None
+    partitions = ddenv.reduce(ELEMENTS, needs("b", "g"), candidates="partitions", **options, **ALL)
+    assert partitions.minimal in (None, False)
+
+
+def graded(rng):
+    """Shows in 95 % with all elements; without "a" never, and without each of "b" to "f" 0.9 times as often."""
+    return lambda kept: "a" in kept and rng.random() < 0.95 * 0.9 ** len(set("bcdef") - kept)
+
+
+@pytest.mark.parametrize("algorithm", ["ddenv", "splitting"])
+def test_where_many_elements_take_a_bit_it_ends_within_its_calls_with_what_is_not_lost(algorithm):
+    for salt in range(5):
+        found = ddenv.reduce(ELEMENTS, graded(np.random.default_rng(salt)), algorithm=algorithm, iterations=3, **ALL)
+        assert found.tests < 1500
+        assert found.claims[0].verdict != "lost"
+        assert found.claims[0].bound
+        left = {claim.without for claim in found.claims} - {None}
+        assert left <= set(found.kept) == set(found.history[-1].kept)
+
+
+def test_what_a_rare_failure_costs_is_said_before():
+    """And what the calls show by then is returned."""
+    rng = np.random.default_rng(3)
+    with pytest.warns(UserWarning, match="to certify what is left takes about .* of them, and most_tests allows 300"):
+        found = ddenv.reduce(ELEMENTS, lambda kept: "a" in kept and rng.random() < 0.3, most_tests=300, **ALL)
+    assert found.flaky
+    assert found.certificate_tests <= 400
 
 
 def test_where_a_certificate_follows_a_search_needs_fewer_tests():
@@ -275,6 +362,7 @@ WRONG = {
     "candidates": ({"candidates": "all"}, "candidates: 'all' is not allowed; use one of both, partitions, complements"),
     "accept_rate": ({"accept_rate": "often"}, "accept_rate: 'often' is not allowed; use one of first, kept"),
     "keep_rate": ({"keep_rate": 1.0}, "keep_rate: expected a number, more than 0, at most 0.95, found 1.0"),
+    "most_tests": ({"most_tests": 0}, "most_tests: expected a whole number, at least 1, found 0"),
     "baseline_runs": ({"baseline_runs": 0}, "baseline_runs: expected a whole number from 1 to 1000, found 0"),
     "prior": ({"prior": "near"}, "prior: 'near' is not allowed"),
     "delta": ({"delta": 0}, "delta: expected a number, more than 0"),

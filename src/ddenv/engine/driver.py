@@ -14,7 +14,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
-from ddenv.engine.limits import limit_after, note, note_ends, note_rare
+from ddenv.engine.limits import limit_after, note, note_ends, note_price, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
@@ -415,6 +415,7 @@ class Driver:
             at_least = max(self._only_certify or 0, RUNS_BESIDE) if seeds else self._only_certify or asked.baseline_runs
             first, error = (before.first_run, before.error) if before else (journal.fresh_run, error_of(number))
             rate, share = journal.rate_of_whole(), self._certify_rate or asked.certify_rate
+            note_price(journal, share, at_least)
             started = events.CertificateStarted(number, first, rate, asked.keep_rate, error, at_least, share, seeds)
             journal.record(started)
             last = journal.state.certificates[-1]

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
+from ddenv.evidence.certificate import certificate_tests
 from ddenv.evidence.ends import ends_of, groups_of, joining, of_baseline, one_place
 from ddenv.runfile import events
 from ddenv.runfile.state import BROKEN, RunState
@@ -40,6 +41,8 @@ KNOWN_AFTER = 10.0
 RARE = 0.7
 # Below this rate a certificate takes thousands of runs, so the user is asked first.
 VERY_RARE = 0.05
+# Where it shows in less than this share, a certificate takes many times the tests of the search.
+DEAR = 0.3
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
 # So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
@@ -149,6 +152,22 @@ def note_rare(journal: Journal) -> bool:
     )
     note(journal, "rare", f"{words}the failing runs themselves takes about {exact} (accept_rate exact, --exact)")
     return base.rate < VERY_RARE
+
+
+def note_price(journal: Journal, certify_rate: float, at_least: int) -> None:
+    """Says what a certificate takes before it begins, where f is so rare that it takes many times what the search took."""
+    state, base = journal.state, journal.state.baseline
+    asked = Reduction.model_validate(state.scenario["reduction"])
+    if base is None or base.rate >= DEAR or asked.accept_rate != "kept":
+        return
+    low, _, high = certificate_tests(base.rate, certify_rate, len(state.environment), at_least, base.runs)
+    exact = rough_run(len(state.environment), asked.model_copy(update={"accept_rate": "exact"}), base.rate)
+    first, _, last = exact.tests
+    words = (
+        f"f shows in {base.failures} of {count(base.runs, 'run')}: the certificate takes about {between(low, high)} tests, "
+        f"and may show too little; reducing the failing runs themselves takes about {between(first, last)} (--exact)"
+    )
+    note(journal, "price", words)
 
 
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:

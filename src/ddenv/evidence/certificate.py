@@ -67,9 +67,12 @@ class Terms:
     """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
     of all claims together, and the minimum number of runs of what is left.
 
-    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn. `at_once`: the runs of
-    a pair are made one right after the other, and none is part of two pairs: without seeds all rates may change in the course of
-    time. After `vain` pairs, none of which showed f at all, it ends.
+    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn.
+    After `vain` pairs, none of which showed f at all, it ends.
+
+    With `order_seed` runs are made in blocks: one run of each environment with an open claim, in an
+    order that this seed draws. Without seeds runs only have in common when they are made, and rates
+    may change from one run to the next. After `most_tests`, not `MOST_PAIRS`, what is open is not shown.
     """
 
     certify_rate: float
@@ -77,8 +80,9 @@ class Terms:
     error: float
     at_least: int = 1
     first_rate: float | None = None
-    at_once: bool = False
     vain: int = MOST_PAIRS
+    order_seed: int | None = None
+    most_tests: int | None = None
 
     @property
     def in_turn(self) -> float:
@@ -240,9 +244,10 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
     mine: Shown = True
-    while run < MOST_PAIRS or hits:
+    most_pairs = terms.most_tests or MOST_PAIRS
+    while run < most_pairs or hits:
         shows_often = run < ALONE_FIRST or assumed.both + assumed.first >= ALONE_SHARE * run
-        alone = shows_often and run < MOST_PAIRS and not terms.at_once
+        alone = shows_often and run < most_pairs and terms.order_seed is None
         theirs: Shown = None
         if hits and not alone:
             mine = True
@@ -414,6 +419,14 @@ def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> flo
     removal = removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER
     lost = 2.0 * _until(REFUTED, pairs, needed)
     return min(lost, max(of_left, removal if left else 0.0) + of_whole + left * removal)
+
+
+def tests_in_blocks(rate: float, certify_rate: float, left: int) -> int:
+    """How many tests a certificate without seeds takes on average, where without any of `left` models f never shows."""
+    both = rate * rate
+    blocks = _until(NEEDS, (both, rate - both, rate - both), (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0))
+    removal = _until(NEEDS, (0.0, 0.0, rate), (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
+    return round(2.0 * blocks + left * removal)
 
 
 def _until(wealth: float, shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:

@@ -12,15 +12,17 @@ what is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice, zip_longest
+from random import Random
 from typing import Protocol, TypeVar
 
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
     HELPING,
-    MOST_PAIRS,
+    NEEDED_SHARE,
     Claim,
     Procedure,
     Settling,
@@ -38,6 +40,10 @@ from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
 # rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
 MOST_STEPS_BACK = 5
+# In blocks, claims about models begin once so much of the rate is shown to be kept: where f always shows, after 4 of 11 pairs.
+LOOKS_KEPT_BOUND = 1 / 3
+# So many blocks decide whether a model is needed, where f shows often with it and never without it.
+ENOUGH_BLOCKS = 20
 
 Result = TypeVar("Result", covariant=True)
 
@@ -324,8 +330,8 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
 
     def claims(error: float) -> Iterator[tuple[int | None, Environment, Procedure]]:
         yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
-        for number, (model, rest) in enumerate(() if certificate.exact else rests.items(), 1):
-            yield model, rest, falls(rest, left, error, first=number * MOST_PAIRS if terms.at_once else 0)
+        for model, rest in () if certificate.exact else rests.items():
+            yield model, rest, falls(rest, left, error)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
@@ -333,13 +339,15 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
             return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in fresh)
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
-    # Models are taken to be in turn, until the rate turns out not to be kept.
-    made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
-    if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
-        made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
-    if rests and {one.claim.verdict for one in made} <= {"kept", "needed", *HELPING} and any(map(_helps, made)):
-        # "Minimal but for these": the runs chose about which models this is said.
-        made = yield from settled(driver, claims(error / len(rests)), ends, certificate.first_run, "certify")
+    if terms.order_seed is not None:
+        made = yield from _settled_in_blocks(driver, certificate, left, whole, rests, ends)
+    else:
+        # Models are taken to be in turn, until the rate turns out not to be kept.
+        made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
+        if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
+            made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
+        if _is_minimal_but_for(made):
+            made = yield from settled(driver, claims(error / len(rests)), ends, certificate.first_run, "certify")
     if certificate.exact:
         # The search has made these runs.
         for model, rest in rests.items():
@@ -352,8 +360,10 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     return certified
 
 
-def _helps(claim: NamedClaim) -> bool:
-    return claim.claim.verdict in HELPING
+def _is_minimal_but_for(made: Sequence[NamedClaim]) -> bool:
+    """Whether "minimal but for" some models will be said: the runs chose about which models, so each claim gets a smaller error."""
+    verdicts = {one.claim.verdict for one in made}
+    return verdicts <= {"kept", "needed", *HELPING} and not verdicts.isdisjoint(HELPING)
 
 
 def settled(
@@ -391,6 +401,96 @@ def settled(
         if not wants:
             return tuple(named)
         yield tuple(wants)
+
+
+def _settled_in_blocks(
+    driver: Driver,
+    certificate: Certificate,
+    left: Environment,
+    whole: Environment,
+    rests: Mapping[int, Environment],
+    ends: Callable[[NamedClaim], bool],
+) -> Work[tuple[NamedClaim, ...]]:
+    """The claims of a certificate without seeds, up to one that `ends` them. One run of `left` serves all claims of its block.
+
+    Models have their turn once it looks as if `left` kept the rate: until then their runs may be for nothing. They have none if the
+    tests that are left decide too little of each.
+    """
+    first_run, terms = certificate.first_run, certificate.terms
+
+    def fresh(environment: Environment, run: int) -> Shown:
+        return driver.shown(environment, first_run + run, full=True)
+
+    without = {rest: model for model, rest in rests.items()}
+
+    def opened(error: float, first: int) -> dict[int, Settling]:
+        return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
+
+    def claims_of(models: Mapping[int, Settling]) -> list[NamedClaim]:
+        return [NamedClaim(model, rests[model], one.claim(fresh)) for model, one in models.items()]
+
+    kept = Settling(keeps(left, whole, terms))
+    models: dict[int, Settling] = {}
+    error = terms.error_of_models(1.0)
+    made = first = 0
+    # The last one that has begun.
+    block = -1
+    # Whether claims have the error of those that are chosen by what the runs show.
+    chosen = False
+    while True:
+        of_left = NamedClaim(None, left, kept.claim(fresh))
+        named = [of_left, *claims_of(models)]
+        in_turn = terms.error_of_models(of_left.claim.bound)
+        ended = next(filter(ends, named), None)
+        if ended is not None or _left_of(terms, made) <= 0:
+            if models and in_turn < error:
+                named = [of_left, *claims_of(opened(in_turn, first))]
+            # To a search that goes on, claims that are still open are of no use.
+            named = [one for one in named if ended is None or one.model in (None, ended.model)]
+            return tuple(replace(one, claim=_given_up(one.claim)) for one in named)
+        if of_left.claim.verdict and in_turn < error:
+            # Models were taken to be in turn. Blocks that are over do not go on.
+            error = in_turn
+            models = {}
+        if not models and _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests) > 0 and _have_turn(of_left, fresh):
+            first = block + 1
+            models = opened(error, first)
+            continue
+        wanted = {test for one in named for test in one.claim.wanted}
+        if not wanted:
+            if chosen or not _is_minimal_but_for(named):
+                return tuple(named)
+            chosen = True
+            error /= len(rests)
+            models = opened(error, first)
+            continue
+        block = min(run for _, run in wanted)
+        order = _in_drawn_order((test for test in wanted if test[1] == block), terms.order_seed)
+        made += 1
+        yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+
+
+def _in_drawn_order(tests: Iterable[tuple[Environment, int]], seed: int | None) -> list[tuple[Environment, int]]:
+    return sorted(tests, key=lambda test: Random(f"{seed} {test[1]} {test[0].bits}").random())
+
+
+def _left_of(terms: Terms, made: int) -> float:
+    """How many tests of a certificate may still be made."""
+    return math.inf if terms.most_tests is None else terms.most_tests - made
+
+
+def _have_turn(of_left: NamedClaim, fresh: Callable[[Environment, int], Shown]) -> bool:
+    """Whether what is left is judged, or seems to keep the rate that the search aims at and is shown to keep a part of it."""
+    claim = of_left.claim
+    if claim.verdict or (claim.bound or 0.0) < LOOKS_KEPT_BOUND:
+        return bool(claim.verdict)
+    with_f = [environment for environment, run in claim.rests_on if fresh(environment, run) is True]
+    of_what_is_left = with_f.count(of_left.environment)
+    return of_what_is_left >= NEEDED_SHARE * (len(with_f) - of_what_is_left)
+
+
+def _given_up(claim: Claim) -> Claim:
+    return claim if claim.verdict else replace(claim, verdict="not shown")
 
 
 def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified) -> Work[Leg | None]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count, takewhile
-from numbers import Real
+from itertools import count as counted
+from itertools import takewhile
+from numbers import Integral, Real
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -15,8 +18,8 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import Terms, Verdict, error_of
-from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate
+from ddenv.evidence.certificate import LONGER, Terms, Verdict, error_of, tests_in_blocks
+from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate, wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
@@ -24,8 +27,19 @@ from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.round import Partition, Round, Search
 from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.settings import SETTINGS
+from ddenv.text import count, percent, rounded
 
-NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothing to reduce"
+NEVER_SHOWS = (
+    "the failure does not show with all elements: in none of {}, so it shows in less than {} % of them (95 %); "
+    "there is nothing to reduce, unless more baseline_runs show it"
+)
+# Without a word of the user a test is taken to be steady if so many calls with all elements show the
+# failure, and so many with what is left, in addition to the one of the search.
+REPLAYS = 5
+# A test that turns out to be flaky gets so many re-runs.
+FLAKY_ITERATIONS = 3
+# This share of `most_tests` is for the last certificate alone, which has so many tests in any case.
+CERTIFICATE_SHARE, FEWEST_TESTS = 0.25, 40
 # Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
 FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 1_000_000
 
@@ -81,19 +95,23 @@ class RateClaim:
 class Reduction:
     """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test in `rounds` rounds.
 
-    `history` begins with all elements; each further step is a reduction, or a step back. `minimal`: what is kept shows the
-    failure often enough, and no single element can be left out; each was left out in a test. With the rule "kept", `claims` say
-    what fresh calls of the test showed of this.
+    `history` begins with all elements; each further step is a reduction, or a step back. With the rule "kept", `claims` say what
+    fresh calls showed, and `minimal` that by these what is kept shows the failure often enough, and that no single element can be
+    left out. Where the test seems to be steady `minimal` rests on two calls of it without each element, and on more without any. It
+    is None with the rule "first", by which one call decides: what a flaky test shows once may be chance.
+
+    `flaky`: calls with the same elements gave different answers.
     """
 
     kept: tuple[str, ...]
     rounds: int
     history: tuple[Step, ...]
-    minimal: bool
+    minimal: bool | None
     baseline_tests: int
     search_tests: int
     certificate_tests: int
     claims: tuple[RateClaim, ...] = ()
+    flaky: bool = False
 
     @property
     def tests(self) -> int:
@@ -114,7 +132,7 @@ def reduce(
     first_sensed: Mapping[str, float] | None = None,
     touched: Iterable[str] | None = None,
     traits: Mapping[str, Traits] | None = None,
-    iterations: int = 0,
+    iterations: int | None = None,
     n_partitions: int = 2,
     candidates: str = "both",
     complement_order: str = "paper",
@@ -127,6 +145,7 @@ def reduce(
     keep_rate: float = 0.8,
     certify_rate: float = 2 / 3,
     baseline_runs: int = 10,
+    most_tests: int = 1200,
     check: bool = True,
     on_round: Callable[[NamedRound], None] | None = None,
 ) -> Reduction:
@@ -135,12 +154,20 @@ def reduce(
         ddenv.reduce("abcdef", lambda kept: kept >= {"a", "e"}, algorithm="ddmin").kept  # ("a", "e")
 
     `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and returns whether the failure showed.
-    A test that returns False is repeated up to `iterations` times, for failures that do not show every time.
+    A few calls with all elements, and at the end with what is left and without each element of it,
+    show whether the test is steady.
 
-    With `accept_rate` "first", the first run with the failure decides, as in the paper. With "kept", the default if there are
-    `iterations`, all elements are run `baseline_runs` times or more at first, the search takes what seems to keep `keep_rate` of
-    their failure rate, and fresh runs show at the end whether at least `certify_rate` of it is kept, and without which elements
-    the failure is rarer. All claims together are wrong with a probability of at most 5 %.
+    If it is flaky, or if there are `iterations`, the rule is "kept". All elements are run
+    `baseline_runs` times or more, and the search takes what seems to keep `keep_rate` of their
+    failure rate; a candidate without the failure is called again up to `iterations` times. Fresh
+    calls show at the end whether at least `certify_rate` of the rate is kept, and without which
+    elements the failure is rarer. All claims together are wrong with a probability of at most 5 %.
+    After the first search about `most_tests` calls are made, to certify, and to go back or on; then
+    the smallest set that is not shown to be lost is kept. If a certificate is likely to take more,
+    there is a warning before it begins.
+
+    With the rule "first" the first call with the failure decides, as in the paper. That is the rule
+    if `iterations` are 0, too. `accept_rate` chooses the rule.
 
     `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of the run that failed.
     `failure_pose` is where it failed, beginning with x, y, z (m); the default is the trajectory's end. `first_sensed` maps names to
@@ -150,11 +177,15 @@ def reduce(
     arguments; exceptions of `test` are passed on.
     """
     names = _names(elements)
+    seems_steady = iterations is None and accept_rate is None
+    iterations = iterations or 0
     accept_rate = accept_rate or ("kept" if iterations else "first")
     variants = {"candidates": candidates, "complement_order": complement_order, "growth": growth, "skip": skip}
     _check(
         **variants, prior=prior, accept_rate=accept_rate, keep_rate=keep_rate, certify_rate=certify_rate, delta=delta
     )
+    if isinstance(most_tests, bool) or not isinstance(most_tests, Integral) or most_tests < 1:
+        raise _wrong("most_tests", "a whole number, at least 1", most_tests)
     _check(iterations=iterations, n_partitions=n_partitions, seed=seed, baseline_runs=baseline_runs)
     path = _trajectory(trajectory)
     failure = _place(path[-1, 1:4] if failure_pose is None and path is not None else failure_pose)
@@ -180,23 +211,46 @@ def reduce(
         )
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
 
-    keeps_rate = accept_rate == "kept"
-    kept = keep_rate if keeps_rate else 0.0
-    caller = _Caller(names, test, begin, kept, certify_rate, iterations, baseline_runs, on_round)
+    caller = _Caller(
+        names=names,
+        test=test,
+        begin=begin,
+        keep_rate=keep_rate if accept_rate == "kept" else 0.0,
+        certify_rate=certify_rate,
+        iterations=iterations,
+        baseline_runs=baseline_runs,
+        on_round=on_round,
+        seed=int(seed),
+        most_tests=int(most_tests),
+    )
     # A missing argument is reported before the first test.
     next(begin(caller.next_leg()), None)
-    if keeps_rate:
-        caller.carry_out(steps.procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
-        minimal = all(claim.verdict in ("kept", "needed") for claim in caller.claims)
-    else:
+    minimal: bool | None = None
+    if seems_steady:
+        minimal = caller.search_if_steady(check)
+        if minimal is None:
+            caller.keep_rate = keep_rate
+            caller.iterations = FLAKY_ITERATIONS
+    elif not caller.keep_rate:
         if check:
             caller.carry_out(steps.baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
-        leg = caller.next_leg()
-        caller.carry_out(steps.search_on(caller, leg))
-        rests = [caller.left - Environment.of((element,)) for element in caller.left]
-        minimal = all(standing([rest], caller.shown, leg.rule)[0] == ["dissimilar"] for rest in rests)
-    tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
-    return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
+        minimal = None if caller.search_once() else False
+    if caller.keep_rate:
+        caller.carry_out(steps.procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
+        caller.keep_best()
+        of_each = len(caller.claims) == 1 + len(caller.history[-1].kept)
+        minimal = of_each and all(claim.verdict in ("kept", "needed") for claim in caller.claims)
+    return Reduction(
+        kept=caller.history[-1].kept,
+        rounds=caller.rounds,
+        history=tuple(caller.history),
+        minimal=minimal,
+        baseline_tests=caller.calls["baseline"],
+        search_tests=caller.calls["round"],
+        certificate_tests=caller.calls["certify"],
+        claims=caller.claims,
+        flaky=caller.flaky,
+    )
 
 
 @dataclass
@@ -213,6 +267,8 @@ class _Caller:
     iterations: int
     baseline_runs: int
     on_round: Callable[[NamedRound], None] | None
+    seed: int
+    most_tests: int
     rounds: int = 0
     claims: tuple[RateClaim, ...] = ()
     refusals: int = 0
@@ -232,6 +288,10 @@ class _Caller:
         self._lost: list[Environment] = []
         self._began: list[NamedRound] = []
         self._certificates = 0
+        # What fresh calls showed of each end that they did not show to be lost.
+        self._shown: dict[Environment, tuple[RateClaim, ...]] = {}
+        # How many calls were made before the first certificate.
+        self._before: int | None = None
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         return self._known.get((environment, run))
@@ -252,17 +312,69 @@ class _Caller:
         shown = list(self._of_whole)
         for number in range(1, self._certificates + 1):
             first = FIRST_FRESH + number * EACH_CERTIFICATE
-            tests = ((self.whole, run) for run in count(first))
+            tests = ((self.whole, run) for run in counted(first))
             shown += [self._known[test] for test in takewhile(self._known.__contains__, tests)]
         return estimated_rate(sum(shown), len(shown))
 
+    @property
+    def flaky(self) -> bool:
+        """Whether calls with the same elements gave different answers."""
+        answers = {(environment, shown) for (environment, _), shown in self._known.items()}
+        return len(answers) > len({environment for environment, _ in answers})
+
+    @property
+    def _affordable(self) -> int:
+        """How many calls may still be made; before the first certificate they are not counted."""
+        return self.most_tests - (0 if self._before is None else self.calls.total() - self._before)
+
     def goes_on(self) -> bool:
-        return True
+        # To an end that is not shown to be lost it goes back in any case.
+        return self._affordable > 0 or not self._shown
 
     def algorithm(self, leg: steps.Leg) -> Search:
-        return self.begin(leg)
+        """The algorithm, up to where what is left of the calls is needed for a certificate."""
+        search, winner = self.begin(leg), None
+        while self._affordable >= CERTIFICATE_SHARE * self.most_tests:
+            try:
+                winner = yield search.send(winner)
+            except StopIteration as end:
+                return cast(Environment, end.value)
+        return self.left
 
-    def carry_out(self, work: steps.Work[object]) -> None:
+    def search_once(self) -> bool:
+        """By the first call with the failure; returns whether each element that is left was left out in vain."""
+        leg = self.next_leg()
+        self.carry_out(steps.search_on(self, leg))
+        verdicts = (standing([rest], self.shown, leg.rule)[0] for rest in self._removals())
+        return all(verdict == ["dissimilar"] for verdict in verdicts)
+
+    def search_if_steady(self, check: bool) -> bool | None:
+        """The same where the test shows the failure in each of a few calls with all elements, and gives the same answers again at
+        the end; else None.
+        """
+        if check:
+            self.carry_out((steps.Test(self.whole, run, "baseline"),) for run in range(REPLAYS))
+            if not all(self._of_whole):
+                return None
+        alone = self.search_once()
+        replays = [steps.Test(self.left, run, "certify") for run in range(1, 1 + REPLAYS)]
+        tested = (rest for rest in self._removals() if self.shown(rest, 0) is not None)
+        replays += [steps.Test(rest, 1, "certify") for rest in tested]
+        self.carry_out((test,) for test in replays)
+        return None if self.flaky else alone
+
+    def _removals(self) -> list[Environment]:
+        return [self.left - Environment.of((element,)) for element in self.left]
+
+    def keep_best(self) -> None:
+        """Goes back from an end that is lost to the smallest one that fresh calls did not show to be."""
+        if self.left in self._shown or not self._shown:
+            return
+        best = min(self._shown, key=len)
+        self._go(best)
+        self.claims = self._shown[best]
+
+    def carry_out(self, work: Iterable[tuple[steps.Test, ...]]) -> None:
         """To the end. Raises UserError if the failure never shows in the baseline."""
         for asked, *_ in work:
             self._tell_rounds()
@@ -282,7 +394,9 @@ class _Caller:
 
     def baseline_ran(self, runs: int, chose: int) -> steps.Baseline:
         if not any(self._of_whole):
-            raise UserError(NOTHING_TO_REDUCE)
+            runs = len(self._of_whole)
+            _, most = wilson_interval(0, runs)
+            raise UserError(NEVER_SHOWS.format(count(runs, "call"), math.ceil(100 * most)))
         return steps.Baseline(sum(self._of_whole))
 
     def failure_fixed(self, runs: int) -> steps.Leg:
@@ -290,7 +404,9 @@ class _Caller:
 
     def next_leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
         rate = self.rate() if self.keep_rate else 0.0
-        rule = Acceptance(1 + self.iterations, rate, self.keep_rate, len(self._lost))
+        # While calls are left it goes back, however often.
+        steps_back = min(len(self._lost), steps.MOST_STEPS_BACK - 1)
+        rule = Acceptance(1 + self.iterations, rate, self.keep_rate, steps_back)
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
         return steps.Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
@@ -314,9 +430,28 @@ class _Caller:
 
     def certificate_due(self) -> steps.Certificate:
         self._certificates += 1
-        error = error_of(self._certificates)
-        terms = Terms(self.certify_rate, self.keep_rate, error, self.baseline_runs, at_once=True)
+        if self._before is None:
+            self._before = self.calls.total()
+            self._warn_of_price()
+        terms = Terms(
+            certify_rate=self.certify_rate,
+            keep_rate=self.keep_rate,
+            error=error_of(self._certificates),
+            at_least=self.baseline_runs,
+            order_seed=self.seed,
+            most_tests=max(self._affordable, FEWEST_TESTS),
+        )
         return steps.Certificate(FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+
+    def _warn_of_price(self) -> None:
+        rate = self.rate()
+        likely = tests_in_blocks(rate, self.certify_rate, len(self.left))
+        if LONGER * likely > self.most_tests:
+            warnings.warn(
+                f"the failure shows in about {percent(rate)} of the calls: to certify what is left takes "
+                f"about {rounded(likely):,} of them, and most_tests allows {self.most_tests:,}; it may end not shown",
+                stacklevel=2,
+            )
 
     def certified(self, made: steps.Certified) -> None:
         claims = []
@@ -326,6 +461,8 @@ class _Caller:
             interval = anytime_interval(shown, len(named.runs))
             claims.append(RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound))
         self.claims = tuple(claims)
+        if claims[0].verdict != "lost":
+            self._shown[self.left] = self.claims
 
     def stepped_back(self, place: int, again: tuple[Partition, ...], tests: object) -> steps.Leg:
         self._lost.append(self._chain[place + 1])

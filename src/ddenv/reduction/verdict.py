@@ -15,7 +15,7 @@ Verdict = Literal["", "similar", "dissimilar", "unknown"]
 # The baseline goes on to this many runs with f, for up to so many runs, where f is rare.
 FEWEST_SHOWN, LONGEST_BASELINE = 3, 60
 # Where all runs of a candidate miss f by chance no more often than this, a miss is looked at again only by a certificate.
-FEW_MISSED = 0.02
+FEW_MISSED = 0.003
 # After this many runs the likelier side counts.
 MOST_RUNS = 40
 # A run that broke is passed over while no more than one in so many runs of its candidate broke.
