@@ -20,10 +20,19 @@ from ddenv.engine.worker import Broken, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Changed, Test
-from ddenv.reduction.verdict import Acceptance, decided_by, standing
-from ddenv.robot.oracle import Failure
+from ddenv.reduction.verdict import Acceptance, decided_by, standing, unproven
+from ddenv.robot.oracle import Failure, ends_of
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import Compared, Comparing, Implied, SupportsStarted, TestFinished, TestStarted, TrialJudged
+from ddenv.runfile.events import (
+    Compared,
+    Comparing,
+    EarlyStopEnded,
+    Implied,
+    SupportsStarted,
+    TestFinished,
+    TestStarted,
+    TrialJudged,
+)
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
@@ -50,7 +59,8 @@ class Bench:
         self, journal: Journal, pool: Workers, control: Control, others: Mapping[Key, Place] | None = None
     ) -> None:
         self._failures: tuple[Failure, ...] = ()
-        self._failed: tuple[int, ...] = ()
+        # The tests and the settings that say what counts as f.
+        self._failed: object = None
         self._journal = journal
         self._pool = pool
         self._control = control
@@ -91,14 +101,14 @@ class Bench:
         return self._pool.busy + len(self._taken)
 
     def _key(self, test: Test) -> tuple[Environment, int, bool]:
-        return test.environment, test.run, self._journal.is_full(test.why)
+        return test.environment, test.run, self._journal.is_full(test)
 
     def _make(self, wanted: Test, trial: int | None = None) -> bool | None:
         """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
         Raises Stopped if the budget is used up and no test runs.
         """
-        journal, full = self._journal, self._journal.is_full(wanted.why)
+        journal, full = self._journal, self._journal.is_full(wanted)
         source = journal.implying(wanted.environment, wanted.run, full)
         implied = source is not None and wanted.why != "audit" and not audit_is_due(journal.state, wanted.why)
         # The budget is that of the reduction, which is over.
@@ -117,13 +127,14 @@ class Bench:
         journal.record(TestStarted(*start, source))
         self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
-        full = full or (source is not None and journal.is_full(state.tests[source - 1].phase))
+        full = full or (source is not None and not state.tests[source - 1].cut)
         keep = frozenset(wanted.environment.names(state.elements))
-        known = self._others.pop((keep, seed, full), None)
+        known = self._others.pop((keep, seed), None)
         if known is not None and (taken := result_of(known)) is not None:
             self._taken.append((number, taken))
         else:
-            self._pool.submit(number, Run(keep, seed, full, wall_limit(state)))
+            ends = None if full or not self._known() else ends_of(self._known())
+            self._pool.submit(number, Run(keep, seed, ends, wall_limit(state)))
         return False
 
     def settle(self) -> Start | Broken:
@@ -187,12 +198,16 @@ class Bench:
         for trial in self._open_trials():
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
-            if verdict:
+            run = unproven(self._journal.shown, environment, self.rule) if verdict == "similar" else None
+            in_full = run is not None
+            if run is not None:
+                wanted = [(0, run)]
+            elif verdict:
                 runs, _ = decided_by(self._journal.shown, environment, self.rule)
                 tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
                 self._journal.record(TrialJudged(trial.number, verdict, tests))
             for _, run in wanted:
-                test = Test(environment, run, "hand")
+                test = Test(environment, run, "hand", full=in_full)
                 if self._key(test) in self._started:
                     continue
                 if not self._pool.idle or self._make(test, trial.number) is None:
@@ -253,20 +268,29 @@ class Bench:
                 self._journal.file.set_live([test for test, _ in live])
             self._live_shown = bool(live)
 
+    def _known(self) -> tuple[Failure, ...]:
+        """The failures that count as f now; none before f is fixed."""
+        state = self._journal.state
+        asked = state.scenario["failure"]
+        if self._failed != (state.failures, asked):
+            self._failures = failures_of(self._journal.file, state, FailureSpec.model_validate(asked))
+            self._failed = state.failures, asked
+        return self._failures
+
     def _record(self, test: int, result: RunResult | Broken) -> None:
         journal = self._journal
-        if self._failed != journal.state.failures:
-            spec = FailureSpec.model_validate(journal.state.scenario["failure"])
-            self._failures, self._failed = failures_of(journal.file, journal.state, spec), journal.state.failures
-        data = result_data(result, self._failures)
+        data = result_data(result, self._known())
+        started = journal.state.tests[test - 1]
+        environment = journal.state.environments[started.environment]
+        before = journal.test(environment, started.run)
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
-            started = journal.state.tests[test - 1]
-            environment = journal.state.environments[started.environment]
-            self._started.discard((environment, started.run, journal.is_full(started.phase)))
+            self._started -= {(environment, started.run, full) for full in (False, True)}
         for name in ("first_sensed", "first_touched"):
             data[name] = journal.in_order(data[name])
         if "took_part" in data:
             data["took_part"] = journal.models(data["took_part"])
         journal.record(TestFinished(test, **data), motions_of(result))
         compare(journal, [journal.state.tests[test - 1]])
+        if before is not None and before.cut and data["outcome"] not in (before.outcome, *BROKEN) and not data["cut"]:
+            journal.record(EarlyStopEnded(test=before.id, by=test))

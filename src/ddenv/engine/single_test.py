@@ -4,34 +4,45 @@ run has left still fails as it did.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ddenv.arrays import Floats
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
-from ddenv.engine.worker import Run
+from ddenv.engine.worker import Broken, Run
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
 from ddenv.robot.oracle import Failure
+from ddenv.robot.result import RunResult
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
+from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import RunFile
+from ddenv.runs.playback import table
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import count
+from ddenv.words.early_stop import contradictions, contradicts, record_of
 from ddenv.world.scenario import Oracle, seed_of
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One run to make: the models in the world, the seed, and the model that was left out on purpose, if any."""
+    """One run to make: the models in the world, the seed, and the model that was left out on purpose, if any. It repeats the test
+    `of` of a run.
+    """
 
     keep: frozenset[str]
     seed: int
     without: str | None = None
+    of: int | None = None
 
 
 def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
@@ -72,7 +83,10 @@ def plan(
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
     if leave_each_out:
         keeps += [(frozenset(models) - {name}, name) for name in models]
-    return [Trial(there, each, without) for there, without in keeps for each in seeds]
+    trials = [Trial(there, each, without) for there, without in keeps for each in seeds]
+    if test is not None and not leave_out:
+        trials[0] = replace(trials[0], of=test)
+    return trials
 
 
 def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
@@ -93,9 +107,15 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     "failed".
     """
     failures: tuple[Failure, ...] = ()
-    if subject.run is not None and subject.state is not None:
+    tests: dict[int, tuple[KnownTest, Floats]] = {}
+    state = subject.state
+    if subject.run is not None and state is not None:
         with RunFile(subject.run) as file:
-            failures = failures_of(file, subject.state, subject.scenario.failure)
+            failures = failures_of(file, state, subject.scenario.failure)
+            repeated = state.tests_of(trial.of for trial in trials if trial.of is not None)
+            tests = {
+                test.id: (test, table(file.motion(test.id) or array("d"))) for test in repeated if test.is_finished
+            }
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
     started = shown = 0
@@ -108,11 +128,21 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
                 trial = trials[index]
                 asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
                 results[index] = asked | result_data(result, failures)
+                if trial.of is not None and trial.of in tests:
+                    test, rows = tests[trial.of]
+                    results[index]["recorded"] = record_of(test, _repeats(result, rows))
             while shown in results:
                 yield results.pop(shown)
                 shown += 1
     finally:
         pool.close()
+
+
+def _repeats(result: RunResult | Broken, recorded: Floats) -> bool | None:
+    """Whether a run in full has every bit of a recorded trajectory, which may have ended early; None if nothing is recorded."""
+    if not len(recorded):
+        return None
+    return isinstance(result, RunResult) and np.array_equal(result.trajectory[: len(recorded)], recorded)
 
 
 # Far from all runs of a reduction, of its certificates and of isolations.
@@ -124,19 +154,22 @@ MOST_BROKEN = 5
 @dataclass(frozen=True)
 class Reproduction:
     """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f shows at the rate that the
-    certificate expects (True), or at less than half of it (False); None while that is open.
+    certificate expects (True), or at less than half of it (False); None while that is open. `contradicted` runs repeat a test of
+    the run, and have another verdict than its record.
     """
 
     fails: bool | None
     shown: int
     runs: int
     broken: int
+    contradicted: int = 0
 
     def __str__(self) -> str:
         said = "the runs do not decide"
         if self.fails is not None:
             said = "it fails as it did" if self.fails else "it does not fail as it did"
-        return f"{said}: f in {self.shown} of {count(self.runs, 'run')}"
+        differ = f"; {contradictions(self.contradicted)}" if self.contradicted else ""
+        return f"{said}: f in {self.shown} of {count(self.runs, 'run')}{differ}"
 
 
 def subject_in(run: Path, folder: Path | None) -> Subject:
@@ -168,6 +201,14 @@ def expected(subject: Subject, where: object) -> Certificate:
     return found
 
 
+def _of_record(subject: Subject, trial: Trial) -> Trial:
+    """The same, as the last test of the run with its models and its seed."""
+    state = subject.state
+    assert state is not None
+    alike = [test.id for test in state.tests if test.seed == trial.seed and state.models_of(test) == state.environment]
+    return replace(trial, of=alike[-1] if alike else None)
+
+
 def reproduce(
     subject: Subject, certificate: Certificate, most: int, jobs: int
 ) -> Iterator[tuple[dict[str, Any], Reproduction]]:
@@ -177,14 +218,16 @@ def reproduce(
     """
     shown: list[bool] = []
     broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
-    trials = [trial for seed in seeds for trial in plan(subject, minimal=True, seed=seed)]
+    contradicted = 0
+    trials = [_of_record(subject, trial) for seed in seeds for trial in plan(subject, minimal=True, seed=seed)]
     for result in run_trials(subject, trials or plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most), jobs):
         if result["outcome"] in BROKEN:
             broken += 1
         else:
             shown.append(result["outcome"] == "similar")
+        contradicted += contradicts(result)
         exact = None if all(shown) and len(shown) < len(seeds) else all(shown)
         fails = exact if seeds else shows_at(shown, rate)
-        yield result, Reproduction(fails, sum(shown), len(shown), broken)
+        yield result, Reproduction(fails, sum(shown), len(shown), broken, contradicted)
         if fails is not None or broken > MOST_BROKEN:
             return

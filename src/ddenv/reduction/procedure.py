@@ -32,7 +32,15 @@ from ddenv.evidence.certificate import (
 )
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.round import Candidate, Partition, Round, Search
-from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
+from ddenv.reduction.verdict import (
+    FEWEST_SHOWN,
+    LONGEST_BASELINE,
+    Acceptance,
+    Rule,
+    decided_by,
+    standing,
+    unproven,
+)
 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
 # rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
@@ -43,7 +51,7 @@ Result = TypeVar("Result", covariant=True)
 
 @dataclass(frozen=True)
 class Test:
-    """Run number `run` of an environment. With `full` it runs to its end, even if the robot is stuck for good.
+    """Run number `run` of an environment. With `full` it runs to its end, whatever its purpose.
 
     `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left), "certify" or "isolate"; "hand" and
     "audit" are tests that the driver makes beside the procedure. `without` is the model that a fresh run leaves out.
@@ -54,6 +62,7 @@ class Test:
     why: str
     candidate: int | None = None
     without: int | None = None
+    full: bool = False
 
 
 # Yields the tests that are needed next, in the order in which a single worker would make them, and goes on once some have ended.
@@ -281,19 +290,24 @@ def judge(
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
     Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
-    missed.
+    missed. Nothing is similar before its first run that showed what is looked for has shown it to its end.
     """
     judged, refusals = 0, driver.refusals
     while True:
         if refusals != driver.refusals:
             # The user may want a candidate that was passed over after all.
             judged, refusals = 0, driver.refusals
+        in_full = False
         candidates = islice(environments, judged, None)
         verdicts, wanted = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
         for verdict in verdicts:
             if not verdict:
                 break
             environment = environments[judged]
+            if verdict == "similar" and (run := unproven(driver.shown, environment, rule)) is not None:
+                wanted = [(judged, run)]
+                in_full = True
+                break
             if driver.refused(environment):
                 # Part of what lost the rate, unless the user refused it.
                 if not driver.refused_by_user(environment):
@@ -308,7 +322,7 @@ def judge(
             judged += 1
         if not wanted:
             return None
-        yield tuple(Test(environments[index], run, why, index) for index, run in wanted)
+        yield tuple(Test(environments[index], run, why, index, full=in_full) for index, run in wanted)
 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:

@@ -140,3 +140,11 @@ def _row(
 def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[int, int]:
     """How many runs of a candidate decided its verdict, and how many of them showed f; all of them are finished."""
     return _row(shown, candidate, rule)[2:]
+
+
+def unproven(shown: Callable[..., Shown], candidate: Environment, rule: Rule) -> int | None:
+    """The first run with f of a similar candidate, where that ended early: its end is still to be made. Else None."""
+    decided, _ = decided_by(shown, candidate, rule)
+    runs = (rule.run(place) for place in range(decided))
+    first = next((run for run in runs if shown(candidate, run) is True), None)
+    return first if first is not None and shown(candidate, first, full=True) is None else None
