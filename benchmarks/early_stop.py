@@ -39,7 +39,9 @@ Both = tuple[RunResult, RunResult]
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--scenario", action="append", default=[], help="a bundled name or a YAML file; may be repeated")
+    parser.add_argument(
+        "--scenario", action="append", default=[], help="a bundled name or a YAML file; may be repeated"
+    )
     parser.add_argument("--world", action="append", default=[], help="FILE:SPAWN:GOAL; may be repeated")
     parser.add_argument("--model-path", action="append", default=[], type=Path, help="a folder with models")
     parser.add_argument("--time-step", type=float, help="of worlds, s")

@@ -103,8 +103,6 @@ def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust:
 
 
 def line(result: Mapping[str, Any]) -> str:
-    from ddenv.words.early_stop import beside_record
-
     how = result["failure"]
     if result["end_pose"] is not None:
         how = f"ended at ({coordinates(result['end_pose'][:3])}) m after {result['simulated_seconds']:.1f} s"
@@ -112,9 +110,7 @@ def line(result: Mapping[str, Any]) -> str:
         how += "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     without = f"  without {result['without']}" if result["without"] else ""
     said = printable(f"seed {result['seed']:<10} {result['outcome']:<8} {how}{without}")
-    if "recorded" not in result:
-        return said
-    return f"{said}\n  {printable(beside_record(result))}"
+    return f"{said}\n  {printable(result['recorded'])}" if "recorded" in result else said
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -20,7 +20,7 @@ from ddenv.engine.worker import Broken, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Changed, Test
-from ddenv.reduction.verdict import Acceptance, decided_by, standing, unproven
+from ddenv.reduction.verdict import Acceptance, decided_by, standing
 from ddenv.robot.oracle import Failure, ends_of
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import (
@@ -198,16 +198,12 @@ class Bench:
         for trial in self._open_trials():
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
-            run = unproven(self._journal.shown, environment, self.rule) if verdict == "similar" else None
-            in_full = run is not None
-            if run is not None:
-                wanted = [(0, run)]
-            elif verdict:
+            if verdict:
                 runs, _ = decided_by(self._journal.shown, environment, self.rule)
                 tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
                 self._journal.record(TrialJudged(trial.number, verdict, tests))
             for _, run in wanted:
-                test = Test(environment, run, "hand", full=in_full)
+                test = Test(environment, run, "hand")
                 if self._key(test) in self._started:
                     continue
                 if not self._pool.idle or self._make(test, trial.number) is None:

@@ -390,15 +390,10 @@ class Driver:
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
             chosen = (test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact))
             journal.record(events.CertificateFinished(claims, tuple(sorted({*rested_on, *chosen}))))
-        lost = self._certificate.claims[0].verdict == "lost"
-        if lost and self._journal.stops_early and self._rests_on_early_tests():
-            self._journal.record(events.EarlyStopEnded(certificate=self._certificate.number))
-
-    def _rests_on_early_tests(self) -> bool:
-        """Whether tests that ended early led to what is left."""
-        state = self._journal.state
-        nodes = self._nodes(state.node)
-        return any(test.cut for node in nodes for test in state.tests_of(node.runs))
+        state, last = self._journal.state, self._certificate
+        accepted = (test for node in self._nodes(state.node) for test in state.tests_of(node.runs))
+        if last.claims[0].verdict == "lost" and self._journal.stops_early and any(test.cut for test in accepted):
+            self._journal.record(events.EarlyStopEnded(certificate=last.number))
 
     @property
     def _certificate(self) -> Certificate:

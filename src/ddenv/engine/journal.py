@@ -64,8 +64,7 @@ class Journal:
             self._forget(lambda test: test.implied_by is not None)
         if after.early_stop_ended is not before.early_stop_ended or _f_of(after) != _f_of(before):
             self._forget(lambda test: test.cut)
-            for key, made in self._implying.items():
-                self._implying[key] = [one for one in made if not after.tests[one[2] - 1].cut]
+            self._implying.clear()
 
     def _enter(self, test: Test) -> None:
         if not test.is_finished:
@@ -176,7 +175,7 @@ class Journal:
 
     def is_full(self, wanted: Wanted) -> bool:
         """Whether a test runs to its end although its verdict is clear before."""
-        return wanted.full or wanted.why not in ("round", "hand", "audit") or not self.stops_early
+        return wanted.full or wanted.why not in ("round", "audit") or not self.stops_early
 
     def implying(self, environment: Environment, run: int, full: bool) -> int | None:
         """The first test that implies the run of an environment, if there is one."""

@@ -15,7 +15,7 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
-from ddenv.engine.worker import Broken, Run
+from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
@@ -29,7 +29,7 @@ from ddenv.runs.playback import table
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import count
-from ddenv.words.early_stop import contradictions, contradicts, record_of
+from ddenv.words.early_stop import beside_record
 from ddenv.world.scenario import Oracle, seed_of
 
 
@@ -130,19 +130,13 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
                 results[index] = asked | result_data(result, failures)
                 if trial.of is not None and trial.of in tests:
                     test, rows = tests[trial.of]
-                    results[index]["recorded"] = record_of(test, _repeats(result, rows))
+                    same = isinstance(result, RunResult) and np.array_equal(result.trajectory[: len(rows)], rows)
+                    results[index]["recorded"] = beside_record(test, results[index], same)
             while shown in results:
                 yield results.pop(shown)
                 shown += 1
     finally:
         pool.close()
-
-
-def _repeats(result: RunResult | Broken, recorded: Floats) -> bool | None:
-    """Whether a run in full has every bit of a recorded trajectory, which may have ended early; None if nothing is recorded."""
-    if not len(recorded):
-        return None
-    return isinstance(result, RunResult) and np.array_equal(result.trajectory[: len(recorded)], recorded)
 
 
 # Far from all runs of a reduction, of its certificates and of isolations.
@@ -154,22 +148,19 @@ MOST_BROKEN = 5
 @dataclass(frozen=True)
 class Reproduction:
     """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f shows at the rate that the
-    certificate expects (True), or at less than half of it (False); None while that is open. `contradicted` runs repeat a test of
-    the run, and have another verdict than its record.
+    certificate expects (True), or at less than half of it (False); None while that is open.
     """
 
     fails: bool | None
     shown: int
     runs: int
     broken: int
-    contradicted: int = 0
 
     def __str__(self) -> str:
         said = "the runs do not decide"
         if self.fails is not None:
             said = "it fails as it did" if self.fails else "it does not fail as it did"
-        differ = f"; {contradictions(self.contradicted)}" if self.contradicted else ""
-        return f"{said}: f in {self.shown} of {count(self.runs, 'run')}{differ}"
+        return f"{said}: f in {self.shown} of {count(self.runs, 'run')}"
 
 
 def subject_in(run: Path, folder: Path | None) -> Subject:
@@ -201,14 +192,6 @@ def expected(subject: Subject, where: object) -> Certificate:
     return found
 
 
-def _of_record(subject: Subject, trial: Trial) -> Trial:
-    """The same, as the last test of the run with its models and its seed."""
-    state = subject.state
-    assert state is not None
-    alike = [test.id for test in state.tests if test.seed == trial.seed and state.models_of(test) == state.environment]
-    return replace(trial, of=alike[-1] if alike else None)
-
-
 def reproduce(
     subject: Subject, certificate: Certificate, most: int, jobs: int
 ) -> Iterator[tuple[dict[str, Any], Reproduction]]:
@@ -218,16 +201,21 @@ def reproduce(
     """
     shown: list[bool] = []
     broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
-    contradicted = 0
-    trials = [_of_record(subject, trial) for seed in seeds for trial in plan(subject, minimal=True, seed=seed)]
+    state = subject.state
+    known = (
+        {}
+        if state is None
+        else {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
+    )
+    # The search has made these runs; how they compare with its records is said, too.
+    trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
     for result in run_trials(subject, trials or plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most), jobs):
         if result["outcome"] in BROKEN:
             broken += 1
         else:
             shown.append(result["outcome"] == "similar")
-        contradicted += contradicts(result)
         exact = None if all(shown) and len(shown) < len(seeds) else all(shown)
         fails = exact if seeds else shows_at(shown, rate)
-        yield result, Reproduction(fails, sum(shown), len(shown), broken, contradicted)
+        yield result, Reproduction(fails, sum(shown), len(shown), broken)
         if fails is not None or broken > MOST_BROKEN:
             return

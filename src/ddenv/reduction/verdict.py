@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import count
 from typing import Literal, Protocol
 
 from ddenv.environment import Environment
@@ -143,8 +144,6 @@ def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environmen
 
 
 def unproven(shown: Callable[..., Shown], candidate: Environment, rule: Rule) -> int | None:
-    """The first run with f of a similar candidate, where that ended early: its end is still to be made. Else None."""
-    decided, _ = decided_by(shown, candidate, rule)
-    runs = (rule.run(place) for place in range(decided))
-    first = next((run for run in runs if shown(candidate, run) is True), None)
-    return first if first is not None and shown(candidate, first, full=True) is None else None
+    """The first run with f of a similar candidate, if that has ended early and its end is still to be made."""
+    run = next(run for run in map(rule.run, count()) if shown(candidate, run) is True)
+    return run if shown(candidate, run, full=True) is None else None
