@@ -33,7 +33,7 @@ from ddenv.engine.pool import Pool
 
 # Loads scikit-learn, which is part of the start.
 from ddenv.reduction import partitionings  # noqa: F401
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.result import Ends, Progress, RunResult
 from ddenv.runfile.events import EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
@@ -61,7 +61,9 @@ class Sleeper:
         self._seconds = seconds
         self._log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 
-    def run(self, keep: frozenset[str], seed: int, progress: Progress | None = None, full: bool = True) -> RunResult:
+    def run(
+        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+    ) -> RunResult:
         began = time.monotonic()
         time.sleep(self._seconds)
         failed = keep.issuperset(self._needed)

@@ -232,10 +232,10 @@ class Reduction:
     )
     early_stop: bool = setting(
         True,
-        "end a test when the robot seems to be stuck for good; certificate runs never end early",
+        "end a test once the robot is at rest for good and its verdict is sure; certificate runs never end early",
         printed=False,
         shown="option",
-        cost="On saves the rest of each stuck test.",
+        cost="On saves the rest of each test in which the controller has stopped.",
     )
     slice: bool = setting(
         True,

@@ -104,7 +104,7 @@ class FakePool:
         if not self.running:
             return []
         test, run = self.running.pop(self.random.randrange(len(self.running)))
-        keep, seed, full, changes = run.keep, run.seed, run.full, run.changes
+        keep, seed, full, changes = run.keep, run.seed, run.ends is None, run.changes
         self.made.append((keep, seed))
         cut = "" if full else self.cut(keep, seed)
         shown = cut or (

@@ -15,7 +15,7 @@ class Hostile:
     def __init__(self, *_):
         pass
 
-    def run(self, keep, seed, progress=None, full=True):
+    def run(self, keep, seed, progress=None, ends=None):
         return getattr(self, min(keep))(seed)
 
     def ends(self, seed):
@@ -53,7 +53,7 @@ class DiesWithoutTheBeam:
     def __init__(self, *_):
         self.made = 0
 
-    def run(self, keep, seed, progress=None, full=True):
+    def run(self, keep, seed, progress=None, ends=None):
         if "wall" in keep and "beam" not in keep:
             os.kill(os.getpid(), signal.SIGABRT)
         failed = "wall" in keep

@@ -155,19 +155,19 @@ def test_of_another_simulator_nothing_is_taken_over(made, fresh, monkeypatch):
     assert known(fresh) == {}
 
 
-def test_a_run_that_was_ended_early_never_stands_for_a_full_one(tmp_path):
-    """All that can be cut is: only the baseline is known in full, and what confirms is made again in full."""
+def test_no_other_run_takes_what_was_ended_early(tmp_path):
+    """All that can be cut is: only the baseline, what was accepted and what confirms are known in full."""
     oracle = needs("wall", "beam")
     cut = {"cut": lambda keep, seed: "similar" if {"wall", "beam"} <= keep else "other"}
     first = drive(new_run(tmp_path, early_stop=True, **METHOD), FakePool(oracle, 1, **cut))
     path = new_run(tmp_path, early_stop=True, **METHOD)
-    full = {key[0] for key in known(path) if key[2]}
     whole, left = frozenset(first.elements), frozenset(first.environment)
-    assert full == {whole, left, left - {"wall"}, left - {"beam"}}
-    for (keep, seed, is_full), place in known(path).items():
-        assert not (is_full and place.test.cut), (keep, seed)
+    accepted = {frozenset(node.environment) for node in first.nodes}
+    assert {models for models, _ in known(path)} == {whole, left, left - {"wall"}, left - {"beam"}} | accepted
+    assert not any(place.test.cut for place in known(path).values())
     state = share(path, pool := FakePool(oracle, 1, **cut))
-    assert pool.made == [] and state.minimal and state.cut_tests == first.cut_tests > 0
+    assert state.minimal and set(state.environment) == left
+    assert len(pool.made) == first.cut_tests - len(first.nodes) + 1 == state.cut_tests > 0
 
 
 def test_broken_tests_are_made_again(tmp_path):

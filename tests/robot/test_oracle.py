@@ -12,8 +12,6 @@ from hypothesis import strategies as st
 
 from ddenv.robot.oracle import Failure, judge, kind_of, trajectory_distance
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.run import ANGLE, RADIUS, SECONDS, Stuck
-from ddenv.world.scenario import Controller
 
 
 def path(*points) -> np.ndarray:
@@ -184,33 +182,3 @@ def test_who_was_stuck_before_it_believed_to_be_there_is_not_lost():
     assert kind(standing, arrived=15.0) == "stuck"
     assert kind(standing, arrived=4.0) == "lost"
     assert kind(standing[:1]) == "stuck"
-
-
-@given(start=st.floats(0, 40), x=st.floats(-RADIUS / 3, RADIUS / 3), degrees=st.floats(-1, 1), rate=st.floats(0.5, 9))
-def test_a_run_that_was_cut_is_stuck(start, x, degrees, rate):
-    """A robot that drove `start` s and then rocks in a rut is cut 8 s after that, and its kind says the same."""
-    period = 2 * math.pi / rate
-    trajectory = way(
-        start + SECONDS + period + 1,
-        lambda t: (min(t, start) + x * math.sin(rate * t), 0, 0),
-        lambda t: rolled(degrees * math.sin(rate * t)),
-    )
-    stuck = Stuck(Controller())
-    cut = next(row for row, values in enumerate(trajectory) if stuck.update(values[0], tuple(values[1:])))
-    assert start - 0.3 <= trajectory[cut, 0] - SECONDS <= start + period + 0.3
-    assert kind(trajectory[: cut + 1]) == "stuck"
-
-
-@pytest.mark.parametrize(
-    ("place", "turn"),
-    [
-        (lambda t: (1.5 * RADIUS / SECONDS * t, 0, 0), lambda _: rolled(0)),
-        (lambda t: (0, 0, 0), lambda t: rolled(math.degrees(1.5 * ANGLE / SECONDS * t))),
-        # Waits for 7 s, backs up for a moment, and so on.
-        (lambda t: (0.2 * (t // 7 % 2), 0, 0), lambda _: rolled(0)),
-    ],
-    ids=["creeping", "turning", "trying again"],
-)
-def test_who_still_moves_is_not_stuck_yet(place, turn):
-    stuck = Stuck(Controller())
-    assert not any(stuck.update(values[0], tuple(values[1:])) for values in way(60, place, turn))

@@ -14,6 +14,7 @@ from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
 from ddenv.words.claims import drift, meaning, means, missing, promise, rate, seen, smaller_known, verdict_on, what_ran
+from ddenv.words.early_stop import why_off
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12
@@ -120,6 +121,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         *_certificate_lines(state),
         f"{state.tests_done} tests ({tests}; {count(state.deflake_runs, 're-run')}{more}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
+        *([off] if (off := why_off(state)) else []),
         *([known] if (known := smaller_known(state)) else []),
         *([f"{count(len(broken), 'test')} broke; the last one: {broken[-1].failure}"] if broken else []),
         f"run file: {path}",

@@ -60,7 +60,11 @@ def test_command(
     results = []
     with ExitStack() as robots:
         what = with_margins(_subject(subject, given, simulator, trust, robots), margins)
-        for result in run_trials(what, plan(what, keep=names, **planned), jobs):
+        trials = plan(what, keep=names, **planned)
+        if margins or simulator is not None:
+            # What is changed is no repetition.
+            trials = [replace(trial, of=None) for trial in trials]
+        for result in run_trials(what, trials, jobs):
             results.append(result)
             if not as_json:
                 print(line(result), flush=True)
@@ -105,7 +109,8 @@ def line(result: Mapping[str, Any]) -> str:
         how += f"  {result['failure']}" if result["failure"] else ""
         how += "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     without = f"  without {result['without']}" if result["without"] else ""
-    return printable(f"seed {result['seed']:<10} {result['outcome']:<8} {how}{without}")
+    said = printable(f"seed {result['seed']:<10} {result['outcome']:<8} {how}{without}")
+    return f"{said}\n  {printable(result['recorded'])}" if "recorded" in result else said
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
@@ -21,9 +21,18 @@ from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Changed, Test
 from ddenv.reduction.verdict import Acceptance, decided_by, standing
-from ddenv.robot.oracle import Failure
+from ddenv.robot.oracle import Failure, ends_of
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import Compared, Comparing, Implied, SupportsStarted, TestFinished, TestStarted, TrialJudged
+from ddenv.runfile.events import (
+    Compared,
+    Comparing,
+    EarlyStopEnded,
+    Implied,
+    SupportsStarted,
+    TestFinished,
+    TestStarted,
+    TrialJudged,
+)
 from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
@@ -92,14 +101,14 @@ class Bench:
         return self._pool.busy + len(self._taken)
 
     def _key(self, test: Test) -> tuple[Environment, int, bool]:
-        return test.environment, test.run, self._journal.is_full(test.why)
+        return test.environment, test.run, self._journal.is_full(test)
 
     def _make(self, wanted: Test, trial: int | None = None) -> bool | None:
         """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
         Raises Stopped if the budget is used up and no test runs.
         """
-        journal, full = self._journal, self._journal.is_full(wanted.why)
+        journal, full = self._journal, self._journal.is_full(wanted)
         source = journal.implying(wanted.environment, wanted.run, full)
         implied = source is not None and wanted.why != "audit" and not audit_is_due(journal.state, wanted.why)
         # The budget is that of the reduction, which is over.
@@ -118,13 +127,14 @@ class Bench:
         journal.record(TestStarted(*start, source))
         self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
-        full = full or (source is not None and journal.is_full(state.tests[source - 1].phase))
+        full = full or (source is not None and not state.tests[source - 1].cut)
         keep = frozenset(wanted.environment.names(state.elements))
-        known = self._others.pop((keep, seed, full), None)
+        known = self._others.pop((keep, seed), None)
         if known is not None and (taken := result_of(known)) is not None:
             self._taken.append((number, taken))
         else:
-            self._pool.submit(number, Run(keep, seed, full, wall_limit(state)))
+            ends = None if full or not self._known() else ends_of(self._known())
+            self._pool.submit(number, Run(keep, seed, ends, wall_limit(state)))
         return False
 
     def settle(self) -> Start | Broken:
@@ -172,7 +182,8 @@ class Bench:
         keep = frozenset(state.environments[test.environment].names(state.elements))
         # It ends as the one that was simulated.
         simulated = test if test.implied_by is None else state.tests[test.implied_by - 1]
-        self._pool.submit(0, Run(keep, test.seed, journal.is_full(simulated.phase), wall_limit(state)))
+        ends = ends_of(self._known()) if simulated.cut else None
+        self._pool.submit(0, Run(keep, test.seed, ends, wall_limit(state)))
         while not (ended := self._pool.finished(WAIT)):
             self._control.poll()
         result = ended[0][1]
@@ -263,27 +274,31 @@ class Bench:
 
     def outcome_of(self, result: RunResult | Broken) -> str:
         """What a run showed, judged by what counts as f now."""
-        return str(self._judged(result)["outcome"])
+        return str(result_data(result, self._known())["outcome"])
 
-    def _judged(self, result: RunResult | Broken) -> dict[str, Any]:
-        journal = self._journal
-        failed = journal.state.failures, journal.state.scenario["failure"]["epsilon"]
+    def _known(self) -> tuple[Failure, ...]:
+        """The failures that count as f now; none before f is fixed."""
+        state = self._journal.state
+        failed = state.failures, state.scenario["failure"]
         if self._failed != failed:
-            self._failures = failures_of(journal.file, journal.state)
+            self._failures = failures_of(self._journal.file, state)
             self._failed = failed
-        return result_data(result, self._failures)
+        return self._failures
 
     def _record(self, test: int, result: RunResult | Broken) -> None:
         journal = self._journal
-        data = self._judged(result)
+        data = result_data(result, self._known())
+        started = journal.state.tests[test - 1]
+        environment = journal.state.environments[started.environment]
+        before = journal.test(environment, started.run)
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
-            started = journal.state.tests[test - 1]
-            environment = journal.state.environments[started.environment]
-            self._started.discard((environment, started.run, journal.is_full(started.phase)))
+            self._started -= {(environment, started.run, full) for full in (False, True)}
         for name in ("first_sensed", "first_touched"):
             data[name] = journal.in_order(data[name])
         if "took_part" in data:
             data["took_part"] = journal.models(data["took_part"])
         journal.record(TestFinished(test, **data), motions_of(result))
         compare(journal, [journal.state.tests[test - 1]])
+        if before is not None and before.cut and data["outcome"] not in (before.outcome, *BROKEN) and not data["cut"]:
+            journal.record(EarlyStopEnded(test=before.id, by=test))

@@ -431,6 +431,10 @@ class Driver:
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
             tests = tuple(sorted({*rested_on, *chosen}))
             journal.record(events.CertificateFinished(claims, tests, self._elsewhere(tests)))
+        state, last = self._journal.state, self._certificate
+        accepted = (test for node in self._nodes(state.node) for test in state.tests_of(node.runs))
+        if last.claims[0].verdict == "lost" and self._journal.stops_early and any(test.cut for test in accepted):
+            self._journal.record(events.EarlyStopEnded(certificate=last.number))
 
     def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
         """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""

@@ -10,6 +10,7 @@ from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.evidence.rates import Shown, estimated_rate
 from ddenv.evidence.slices import Ties, implies
+from ddenv.reduction.procedure import Test as Wanted
 from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
@@ -23,8 +24,8 @@ class Journal:
     """The events of a run, `state` folded from them, and a memo of its finished tests by (environment, run, full).
 
     A test that broke is made twice, and again by the next engine where a verdict needs it. Tests that ran to their end have
-    `full` True, those that the search asked for False, most both: `early_stop` only changes runs that it cuts. While a user's
-    `command` is obeyed, events hold its number.
+    `full` True, those that the search asked for False, most both: `early_stop` only changes runs that it cuts. What was cut
+    counts only while the same ends count as f, and early stop is used. While a user's `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -61,6 +62,9 @@ class Journal:
             self._forget(lambda test: test.outcome in BROKEN and self._is_made_again(test))
         if after.refuted is not before.refuted:
             self._forget(lambda test: test.implied_by is not None)
+        if after.early_stop_ended is not before.early_stop_ended or _f_of(after) != _f_of(before):
+            self._forget(lambda test: test.cut)
+            self._implying.clear()
 
     def _enter(self, test: Test) -> None:
         if not test.is_finished:
@@ -164,9 +168,14 @@ class Journal:
         """The first of `tests` that showed f."""
         return next(test for test in tests if self.state.tests[test - 1].outcome == "similar")
 
-    def is_full(self, phase: str) -> bool:
-        """Whether tests of this phase run to the end even if the robot is stuck for good."""
-        return phase not in ("round", "hand", "audit") or not read(self.state.scenario, SETTINGS["early_stop"])
+    @property
+    def stops_early(self) -> bool:
+        """Whether tests may end early."""
+        return bool(read(self.state.scenario, SETTINGS["early_stop"])) and self.state.early_stop_ended is None
+
+    def is_full(self, wanted: Wanted) -> bool:
+        """Whether a test runs to its end although its verdict is clear before."""
+        return wanted.full or wanted.why not in ("round", "audit") or not self.stops_early
 
     def implying(self, environment: Environment, run: int, full: bool) -> int | None:
         """The first test that implies the run of an environment, if there is one."""
@@ -234,3 +243,8 @@ class Journal:
         if self.state.round is None:
             raise UserError("damaged run file: there is no round yet")
         return self.state.round
+
+
+def _f_of(state: RunState) -> object:
+    """What says where f ended, and how near that is: a test that ended early was decided by it."""
+    return state.failures, state.scenario.get("failure")

@@ -20,6 +20,7 @@ from ddenv.errors import UserError
 from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import estimated_rate
+from ddenv.robot.oracle import ends_of
 from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
@@ -184,7 +185,8 @@ class _Search:
         self._running[self._submitted] = one
         seed, limit = seed_of(self._parts[0].reduction, run), wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
-        test = Run(self._kept, seed, run >= known.FIRST_FIX_RUN, limit, self._changes(name, value))
+        ends = None if run >= known.FIRST_FIX_RUN or not self._journal.stops_early else ends_of(self._failures)
+        test = Run(self._kept, seed, ends, limit, self._changes(name, value))
         self._pool.submit(self._submitted, test)
         self._control.started()
 

@@ -138,8 +138,9 @@ def write_mcap(run: Path, target: Path) -> list[str]:
     writer.write_message(RESULT, schemas[WORDS], {"data": shown(state)}, nanoseconds(0.0))
     for name, test, rows in chosen:
         streams, models = Streams(), frozenset(state.models_of(test))
-        result = template.run(models, test.seed, None, not test.cut, streams)
-        if not np.array_equal(result.trajectory, rows):
+        result = template.run(models, test.seed, listener=streams)
+        # A test that ended early is written to its end.
+        if not np.array_equal(result.trajectory[: len(rows)], rows):
             raise UserError(f"{run}: test {test.id} gives different bits here: another Drake or processor made it")
         for topic, kind, seconds, message in messages(name, models, result, streams, subject):
             whole = topic if topic.startswith("/") else f"/{name}/{topic}"

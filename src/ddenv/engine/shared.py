@@ -16,7 +16,7 @@ from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import CERTIFY, RunState, Test
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import ROBOT, RunFile
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
@@ -25,8 +25,8 @@ from ddenv.world.scenario import Scenario
 
 OURS = ("straight", "costmap")
 
-# Models, seed, and whether the test ran to its end.
-Key = tuple[frozenset[str], int, bool]
+# Models and seed.
+Key = tuple[frozenset[str], int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def machine() -> str:
 
 
 def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key, Place]:
-    """The tests of the other runs in `folder`, by models, seed, and whether they ran to the end."""
+    """The tests of the other runs in `folder` that ran to their end, by models and seed."""
     if scenario.oracle is not None or scenario.controller.use not in OURS:
         return {}
     known: dict[Key, Place] = {}
@@ -72,12 +72,9 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
 
 def _tests_of(path: Path, state: RunState) -> Iterator[tuple[Key, Place]]:
     for test in state.tests:
-        # Another run implies for itself.
-        if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None:
-            models = frozenset(state.models_of(test))
-            for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
-                if holds:
-                    yield (models, test.seed, full), Place(path, test, state.elements)
+        # Another run implies for itself. What ended early there was decided by where f ended there.
+        if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None and not test.cut:
+            yield (frozenset(state.models_of(test)), test.seed), Place(path, test, state.elements)
 
 
 def _asked(created: Created) -> Any:

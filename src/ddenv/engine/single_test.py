@@ -4,11 +4,15 @@ run has left still fails as it did.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ddenv.arrays import Floats
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
 from ddenv.engine.worker import Run
@@ -16,23 +20,30 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
 from ddenv.robot.oracle import Failure
+from ddenv.robot.result import RunResult
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
+from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import RunFile
+from ddenv.runs.playback import table
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import count
 from ddenv.words.claims import still_fails
+from ddenv.words.early_stop import beside_record
 from ddenv.world.scenario import Oracle, seed_of
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One run to make: the models in the world, the seed, and the model that was left out on purpose, if any."""
+    """One run to make: the models in the world, the seed, and the model that was left out on purpose, if any. It repeats the test
+    `of` of a run.
+    """
 
     keep: frozenset[str]
     seed: int
     without: str | None = None
+    of: int | None = None
 
 
 def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
@@ -73,7 +84,10 @@ def plan(
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
     if leave_each_out:
         keeps += [(frozenset(models) - {name}, name) for name in models]
-    return [Trial(there, each, without) for there, without in keeps for each in seeds]
+    trials = [Trial(there, each, without) for there, without in keeps for each in seeds]
+    if test is not None and not leave_out:
+        trials[0] = replace(trials[0], of=test)
+    return trials
 
 
 def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
@@ -94,9 +108,15 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     "failed".
     """
     failures: tuple[Failure, ...] = ()
-    if subject.run is not None and subject.state is not None:
+    tests: dict[int, tuple[KnownTest, Floats]] = {}
+    state = subject.state
+    if subject.run is not None and state is not None:
         with RunFile(subject.run) as file:
-            failures = failures_of(file, subject.state)
+            failures = failures_of(file, state)
+            repeated = state.tests_of(trial.of for trial in trials if trial.of is not None)
+            tests = {
+                test.id: (test, table(file.motion(test.id) or array("d"))) for test in repeated if test.is_finished
+            }
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
     started = shown = 0
@@ -109,6 +129,10 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
                 trial = trials[index]
                 asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
                 results[index] = asked | result_data(result, failures)
+                if trial.of is not None and trial.of in tests:
+                    test, rows = tests[trial.of]
+                    same = isinstance(result, RunResult) and np.array_equal(result.trajectory[: len(rows)], rows)
+                    results[index]["recorded"] = beside_record(test, results[index], same)
             while shown in results:
                 yield results.pop(shown)
                 shown += 1
@@ -176,7 +200,14 @@ def reproduce(
     """
     shown: list[bool] = []
     broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
-    trials = [trial for seed in seeds for trial in plan(subject, minimal=True, seed=seed)]
+    state = subject.state
+    known = (
+        {}
+        if state is None
+        else {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
+    )
+    # The search has made these runs; how they compare with its records is said, too.
+    trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
     for result in run_trials(subject, trials or plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most), jobs):
         if result["outcome"] in BROKEN:
             broken += 1

@@ -24,7 +24,7 @@ from ddenv.errors import UserError
 from ddenv.robot.external.process import MOST_LEFT, PIECE, Complaints, signal_name
 from ddenv.robot.external.python_simulator import PythonSimulator
 from ddenv.robot.external.simulator import ExternalSimulator
-from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
+from ddenv.robot.result import Ends, PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
 from ddenv.text import printable
 from ddenv.world.model import Model, World
@@ -64,13 +64,13 @@ class Start:
 
 @dataclass(frozen=True)
 class Run:
-    """Asks for a test. If not `full`, it ends as soon as the robot is stuck for good. `changes` have other values by name. It may
-    take `limit` s of real time, without its preparation; None for what the scenario says.
+    """Asks for a test. With `ends` it may end early, see `Simulator.run`. `changes` have other values by name. It may take `limit`
+    s of real time, without its preparation; None for what the scenario says.
     """
 
     keep: frozenset[str]
     seed: int
-    full: bool = True
+    ends: Ends | None = None
     limit: float | None = None
     changes: Changes = ()
 
@@ -194,7 +194,7 @@ def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Momen
         if isinstance(simulator, ExternalSimulator):
             # It ends a test itself, and says why.
             simulator.limit = task.limit or simulator.limit
-        return simulator.run(task.keep, task.seed, _progress(tell), task.full)
+        return simulator.run(task.keep, task.seed, _progress(tell), task.ends)
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:
         if error is simulator and isinstance(error, UserError):

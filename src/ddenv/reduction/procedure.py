@@ -35,7 +35,15 @@ from ddenv.evidence.certificate import (
 )
 from ddenv.evidence.rates import Shown
 from ddenv.reduction.round import Candidate, Partition, Round, Search
-from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
+from ddenv.reduction.verdict import (
+    FEWEST_SHOWN,
+    LONGEST_BASELINE,
+    Acceptance,
+    Rule,
+    decided_by,
+    standing,
+    unproven,
+)
 
 # After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
 # rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
@@ -50,7 +58,7 @@ Result = TypeVar("Result", covariant=True)
 
 @dataclass(frozen=True)
 class Test:
-    """Run number `run` of an environment. With `full` it runs to its end, even if the robot is stuck for good.
+    """Run number `run` of an environment. With `full` it runs to its end, whatever its purpose.
 
     `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left), "certify" or "isolate"; "hand" and
     "audit" are tests that the driver makes beside the procedure. `without` is the model that a fresh run leaves out.
@@ -61,6 +69,7 @@ class Test:
     why: str
     candidate: int | None = None
     without: int | None = None
+    full: bool = False
 
 
 # Yields the tests that are needed next, in the order in which a single worker would make them, and goes on once some have ended.
@@ -288,19 +297,24 @@ def judge(
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
     Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
-    missed.
+    missed. Nothing is similar before its first run that showed what is looked for has shown it to its end.
     """
     judged, refusals = 0, driver.refusals
     while True:
         if refusals != driver.refusals:
             # The user may want a candidate that was passed over after all.
             judged, refusals = 0, driver.refusals
+        in_full = False
         candidates = islice(environments, judged, None)
         verdicts, wanted = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
         for verdict in verdicts:
             if not verdict:
                 break
             environment = environments[judged]
+            if verdict == "similar" and (run := unproven(driver.shown, environment, rule)) is not None:
+                wanted = [(judged, run)]
+                in_full = True
+                break
             if driver.refused(environment):
                 # Part of what lost the rate, unless the user refused it.
                 if not driver.refused_by_user(environment):
@@ -316,7 +330,7 @@ def judge(
             judged += 1
         if not wanted:
             return None
-        yield tuple(Test(environments[index], run, why, index) for index, run in wanted)
+        yield tuple(Test(environments[index], run, why, index, full=in_full) for index, run in wanted)
 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
@@ -325,13 +339,7 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
         yield tuple(Test(left, run, "round") for run in missing)
     certificate = driver.certificate_due()
-    terms = certificate.terms
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
-
-    def claims(error: float) -> Iterator[tuple[int | None, Environment, Procedure]]:
-        yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
-        for model, rest in () if certificate.exact else rests.items():
-            yield model, rest, falls(rest, left, error)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
@@ -339,15 +347,8 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
             return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in fresh)
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
-    if terms.order_seed is not None:
-        made = yield from _settled_in_blocks(driver, certificate, left, whole, rests, ends)
-    else:
-        # Models are taken to be in turn, until the rate turns out not to be kept.
-        made = yield from settled(driver, claims(terms.error_of_models(1.0)), ends, certificate.first_run, "certify")
-        if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
-            made = yield from settled(driver, claims(error), ends, certificate.first_run, "certify")
-        if _is_minimal_but_for(made):
-            made = yield from settled(driver, claims(error / len(rests)), ends, certificate.first_run, "certify")
+    settle_claims = _settled_in_turn if certificate.terms.order_seed is None else _settled_in_blocks
+    made = yield from settle_claims(driver, certificate, left, whole, rests, ends)
     if certificate.exact:
         # The search has made these runs.
         for model, rest in rests.items():
@@ -358,6 +359,34 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     certified = Certified(certificate, made)
     driver.certified(certified)
     return certified
+
+
+def _settled_in_turn(
+    driver: Driver,
+    certificate: Certificate,
+    left: Environment,
+    whole: Environment,
+    rests: Mapping[int, Environment],
+    ends: Callable[[NamedClaim], bool],
+) -> Work[tuple[NamedClaim, ...]]:
+    """The claims of a certificate with seeds, up to one that `ends` them."""
+    terms = certificate.terms
+
+    def claims(error: float) -> Iterator[tuple[int | None, Environment, Procedure]]:
+        yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
+        for model, rest in () if certificate.exact else rests.items():
+            yield model, rest, falls(rest, left, error)
+
+    def settled_with(error: float) -> Work[tuple[NamedClaim, ...]]:
+        return settled(driver, claims(error), ends, certificate.first_run, "certify")
+
+    # Models are taken to be in turn, until the rate turns out not to be kept.
+    made = yield from settled_with(terms.error_of_models(1.0))
+    if (error := terms.error_of_models(made[0].claim.bound)) < terms.error_of_models(1.0):
+        made = yield from settled_with(error)
+    if _is_minimal_but_for(made):
+        made = yield from settled_with(error / len(rests))
+    return made
 
 
 def _is_minimal_but_for(made: Sequence[NamedClaim]) -> bool:
@@ -445,9 +474,7 @@ def _settled_in_blocks(
         if ended is not None or _left_of(terms, made) <= 0:
             if models and in_turn < error:
                 named = [of_left, *claims_of(opened(in_turn, first))]
-            # To a search that goes on, claims that are still open are of no use.
-            named = [one for one in named if ended is None or one.model in (None, ended.model)]
-            return tuple(replace(one, claim=_given_up(one.claim)) for one in named)
+            return _without_more_runs(named, ended)
         if of_left.claim.verdict and in_turn < error:
             # Models were taken to be in turn. Blocks that are over do not go on.
             error = in_turn
@@ -457,17 +484,23 @@ def _settled_in_blocks(
             models = opened(error, first)
             continue
         wanted = {test for one in named for test in one.claim.wanted}
-        if not wanted:
-            if chosen or not _is_minimal_but_for(named):
-                return tuple(named)
+        if not wanted and not chosen and _is_minimal_but_for(named):
             chosen = True
             error /= len(rests)
             models = opened(error, first)
             continue
+        if not wanted:
+            return tuple(named)
         block = min(run for _, run in wanted)
         order = _in_drawn_order((test for test in wanted if test[1] == block), terms.order_seed)
         made += 1
         yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+
+
+def _without_more_runs(named: Iterable[NamedClaim], ended: NamedClaim | None) -> tuple[NamedClaim, ...]:
+    """What is said of these claims. To a search that goes on after one `ended`, those that are still open are of no use."""
+    used = (one for one in named if ended is None or one.model in (None, ended.model))
+    return tuple(replace(one, claim=_given_up(one.claim)) for one in used)
 
 
 def _in_drawn_order(tests: Iterable[tuple[Environment, int]], seed: int | None) -> list[tuple[Environment, int]]:

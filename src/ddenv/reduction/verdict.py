@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import count
 from typing import Literal, Protocol
 
 from ddenv.environment import Environment
@@ -157,3 +158,9 @@ def _row(
 def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[int, int, int]:
     """How many runs of a candidate decided its verdict, how many of them showed f, and how many broke; all of them are finished."""
     return _row(shown, candidate, rule)[2:]
+
+
+def unproven(shown: Callable[..., Shown], candidate: Environment, rule: Rule) -> int | None:
+    """The first run with f of a similar candidate, if that has ended early and its end is still to be made."""
+    run = next(run for run in map(rule.run, count()) if shown(candidate, run) is True)
+    return run if shown(candidate, run, full=True) is None else None

@@ -15,6 +15,7 @@ from ddenv.runfile.state import BROKEN, RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.baseline import failed_in, missed
 from ddenv.words.claims import drift, means, missing, promise
+from ddenv.words.early_stop import WHY, why_off
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
 # The maximum number of models with a row each.
@@ -91,10 +92,11 @@ def _tests(state: RunState) -> list[Block]:
     ahead = state.ahead if state.status == "finished" else 0
     words = (
         f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, and "
-        f"{thousands(state.cut_tests)} ended early because the robot was stuck for good"
+        f"{thousands(state.cut_tests)} ended early: {WHY}"
     )
     idle = f"; {thousands(ahead)} were started early by idle workers and not needed" if ahead else ""
-    return [table, say(f"{words}{idle}."), *_slices(state)]
+    off = [say(as_sentence(said))] if (said := why_off(state)) else []
+    return [table, say(f"{words}{idle}."), *off, *_slices(state)]
 
 
 def _slices(state: RunState) -> list[Block]:

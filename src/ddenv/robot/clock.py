@@ -52,6 +52,11 @@ class Clock:
         return cls(step, max(1, round(scenario.failure.timeout / step)), every)
 
     @property
+    def seconds(self) -> float:
+        """When time is up, s."""
+        return self.last * self.step
+
+    @property
     def command_period(self) -> float:
         """The time between two commands, s."""
         return self.every["command"] * self.step

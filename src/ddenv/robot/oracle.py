@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ddenv.arrays import Floats
-from ddenv.robot.result import RunResult
+from ddenv.robot.result import Ends, RunResult
 from ddenv.world.pose import Pose, Vector
 
 LEAN = math.radians(60)  # a robot that leans more than this no longer stands on its wheels, rad
@@ -19,8 +20,7 @@ DROP, DROP_SECONDS = 1.0, 0.6
 SETTLING = 1.0  # a robot may drop onto the ground when a run begins, s
 
 # Within half a robot's length (m) of its end for this time (s). A moving robot leaves such a circle in a second or two; one that
-# rocks back and forth to get free stays. The time is shorter than what `Stuck` waits for, so that a run that was cut short is
-# stuck here as well.
+# rocks back and forth to get free stays.
 STILL, STILL_SECONDS = 0.5, 6.0
 
 
@@ -70,6 +70,13 @@ class Failure:
     trajectory: Floats
     epsilon: float
     similarity: str = "end-pose"
+
+
+def ends_of(failures: Sequence[Failure]) -> Ends:
+    """The ends of `failures`, of which there is at least one; they share their epsilon."""
+    f = failures[0]
+    positions = tuple(each.position for each in failures)
+    return Ends(positions, f.epsilon, suffice=f.similarity == "end-pose")
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ddenv.arrays import Floats
+from ddenv.world.pose import Vector
 
 # x, y, z (m), qw, qx, qy, qz.
 PoseRow = tuple[float, float, float, float, float, float, float]
@@ -27,7 +28,7 @@ class RunResult:
     in the world frame. `motions` holds such rows for each dynamic model that moved.
     `first_touched` maps a model to the time (s) when the robot first touched it, `first_sensed` to the time when it first had it in
     view or touched it, which is never later. Models that it never touched or sensed are absent.
-    `cut` is True if the run was cut short because the robot was stuck for good.
+    `cut` is True if the run was cut short: the robot was at rest for good, and no longer run would change its verdict.
     `took_part` names the models that can have changed a bit of the run; None if that is unknown. A run with the same seed in a
     world that lacks others, and breaks no tie, repeats every bit of this one. Equal runs name the same models.
     `taken` names the finished run that implies this one, "" for a run that was made.
@@ -53,15 +54,34 @@ class RunResult:
         return x, y, z, qw, qx, qy, qz
 
 
+@dataclass(frozen=True)
+class Ends:
+    """Where the failures that count as f ended, m: all that a run has to know of f to end early.
+
+    Without `suffice` a run that ends there still has to show that it came on a similar way.
+    """
+
+    positions: tuple[Vector, ...]
+    epsilon: float
+    suffice: bool = True
+
+    def decide(self, place: Vector, slides: float) -> bool:
+        """Whether failed runs that end within `slides` (m) of `place` all have the same verdict."""
+        away = min(math.dist(place, position) for position in self.positions)
+        return away - slides > self.epsilon or (self.suffice and away + slides < self.epsilon)
+
+
 class Simulator(Protocol):
     """Runs the robot in parts of one world."""
 
-    def run(self, keep: frozenset[str], seed: int, progress: Progress | None = None, full: bool = True) -> RunResult:
+    def run(
+        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+    ) -> RunResult:
         """Runs the robot in the world with the models `keep`, and with those that always stay.
 
         `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw, qx, qy, qz) of the robot and,
-        by name, of the models that can move, at each recorded sample. A run that is not `full` may be cut short as soon as the
-        robot is stuck for good. Raises ValueError for unknown names.
+        by name, of the models that can move, at each recorded sample. With `ends` a run may be cut short once the robot is at
+        rest for good and its verdict by these is sure. Raises ValueError for unknown names.
         """
         ...
 

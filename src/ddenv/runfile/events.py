@@ -358,6 +358,16 @@ class SlicesRefuted(Event):
     node: Natural
 
 
+class EarlyStopEnded(Event):
+    """From here on all tests run to their end: the tests that led to what a `certificate` refutes ended early; or the test `by`
+    shows to its end another verdict than `test`, which ended early.
+    """
+
+    certificate: Number | None = None
+    test: Number | None = None
+    by: Number | None = None
+
+
 # Certificates.
 
 

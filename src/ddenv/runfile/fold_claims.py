@@ -202,6 +202,10 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
     }
 
 
+def early_stop_ended(state: RunState, event: e.EarlyStopEnded, _: float) -> Changes:
+    return {"early_stop_ended": event}
+
+
 def rests_on_slices(state: RunState, node: Node) -> bool:
     """Whether a node was reached by implied tests, or by a slice."""
     return node.how == "sliced" or _any_implied(state, (*node.runs, node.evidence_test or 0))

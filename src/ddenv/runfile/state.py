@@ -13,7 +13,7 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.progress import Isolation, Margins, Node, Physics, path
 
 if TYPE_CHECKING:
-    from ddenv.runfile.events import BaselineFinished, Forecast, Place
+    from ddenv.runfile.events import BaselineFinished, EarlyStopEnded, Forecast, Place
     from ddenv.runfile.progress import Certificate, Decision, Leg, Point, Refusal, Removal
 
 # Items in a chunk. A change copies one chunk and the list of chunks; for the longest runs (60,000 tests) both are about as long.
@@ -123,6 +123,7 @@ class RunState:
     Of the tests, `implied` ones were not simulated, and `audits` were although they were implied;
     decisions rest on those with the bits 1 << id of `rests_on`. Those up to `mixed_until` were computed with something else, and
     imply nothing now. If one of these, the first of `refuted`, did not repeat the second, slices are no longer used.
+    Since `early_stop_ended` all tests run to their end.
     `engines` counts the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one
     makes them again. `notes` say what is wrong with the whole world: a word and a sentence each. `refusal` is the last command
     that the engine could not obey, with the reason. `needs_room` is how many bytes have to be free on the disk before more tests
@@ -181,6 +182,7 @@ class RunState:
     rests_on: int = 0
     audits: int = 0
     refuted: tuple[int, int] | None = None
+    early_stop_ended: EarlyStopEnded | None = None
     notes: tuple[tuple[str, str], ...] = ()
     settling: bool = False
     unsettled: str = ""

@@ -19,6 +19,7 @@ from ddenv.text import count, first_of, plain
 from ddenv.words import margins
 from ddenv.words.baseline import baseline
 from ddenv.words.claims import made_of_usual, of_passing, smaller_known, usual_runs, verdict_on
+from ddenv.words.early_stop import early_among, ended_early, why_off
 from ddenv.words.signs import SETTLING, outcome
 from ddenv.words.slices import implied_words, refuted_words, slice_words
 
@@ -137,7 +138,8 @@ def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> s
         endings = Counter(_ending(state, test) for test in state.tests_of(one.tests) if test.is_finished)
         ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
         implied = f", {words}" if (words := implied_words(state, one.tests)) else ""
-        said.append(f"  {what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{implied}")
+        early = f", {words}" if (words := early_among(state.tests_of(one.tests))) else ""
+        said.append(f"  {what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{early}{implied}")
     return "".join(said)
 
 
@@ -194,6 +196,7 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
     "reduced": lambda _, after: f"  reduced to {_left(after)} after {after.tests_done} tests",
     "sliced": lambda _, after: f"  reduced to {_left(after)}: {slice_words(after, after.nodes[after.node])}",
     "slices_refuted": lambda _, after: refuted_words(after),
+    "early_stop_ended": lambda _, after: f"  {why_off(after)}",
     "certificate_started": _certificate_started,
     "certificate_finished": lambda _, after: (
         f"  certificate {after.certificates[-1].number}: "
@@ -249,4 +252,7 @@ def _of_test(state: RunState, test: Test) -> str:
     what = f"test {test.id} ({purpose(state, test)}, seed {test.seed})"
     if test.implied_by is not None:
         return f"{what} follows from test {test.implied_by}: {outcome(test)}"
-    return f"{what} starts" if test.outcome == "running" else f"{what}: {outcome(test) or test.outcome}"
+    if test.outcome == "running":
+        return f"{what} starts"
+    early = f", {ended_early(test)}" if test.cut else ""
+    return f"{what}: {outcome(test) or test.outcome}{early}"

@@ -22,7 +22,7 @@ from ddenv.robot.external.process import running
 from ddenv.robot.external.protocol import Ended, Row, SimulatorSetup, SubWorld
 from ddenv.robot.external.simulator import EXPECTED, BadLog, PoseLog, scenario_in, temporary_folder, write_files
 from ddenv.robot.oracle import kind_of
-from ddenv.robot.result import PoseRow, Progress, RunResult, has_moved
+from ddenv.robot.result import Ends, PoseRow, Progress, RunResult, has_moved
 from ddenv.schemas import nearest
 from ddenv.text import plain
 from ddenv.world.command import start_folder
@@ -73,8 +73,10 @@ class PythonSimulator:
         """Removes the files of its tests. They are also removed when this process ends, however it does."""
         self._open.close()
 
-    def run(self, keep: frozenset[str], seed: int, progress: Progress | None = None, full: bool = True) -> RunResult:
-        """As `Simulator.run`; `full` has no effect. Raises UserError for whatever the user's class does wrong."""
+    def run(
+        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+    ) -> RunResult:
+        """As `Simulator.run`; `ends` has no effect. Raises UserError for whatever the user's class does wrong."""
         if unknown := keep - self._names:
             raise ValueError(f"no such model: {min(unknown)}")
         started = time.perf_counter()

@@ -23,7 +23,7 @@ from ddenv.errors import UserError
 from ddenv.robot.controllers import WrongAnswer
 from ddenv.robot.external.process import BEGIN, Ended, running, watch
 from ddenv.robot.oracle import kind_of
-from ddenv.robot.result import RECORD_PERIOD, Progress, RunResult
+from ddenv.robot.result import RECORD_PERIOD, Ends, Progress, RunResult
 from ddenv.text import printable
 from ddenv.world.command import command_words, filled, has_placeholder, start_folder
 from ddenv.world.files.resources import ENVIRONMENT, PACKAGES
@@ -49,10 +49,12 @@ class ExternalSimulator:
         self.limit = scenario.simulation.wall_timeout or math.inf
         self._removable = frozenset(world.elements(frozenset(scenario.protected)))
 
-    def run(self, keep: frozenset[str], seed: int, progress: Progress | None = None, full: bool = True) -> RunResult:
+    def run(
+        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+    ) -> RunResult:
         """As `Simulator.run`, with the robot's pose alone for `progress`, of each row that the command prints.
 
-        `full` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises UserError if no
+        `ends` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises UserError if no
         temporary file can be written.
         """
         unknown = keep - self._names

@@ -225,6 +225,11 @@ class Autonomy:
         # What was measured since the last command, by the names of `Reading`.
         self._new: dict[str, Any] = {}
 
+    @property
+    def is_over(self) -> bool:
+        """Whether a built-in controller has stopped for good."""
+        return self.arrived is not None or bool(getattr(self._controller, "gave_up", False))
+
     def sense(self, tick: Tick, truth: Truth, scan: Scan | None) -> None:
         """Takes the measurements that are due at `tick`, and updates the pose estimate."""
         if tick.odometry:

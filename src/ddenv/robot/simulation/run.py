@@ -21,10 +21,11 @@ from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.autonomy import Autonomy, Truth
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.simulation.notice import Notice
+from ddenv.robot.simulation.rest import SLOW, Rest
 from ddenv.robot.simulation.taking_part import Reached
 from ddenv.world.drive import Drive
-from ddenv.world.pose import Pose, angle_between
-from ddenv.world.scenario import Controller, Scenario
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Scenario
 
 UNSOLVED = "did not converge"  # in what Drake's solver says when it finds no contact forces
 LONGEST_LOOK = 10.0  # the maximum real time between two recorded poses that counts as time of the run, s
@@ -37,7 +38,7 @@ class Run:
     """One run in a prepared context: start poses are set, removed models are switched off.
 
     No part of the robot is farther than `reach` (m) from its first link. `kept` are the moving models whose motion is recorded.
-    With `stuck` the run is cut short once the robot is stuck for good. Without `reached` it stays unknown who took part;
+    With `rest` the run is cut short once the robot is at rest for good. Without `reached` it stays unknown who took part;
     `unusual` take part in any case.
     """
 
@@ -49,7 +50,7 @@ class Run:
     autonomy: Autonomy
     lidar: Lidar | None
     reach: float
-    stuck: Stuck | None
+    rest: Rest | None
     reached: Reached | None
     unusual: frozenset[str]
     kept: Sequence[Body]
@@ -82,7 +83,8 @@ class Run:
         outcome, failure, cut, seconds = self._loop(progress or (lambda *_: None))
         trajectory = self._recording.trajectory()
         if outcome == "failed":
-            failure = kind_of(trajectory, fell=failure == "fell", arrived=self.autonomy.arrived)
+            whole = np.vstack([trajectory, [self.context.clock.seconds, *trajectory[-1, 1:]]]) if cut else trajectory
+            failure = kind_of(whole, fell=failure == "fell", arrived=self.autonomy.arrived)
         seen, took_part = self.lidar.first_seen if self.lidar else {}, None
         if self.reached and outcome != "error":
             read = self.lidar.took_part if self.lidar else {}
@@ -151,9 +153,16 @@ class Run:
             return "failed", "fell", False
         if tick.step >= self.context.clock.last:
             return "failed", "", False
-        if self.stuck and tick.record and self.stuck.update(tick.time, pose):
+        if self.rest and tick.record and self.rest.update(tick.time, pose[:3], self._is_still()):
             return "failed", "", True
         return None
+
+    def _is_still(self) -> bool:
+        """Whether the controller has stopped for good, and no joint, no wheel and no model moves."""
+        if not self.autonomy.is_over or self.sleep.pace.max(initial=0.0) > SLOW:
+            return False
+        speeds = self._state[self.context.built.plant.num_positions() :]
+        return all(abs(speed) <= SLOW for speed in speeds)
 
     def _simulate(self, until: float) -> str:
         """Simulates up to the time `until` (s). Returns what went wrong, or ""."""
@@ -223,36 +232,3 @@ class Run:
 
 def _mass(body: Body) -> float:
     return float(sum(link.default_mass() for link in body.links))
-
-
-# A robot that stays within this distance (m) and angle (rad) for this time (s) is stuck. Wheels that slip in a rut rock a robot by
-# less; a robot that turns on the spot or backs up leaves these limits in a fraction of a second.
-RADIUS = 0.05
-ANGLE = math.radians(5)
-SECONDS = 8.0
-
-# The controller `costmap` first stands still for its patience, clears its map and waits as long again before it backs up and
-# turns: nobody may call it stuck before that.
-PATIENCES = 3.0
-
-
-class Stuck:
-    """Finds out whether a robot is stuck for good, from the recorded poses of one run.
-
-    It is a guess: a robot may still come free later. So runs that were not cut short confirm what a reduction leaves.
-    """
-
-    def __init__(self, controller: Controller) -> None:
-        # How long a robot with this controller must not have moved, s.
-        patience = PATIENCES * controller.planner.patience if controller.use == "costmap" else 0.0
-        self._seconds = max(SECONDS, patience)
-        self._since = 0.0
-        self._place: PoseRow | None = None
-
-    def update(self, now: float, pose: PoseRow) -> bool:
-        """Whether the robot is stuck at `now` (s). Call it for each recorded pose, in order of time."""
-        place = self._place
-        if place is None or math.dist(place[:3], pose[:3]) > RADIUS or angle_between(place[3:], pose[3:]) > ANGLE:
-            self._since, self._place = now, pose
-        # Times are sums of steps: 8 s may come out 1e-15 s short.
-        return now - self._since >= self._seconds - 1e-6

@@ -16,13 +16,14 @@ from ddenv.robot.drake.region import LeftRegion, Place, Region
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.result import Ends, Progress, RunResult
 from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
 from ddenv.robot.sensing.beams import Obstacles
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.settled import Settled
 from ddenv.robot.simulation.notice import Notice, still_boxes
-from ddenv.robot.simulation.run import Run, Stuck
+from ddenv.robot.simulation.rest import Rest
+from ddenv.robot.simulation.run import Run
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
@@ -126,7 +127,7 @@ class Template:
         keep: frozenset[str],
         seed: int,
         progress: Progress | None = None,
-        full: bool = True,
+        ends: Ends | None = None,
         listener: Listener | None = None,
     ) -> RunResult:
         """As `Simulator.run`; `listener` hears the controller.
@@ -157,6 +158,10 @@ class Template:
             controller = self._controllers(setup)
             if listener is not None:
                 listener.begin(setup)
+            rest = None
+            # Nobody knows whether a controller of the user's drives again.
+            if ends is not None and scenario.controller.use in BUILT_IN:
+                rest = Rest(ends, scenario.goal, self._clock.seconds)
             run = Run(
                 context=context,
                 scenario=scenario,
@@ -166,7 +171,7 @@ class Template:
                 autonomy=Autonomy(scenario, suite, self._drive, self._clock, controller, listener),
                 lidar=lidar,
                 reach=self._reach,
-                stuck=None if full else Stuck(scenario.controller),
+                rest=rest,
                 reached=reached,
                 unusual=unusual,
                 kept=kept,
@@ -210,12 +215,12 @@ class Variants:
         keep: frozenset[str],
         seed: int,
         progress: Progress | None = None,
-        full: bool = True,
+        ends: Ends | None = None,
         listener: Listener | None = None,
     ) -> RunResult:
         """As `Template.run`, in a plant that has all that comes near."""
         self._learn_piles()
-        return self._within(lambda _: self._template(keep).run(keep, seed, progress, full, listener))
+        return self._within(lambda _: self._template(keep).run(keep, seed, progress, ends, listener))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """Which models support which in the whole world; see `Rehearsals.supports`."""

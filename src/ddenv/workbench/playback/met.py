@@ -10,6 +10,7 @@ from textual.widget import Widget
 
 from ddenv.runfile.state import Test
 from ddenv.text import plain, shortened
+from ddenv.words.early_stop import WHY, ended_early
 from ddenv.words.signs import OUTCOME
 from ddenv.workbench.playback.timeline import ROBOTS
 
@@ -34,7 +35,7 @@ def how_it_ended(test: Test) -> str:
     if test.outcome == "running":
         return "▶ running"
     why = f": {plain(test.failure)}" if test.failure else ""
-    early = ", ended early: it was stuck for good" if test.cut else ""
+    early = f", {ended_early(test)}: {WHY}" if test.cut else ""
     return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"
 
 

@@ -16,6 +16,7 @@ from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.text import count, percent, plain, told_apart
 from ddenv.words.claims import made_of_usual, short
+from ddenv.words.early_stop import early_among
 from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
 from ddenv.words.slices import implied_words
 
@@ -188,8 +189,8 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
     if isinstance(item, Candidate) and state.waiting_candidate == item.index:
         return "? a or x"
     if item.verdict:
-        implied = implied_words(state, item.tests)
-        return f"{VERDICT.get(item.verdict, plain(item.verdict))}{f', {implied}' if implied else ''}"
+        marks = (early_among(tests), implied_words(state, item.tests))
+        return ", ".join([VERDICT.get(item.verdict, plain(item.verdict)), *filter(None, marks)])
     return _running(snapshot, tests)
 
 
