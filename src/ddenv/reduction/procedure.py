@@ -452,9 +452,6 @@ def _settled_in_blocks(
 
     without = {rest: model for model, rest in rests.items()}
 
-    def opened(error: float, first: int) -> dict[int, Settling]:
-        return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
-
     def claims_of(models: Mapping[int, Settling]) -> list[NamedClaim]:
         return [NamedClaim(model, rests[model], one.claim(fresh)) for model, one in models.items()]
 
@@ -473,7 +470,7 @@ def _settled_in_blocks(
         ended = next(filter(ends, named), None)
         if ended is not None or _left_of(terms, made) <= 0:
             if models and in_turn < error:
-                named = [of_left, *claims_of(opened(in_turn, first))]
+                named = [of_left, *claims_of(_opened(rests, left, in_turn, first))]
             return _without_more_runs(named, ended)
         if of_left.claim.verdict and in_turn < error:
             # Models were taken to be in turn. Blocks that are over do not go on.
@@ -481,13 +478,13 @@ def _settled_in_blocks(
             models = {}
         if not models and _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests) > 0 and _have_turn(of_left, fresh):
             first = block + 1
-            models = opened(error, first)
+            models = _opened(rests, left, error, first)
             continue
         wanted = {test for one in named for test in one.claim.wanted}
         if not wanted and not chosen and _is_minimal_but_for(named):
             chosen = True
             error /= len(rests)
-            models = opened(error, first)
+            models = _opened(rests, left, error, first)
             continue
         if not wanted:
             return tuple(named)
@@ -495,6 +492,11 @@ def _settled_in_blocks(
         order = _in_drawn_order((test for test in wanted if test[1] == block), terms.order_seed)
         made += 1
         yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+
+
+def _opened(rests: Mapping[int, Environment], left: Environment, error: float, first: int) -> dict[int, Settling]:
+    """A claim of each model, with runs from block number `first` on."""
+    return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
 
 
 def _without_more_runs(named: Iterable[NamedClaim], ended: NamedClaim | None) -> tuple[NamedClaim, ...]:
