@@ -160,3 +160,11 @@ def test_a_very_rare_failure_asks_how_to_go_on_and_can_be_reduced_exactly(tmp_pa
     assert state.environment == ("wall",)
     assert state.certificate.seeds == (20, 30, 40)
     assert sum(test.phase == "baseline" for test in state.tests) == 70
+
+
+def test_a_robot_that_fails_without_any_model_is_told(tmp_path):
+    state = drive(new_run(tmp_path, accept_rate="kept", growth="steady"), FakePool(lambda *_: "similar", 1))
+    assert not state.environment
+    assert state.reason.startswith(
+        "fails without any model: look at the ground, the robot, its controller, or something that is "
+    )

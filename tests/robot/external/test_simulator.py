@@ -132,6 +132,8 @@ def test_what_a_command_leaves_behind_is_killed(simulator_of):
     ("code", "complaint"),
     [
         ("exit(3)", "the command's exit code is 3, neither 0 nor 1"),
+        ("exit(139)", "exit code is 139, neither 0 nor 1 .SIGSEGV."),
+        ("print('1,0;3,0;0,0;0,2;0;0;0;1')", "write decimal points, and commas between the numbers"),
         ("1 / 0", "the command ended with an exception: ZeroDivisionError: division by zero"),
         ("import sys; print('no display\\n\\x1b[2J', file=sys.stderr); exit(255)", "exit code is 255, .*: .*2J"),
         (
