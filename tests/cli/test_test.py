@@ -65,6 +65,14 @@ def test_nothing_is_needed_elsewhere_where_f_hardly_shows_there(shown):
     assert ball["fails"] is None and ball["said"].startswith("ball: not shown for MuJoCo")
 
 
+def test_where_every_run_breaks_the_command_says_so_by_its_exit_code(monkeypatch, command):
+    more = {"seed": 1, "end_pose": None, "failure": "it broke", "distance": None}
+    for results, code in ((runs(None, "error", "timeout"), 1), (runs(None, "error", "pass"), 0)):
+        made = [one | more for one in results]
+        monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *_, made=made: iter(made))
+        assert command("test", DATA / "wall.yaml", "--repeat", 2).returncode == code
+
+
 def test_the_command_ends_with_it(monkeypatch, command):
     results = [*runs(None, "failed", "failed"), *runs("w\x1b", "pass", "pass")]
     more = {"seed": 1, "end_pose": None, "failure": "", "distance": None}

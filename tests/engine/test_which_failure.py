@@ -4,6 +4,7 @@ import pytest
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
+from ddenv.engine.limits import note_start
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.store import RunFile
@@ -160,3 +161,25 @@ def test_a_very_rare_failure_asks_how_to_go_on_and_can_be_reduced_exactly(tmp_pa
     assert state.environment == ("wall",)
     assert state.certificate.seeds == (20, 30, 40)
     assert sum(test.phase == "baseline" for test in state.tests) == 70
+
+
+def test_an_epsilon_wider_than_the_way_is_told(tmp_path):
+    path = new_run(tmp_path)
+    with RunFile(path) as file:
+        subject = read_subject(file)
+    wide = subject.scenario.model_copy(
+        update={"failure": subject.scenario.failure.model_copy(update={"epsilon": 1000.0})}
+    )
+    with engine(path, FakePool(two, 1)) as one:
+        note_start(wide, subject.world, subject.robot, one.journal)
+        assert dict(one.journal.state.notes)["epsilon"].startswith(
+            "epsilon (1000 m) is wider than the way to the goal ("
+        )
+
+
+def test_a_robot_that_fails_without_any_model_is_told(tmp_path):
+    state = drive(new_run(tmp_path, accept_rate="kept", growth="steady"), FakePool(lambda *_: "similar", 1))
+    assert not state.environment
+    assert state.reason.startswith(
+        "fails without any model: look at the ground, the robot, its controller, or something that is "
+    )

@@ -121,6 +121,8 @@ def export_command(
         exported = export_world(path, sdf, scenario, passes, margin)
         say_written(exported.files)
         announce_needs(sdf, exported.needs)
+        if exported.whole:
+            announce("no failure is known yet: this is the whole world; 'ddenv resume RUN' reduces it")
     return 0
 
 

@@ -78,7 +78,8 @@ def test_command(
         print(json.dumps({"runs": results, "summary": rows, "elsewhere": others}))
     elif len(results) > 1:
         print("\n".join(["", *lines(rows, {each["without"]: each["said"] for each in others})]))
-    return 0
+    # Where every run broke, nothing was tested.
+    return int(not any(row["runs"] for row in rows))
 
 
 def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack) -> Subject:

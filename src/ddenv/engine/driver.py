@@ -59,6 +59,7 @@ VERY_RARE = (
     "f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces its failing runs, 'ddenv resume RUN' "
     "keeps its rate"
 )
+NO_MODEL = "fails without any model: look at the ground, the robot, its controller, or something that is missing"
 # Of a rarer f no few replays say whether it still shows.
 FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
 LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
@@ -509,7 +510,8 @@ class Driver:
         together = self._reduction.keep_supports or any(len(stack) > 1 for stack in stacks)
         pinned = self._leg.pinned & journal.environment
         vanished = "" if certificate.claims[0].shown else f"{no_more(journal.state)}; "
-        reason = vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
+        bare = "" if journal.environment else f"{NO_MODEL}; "
+        reason = bare + vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
             reason += "; leaving it out was vetoed or rejected"

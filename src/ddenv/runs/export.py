@@ -10,11 +10,10 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.evidence.margins import fixes_of
-from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import removed_in_passing
-from ddenv.runs.subject import RESOURCE, Subject, read_parts
+from ddenv.runs.subject import RESOURCE, Subject, read_subject
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
 from ddenv.world.access import Missing, Unusable, check_ending, write_file
@@ -29,10 +28,11 @@ from ddenv.world.write import without
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """The written files, and the URIs of other files that the written world needs."""
+    """The written files, and the URIs of other files that the written world needs. `whole`: f was not known yet."""
 
     files: list[Path]
     needs: list[str]
+    whole: bool = False
 
 
 def export_world(
@@ -44,14 +44,15 @@ def export_world(
     reaches its goal if no other is given. Raises UserError.
     """
     with RunFile(run) as file:
-        scenario, world, machine = read_parts(file)
+        subject = read_subject(file)
         robot, documents = file.document("robot"), file.documents(RESOURCE)
-        state = fold(file.events())
+    scenario, world, state = subject.scenario, subject.world, subject.state
+    assert state is not None
     check_ending(sdf, scenario.world)
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
-    there = with_margins(Subject(scenario, world, machine, run, state), margins)
+    there = with_margins(subject, margins)
     if scenario_file is None and there.scenario != scenario:
         raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
     scenario, world = there.scenario, there.world
@@ -65,7 +66,7 @@ def export_world(
     minimal = parse_world(text, scenario.world, scenario.reading.model_copy(update={"inside": False}), asked)
     needs = list(dict.fromkeys(uri for uri, base in asked.asked if base == scenario.world.parent))
     if scenario_file is None:
-        return Exported([sdf], needs)
+        return Exported([sdf], needs, whole=state.baseline is None)
     is_urdf = scenario.robot.model.suffix.lower() == ".urdf"
     model = scenario_file.with_suffix(".robot.urdf" if is_urdf else ".robot.sdf")
     write_file(model, robot)
@@ -85,7 +86,7 @@ def export_world(
     model_path = (*scenario.reading.model_path, *needed)
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, scenario_text(data, scenario))
-    return Exported([sdf, model, scenario_file], needs)
+    return Exported([sdf, model, scenario_file], needs, whole=state.baseline is None)
 
 
 def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:

@@ -128,10 +128,18 @@ def test_what_a_command_leaves_behind_is_killed(simulator_of):
     assert simulator_of(FAMILY).run(EVERYTHING, 0).outcome == "pass"
 
 
+def test_a_log_that_ends_long_after_the_timeout_is_an_error(simulator_of):
+    late = simulator_of("print('0,0,0,0.2,0,0,0,1'); print('1e9,3,0,0.2,0,0,0,1'); exit(1)").run(EVERYTHING, 0)
+    assert late.outcome == "error"
+    assert late.failure.startswith("the pose log ends at 1e+09 s, and the timeout is ")
+
+
 @pytest.mark.parametrize(
     ("code", "complaint"),
     [
         ("exit(3)", "the command's exit code is 3, neither 0 nor 1"),
+        ("exit(139)", "exit code is 139, neither 0 nor 1 .SIGSEGV."),
+        ("print('1,0;3,0;0,0;0,2;0;0;0;1')", "write decimal points, and commas between the numbers"),
         ("1 / 0", "the command ended with an exception: ZeroDivisionError: division by zero"),
         ("import sys; print('no display\\n\\x1b[2J', file=sys.stderr); exit(255)", "exit code is 255, .*: .*2J"),
         (

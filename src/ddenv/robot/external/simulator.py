@@ -9,6 +9,7 @@ import contextlib
 import math
 import os
 import shutil
+import signal
 import tempfile
 import time
 import uuid
@@ -21,7 +22,7 @@ import yaml
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.robot.controllers import WrongAnswer
-from ddenv.robot.external.process import BEGIN, Ended, running, watch
+from ddenv.robot.external.process import BEGIN, Ended, running, signal_name, watch
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import RECORD_PERIOD, Ends, Progress, RunResult
 from ddenv.text import printable
@@ -125,12 +126,17 @@ class ExternalSimulator:
     def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, Floats]:
         said = f": {ended.complaint}" if ended.complaint else ""
         if ended.code is None or ended.code not in OUTCOMES:
-            why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"
+            why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1{_of_a_shell(ended.code)}"
             return "error", why + said, self._rows(log)
         if ended.code == 1 and ended.raised:
             return "error", f"the command ended with an exception{said}", self._rows(log)
         try:
             outcome, rows = OUTCOMES[ended.code], log.finish()
+            timeout = self._scenario.failure.timeout
+            if rows[-1, 0] > MUCH_LATER * timeout:
+                raise BadLog(
+                    f"the pose log ends at {rows[-1, 0]:g} s, and the timeout is {timeout:g} s: times are in s"
+                )
             return outcome, kind_of(rows, fell=False, arrived=None) if outcome == "failed" else "", rows
         except BadLog as error:
             return "error", f"{error}{said}", self._rows(log)
@@ -142,6 +148,12 @@ class ExternalSimulator:
             return rows
         start = spawn_pose(self._scenario.robot.spawn)
         return np.array([[0.0, *start.position, *start.quaternion]])
+
+
+def _of_a_shell(code: int | None) -> str:
+    """Which signal an exit code stands for, as shells have it, where a program under the command was ended by one."""
+    number = 0 if code is None else code - 128
+    return f" ({signal_name(number)})" if number in set(signal.Signals) else ""
 
 
 def scenario_in(scenario: Scenario, whole: Whole, file: Path) -> bytes:
@@ -187,6 +199,8 @@ def _no_room(error: OSError) -> UserError:
 
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 EXPECTED = f"expected {','.join(COLUMNS)} (s, m, a quaternion)"
+# A log that ends after so many times the timeout has other units.
+MUCH_LATER = 10.0
 MOST_BYTES = 64_000_000
 TOO_LARGE = f"the pose log is larger than {MOST_BYTES / 1e6:.0f} MB; a row every 0.1 s is enough"
 # Longer than any row of eight numbers, and larger than any number of seconds or metres.
@@ -299,7 +313,11 @@ class PoseLog:
 
     def _wrong(self, text: str) -> BadLog:
         shown = printable(text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}...")
-        return BadLog(f"the pose log, line {self._number}: {EXPECTED}, found '{shown}'")
+        hint = "; write decimal points, and commas between the numbers" if ";" in text else ""
+        numbers = [number for field in text.split(",") if (number := _number(field)) is not None]
+        if not all(map(math.isfinite, numbers)):
+            hint = "; a number is not finite"
+        return BadLog(f"the pose log, line {self._number}: {EXPECTED}, found '{shown}'{hint}")
 
 
 def _number(field: str) -> float | None:
