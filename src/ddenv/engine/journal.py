@@ -64,7 +64,8 @@ class Journal:
             self._forget(lambda test: test.implied_by is not None)
         if after.early_stop_ended is not before.early_stop_ended or _f_of(after) != _f_of(before):
             self._forget(lambda test: test.cut)
-            self._implying.clear()
+            for known in self._implying.values():
+                known[:] = [implying for implying in known if not self.state.tests[implying[2] - 1].cut]
 
     def _enter(self, test: Test) -> None:
         if not test.is_finished:
