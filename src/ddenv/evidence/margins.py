@@ -259,8 +259,8 @@ def steps(asked: NumberAsked, up: bool) -> tuple[float, ...]:
     return (*dict.fromkeys(inner), asked.high if up else asked.low)
 
 
-def _at(asked: NumberAsked, up: bool, distance: float) -> float:
-    value = asked.now + math.copysign(float(f"{distance:.2g}"), 1.0 if up else -1.0)
+def _at(asked: NumberAsked, up: bool, distance: float, digits: int = 2) -> float:
+    value = asked.now + math.copysign(float(f"{distance:.{digits}g}"), 1.0 if up else -1.0)
     return min(asked.high, max(asked.low, float(f"{value:.9g}")))
 
 
@@ -272,7 +272,7 @@ def beyond(asked: NumberAsked, up: bool, value: float) -> tuple[float, ...]:
     left = abs(end - value)
     if left <= asked.resolution:
         return ()
-    return end, *(_at(asked, up, distance + part * left) for part in BEYOND)
+    return end, *(_at(asked, up, distance + part * left, digits=3) for part in BEYOND)
 
 
 def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float | None:
