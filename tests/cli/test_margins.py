@@ -59,7 +59,16 @@ def test_the_report_outlines_how_far_a_model_may_move_and_has_both_paths(run, tm
 def test_a_value_is_tried_again_in_what_is_left(run, monkeypatch, command):
     fake_moments.with_margins(run)
     asked = []
-    monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *given: asked.append(given) or [])
+    made = {
+        "without": None,
+        "models": 2,
+        "outcome": "pass",
+        "seed": 1,
+        "end_pose": None,
+        "failure": "",
+        "distance": None,
+    }
+    monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *given: asked.append(given) or [made])
     words = ["--minimal", "--margin", "crate_01.y=1.5", "--margin", "crate_00.friction", "--repeat", 3]
     assert command("test", run.path, *words).returncode == 0
     ((subject, trials, _),) = asked
