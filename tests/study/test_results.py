@@ -102,7 +102,10 @@ def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
         ),
         (holds(LEFT) | {"crate_01": ("not shown", "sppp")}, "undecided without crate_01"),
         (holds(LEFT) | {"crate_01": ("unknown", "eppp")}, "tests broke without crate_01"),
-        (holds(LEFT) | {"crate_01": ("not needed", "ssss")}, "not minimal: f seems to show about as often without crate_01"),
+        (
+            holds(LEFT) | {"crate_01": ("not needed", "ssss")},
+            "not minimal: f seems to show about as often without crate_01",
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
