@@ -204,7 +204,7 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
     ),
     "rate_lost": lambda _, after: f"  back to {_left(after)}, the last environment not shown to have lost the rate",
     "left_out": lambda _, after: (
-        f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
+        f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f seems to show about as often"
     ),
     "isolation_started": lambda *_: (
         f"{ISOLATING}: removing as few models as possible from the whole world so that the robot reaches its goal"
