@@ -167,6 +167,7 @@ def test_what_the_user_trusts_or_owns_starts_and_is_not_asked_about_again(scenar
         subject, trusted = home / "mail.ddenv", ["--trust"]
     for words in (trusted, []):
         done = ddenv("test", subject, "--json", *words, env=env)
-        assert done.returncode == 0, done.stderr
+        # The program that was started is no simulator: its run broke.
+        assert done.returncode == 1, done.stderr
         assert len(json.loads(done.stdout)["runs"]) == 1
     assert (home / "started").exists()

@@ -389,7 +389,8 @@ class Driver:
             return
         for replay, test in enumerate(islice(cycle(failing), replays)):
             result = self._bench.made_again(test, tells=not replay)
-            if result is None or self._bench.outcome_of(result) == "similar":
+            # A replay that broke says nothing of f.
+            if result is None or self._bench.outcome_of(result) in ("similar", *BROKEN):
                 return
         raise UserError(f"{no_more(state)}, and in none of {count(replays, 'replay')}; {LEFT_OVER}")
 
@@ -509,7 +510,10 @@ class Driver:
         stacks = stacks_of(journal.state, journal.state.environment)
         together = self._reduction.keep_supports or any(len(stack) > 1 for stack in stacks)
         pinned = self._leg.pinned & journal.environment
-        vanished = "" if certificate.claims[0].shown else f"{no_more(journal.state)}; "
+        left = certificate.claims[0]
+        # Where what is left is lost, f still shows in the whole world.
+        is_gone = left.verdict == "not shown" and not left.shown
+        vanished = f"{no_more(journal.state)}; " if is_gone else ""
         bare = "" if journal.environment else f"{NO_MODEL}; "
         reason = bare + vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
