@@ -12,6 +12,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
+from tests.engine.reading import events
 from tests.study.made import plan_of, wall
 from tests.study.quick import Lab
 from tests.study.test_conduct import fails, study, told
@@ -96,9 +97,12 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     assert "1 of 1 cell certified; wrote study/study.html" in said
     assert len(sessions(folder)) == 3
 
-    # Of the tests that were in flight nothing is left, and no other one was made twice.
+    # Of the tests that were in flight nothing is left, and no other one was made twice, but for replays of runs that showed f.
     (row,) = csv.DictReader((folder / "study.csv").read_text().splitlines())
-    assert len(made.read_text()) == int(row["tests"]) + int(row["certificate_tests"]) + 2
+    replays = sum(event.kind == "comparing" for event in events(run))
+    in_flight = len(made.read_text()) - int(row["tests"]) - int(row["certificate_tests"]) - replays
+    # Of the two that were stopped one may have been a replay.
+    assert in_flight in (1, 2)
     assert (row["left_f"], row["without_most"]) == (row["left_runs"], "0.0")
 
     Lab(monkeypatch, fails)
