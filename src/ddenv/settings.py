@@ -232,7 +232,7 @@ class Reduction:
     )
     early_stop: bool = setting(
         True,
-        "end a test once the robot is at rest for good and its verdict is sure; certificate runs never end early",
+        "end a test once its controller has stopped and it rests well inside or outside epsilon; certificate runs never end early",
         printed=False,
         shown="option",
         cost="On saves the rest of each test in which the controller has stopped.",

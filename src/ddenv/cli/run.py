@@ -136,7 +136,8 @@ def resume_command(
         copy = run_path(scenario.name, None, path.parent)
         create_like(path, scenario, copy)
         announce(f"repeating the tests of {path} in {copy}")
-        path, how = copy, {}
+        path = copy
+        how = {}
     return follow_to_summary(path, start_engine(path, jobs, cluster=cluster, **how), as_json)[0]
 
 

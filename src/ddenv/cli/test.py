@@ -186,7 +186,8 @@ def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
     from ddenv.evidence.rates import Shown
     from ddenv.runfile.state import BROKEN
 
-    rest, left = Environment.whole(1), Environment.whole(2)
+    rest = Environment.whole(1)
+    left = Environment.whole(2)
     outcomes: dict[Environment, dict[int, Shown]] = {rest: {}, left: {}}
     for one in results:
         if one["without"] in (None, without):

@@ -108,7 +108,8 @@ class Bench:
 
         Raises Stopped if the budget is used up and no test runs.
         """
-        journal, full = self._journal, self._journal.is_full(wanted)
+        journal = self._journal
+        full = journal.is_full(wanted)
         source = journal.implying(wanted.environment, wanted.run, full)
         implied = source is not None and wanted.why != "audit" and not audit_is_due(journal.state, wanted.why)
         # The budget is that of the reduction, which is over.
@@ -176,7 +177,8 @@ class Bench:
         while self._busy:
             # A search that is due begins after this.
             self._look_around(WAIT)
-        journal, state = self._journal, self._journal.state
+        journal = self._journal
+        state = journal.state
         if tells:
             journal.record(Comparing(test.id))
         keep = frozenset(state.environments[test.environment].names(state.elements))

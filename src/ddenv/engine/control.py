@@ -245,7 +245,8 @@ def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
 
 
 def _changed(journal: Journal, asked: c.Change) -> events.Event:
-    state, new = journal.state, asked.new(journal.state)
+    state = journal.state
+    new = asked.new(state)
     if "epsilon" not in new or state.baseline is None:
         return events.Changed(new)
     # Stored ends are judged again.

@@ -39,7 +39,7 @@ from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
 from ddenv.text import count
-from ddenv.words.claims import no_more, verdict_on
+from ddenv.words.claims import verdict_on
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
@@ -272,9 +272,16 @@ class Driver:
         journal, whole = self._journal, self._journal.state.environments[0]
         tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
-        spec, asked = spec_of(journal.state), self._reduction
-        usual = asked.baseline_runs
-        found = self._baseline = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure, chose, usual)
+        asked = self._reduction
+        found = self._baseline = fix_failure(
+            tests,
+            trajectories,
+            spec=spec_of(journal.state),
+            iterations=asked.iterations,
+            wanted=asked.failure,
+            chose=chose,
+            usual=asked.baseline_runs,
+        )
         if isinstance(found, str):
             return None
         f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)
@@ -392,7 +399,11 @@ class Driver:
             # A replay that broke says nothing of f.
             if result is None or self._bench.outcome_of(result) in ("similar", *BROKEN):
                 return
-        raise UserError(f"{no_more(state)}, and in none of {count(replays, 'replay')}; {LEFT_OVER}")
+        last = max(test.id for test in shown)
+        raise UserError(
+            f"f does not repeat: it showed only in the first {count(last, 'run')}, "
+            f"and in none of {count(replays, 'replay')}; {LEFT_OVER}"
+        )
 
     def search_ended(self, environment: Environment) -> None:
         self._audit_slice()
@@ -433,14 +444,23 @@ class Driver:
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
             tests = tuple(sorted({*rested_on, *chosen}))
             journal.record(events.CertificateFinished(claims, tests, self._elsewhere(tests)))
-        state, last = self._journal.state, self._certificate
+        self._end_early_stop_if_refuted()
+
+    def _end_early_stop_if_refuted(self) -> None:
+        """Ends early stop where what is left is lost, and tests that ended early had accepted it."""
+        journal = self._journal
+        certificate = self._certificate
+        if certificate.claims[0].verdict != "lost" or not journal.stops_early:
+            return
+        state = journal.state
         accepted = (test for node in self._nodes(state.node) for test in state.tests_of(node.runs))
-        if last.claims[0].verdict == "lost" and self._journal.stops_early and any(test.cut for test in accepted):
-            self._journal.record(events.EarlyStopEnded(certificate=last.number))
+        if any(test.cut for test in accepted):
+            journal.record(events.EarlyStopEnded(certificate=certificate.number))
 
     def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
         """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
-        state, epsilon = self._journal.state, spec_of(self._journal.state).epsilon
+        state = self._journal.state
+        epsilon = spec_of(state).epsilon
         # Where another failure counts as f, the baseline says nothing of its ends.
         if self._certificate.branch or len(state.failures) > 1:
             return None
@@ -513,7 +533,7 @@ class Driver:
         left = certificate.claims[0]
         # Where what is left is lost, f still shows in the whole world.
         is_gone = left.verdict == "not shown" and not left.shown
-        vanished = f"{no_more(journal.state)}; " if is_gone else ""
+        vanished = "f does not repeat; " if is_gone else ""
         bare = "" if journal.environment else f"{NO_MODEL}; "
         reason = bare + vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]

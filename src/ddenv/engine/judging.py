@@ -138,7 +138,15 @@ def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
     unjudged = [replace(one, outcome="failed") if one.outcome in failed else one for _, one in sorted(tests.items())]
     trajectories = {test.id: rows_of(file, test.id) for test in unjudged if test.outcome == "failed"}
     spec = spec_of(state)
-    found = fix_failure(unjudged, trajectories, spec, reduction.iterations, reduction.failure, before.chose)
+    found = fix_failure(
+        unjudged,
+        trajectories,
+        spec=spec,
+        iterations=reduction.iterations,
+        wanted=reduction.failure,
+        chose=before.chose,
+        usual=reduction.baseline_runs,
+    )
     if isinstance(found, str):
         raise UserError(found)
     f = Failure(found.position, trajectories[found.failure_test], spec.epsilon, spec.similarity)

@@ -138,7 +138,7 @@ HERE: dict[str, Callable[[RunState], object]] = {
     "here_parts": lambda state: 0 if state.round is None else len(state.round.partitions),
     "here_candidates": lambda state: 0 if state.round is None else len(state.round.candidates),
     "here_kept": lambda state: first_of(list(state.environment), _NAMED),
-    "here_aim": lambda state: percent(_now(state).certify_rate),
+    "here_aim": lambda state: percent_at_least(_now(state).certify_rate),
     "here_left": _left,
     "here_bound": _bound,
     "here_fresh": _fresh,

@@ -342,7 +342,7 @@ class _Caller:
         return self.left
 
     def search_once(self) -> bool:
-        """By the first call with the failure; returns whether each element that is left was left out in vain."""
+        """Takes the first call with the failure; returns whether the failure was gone without each element that is left."""
         leg = self.next_leg()
         self.carry_out(steps.search_on(self, leg))
         verdicts = (standing([rest], self.shown, leg.rule)[0] for rest in self._removals())

@@ -28,7 +28,7 @@ class RunResult:
     in the world frame. `motions` holds such rows for each dynamic model that moved.
     `first_touched` maps a model to the time (s) when the robot first touched it, `first_sensed` to the time when it first had it in
     view or touched it, which is never later. Models that it never touched or sensed are absent.
-    `cut` is True if the run was cut short: the robot was at rest for good, and no longer run would change its verdict.
+    `cut` is True if the run was cut short: its controller had stopped, and it was at rest well inside or outside epsilon.
     `took_part` names the models that can have changed a bit of the run; None if that is unknown. A run with the same seed in a
     world that lacks others, and breaks no tie, repeats every bit of this one. Equal runs name the same models.
     `taken` names the finished run that implies this one, "" for a run that was made.

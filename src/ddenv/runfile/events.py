@@ -425,7 +425,7 @@ class EndsElsewhere:
 
 
 class CertificateFinished(Event):
-    """What fresh runs show; the claims rest on these tests. `elsewhere`: what is left shows another failure within epsilon."""
+    """What fresh runs show; the claims rest on these tests. `elsewhere`: what is left ends elsewhere within epsilon."""
 
     claims: tuple[ClaimMade, ...]
     tests: tuple[Number, ...]

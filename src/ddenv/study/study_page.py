@@ -34,7 +34,7 @@ from ddenv.study.folder import Session
 from ddenv.study.plan import RUNS, Plan, run_path
 from ddenv.study.results import Result, paper_row, read_cell, rows_of
 from ddenv.study.tables import best, section
-from ddenv.text import count, plain
+from ddenv.text import count, percent_at_least, plain
 from ddenv.world.access import write_file
 
 STEM = "study"
@@ -90,8 +90,8 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
         "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, and "
         "stops when no single model can be left out. Runs with fresh seeds then check the result: it is certified if "
-        f"it keeps at least {' or '.join(map(percent, shares))} of the whole world's failure rate, and less without any one "
-        "of its models."
+        f"it keeps at least {' or '.join(map(percent_at_least, shares))} of the whole world's failure rate, and less without "
+        "any one of its models."
     )
     beside = [(result, paper) for result in minimal if (paper := paper_row(result.cell)) is not None]
     if beside:

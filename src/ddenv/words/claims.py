@@ -40,7 +40,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
             f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
         )
     if left.verdict != "kept" and not certificate.seeds:
-        aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
+        aim = f"{percent_at_least(certificate.certify_rate)} of {_whole_rate(certificate)}"
         shown = f"; it keeps at least {percent_at_least(left.bound)}" if left.bound else ""
         return f"not shown that what is left keeps {aim}{shown}: {rate(left)}"
     verdicts = {str(claim.without): claim.verdict for claim in removals}
@@ -67,18 +67,12 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 
-def no_more(state: RunState) -> str:
-    """That f has stopped to show: "f does not repeat: it showed only in the first 3 runs"."""
-    last = max((test.id for test in state.tests if test.outcome == "similar"), default=0)
-    return f"f does not repeat: it showed only in the first {count(last, 'run')}"
-
-
 def _elsewhere(ends: EndsElsewhere) -> str:
-    """Which other failure took the place of f."""
+    """That what is left mostly ends where f did not, within epsilon of it."""
     return (
-        f"another failure within epsilon took the place of f: {ends.whole} of {ends.of_whole} runs of the whole world with f "
-        f"ended together, {ends.left} of {ends.of_left} fresh runs of what is left did there, and others "
-        f"{ends.apart:.2g} m away; --epsilon {ends.epsilon:g} tells them apart"
+        f"what is left may show another failure within epsilon: of the runs of the whole world with f "
+        f"{ends.whole} of {ends.of_whole} ended in one place, of what is left {ends.left} of {ends.of_left} did, "
+        f"and others ended {ends.apart:.2g} m away; --epsilon {ends.epsilon:g} tells them apart"
     )
 
 
@@ -260,7 +254,7 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
     rate, bound = _whole_rate(certificate), claim.bound
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
-        return f"shown to keep at least {percent_at_least(bound)} of {rate}, not {percent(certificate.certify_rate)}"
+        return f"shown to keep at least {percent_at_least(bound)} of {rate}, not {percent_at_least(certificate.certify_rate)}"
     often = "with none of these seeds" if claim.is_exact else _as_often(bound)
     return {
         "exact": f"f shows with {seeds_of(certificate)} each time",
@@ -360,7 +354,7 @@ def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
     if certificate.seeds:
         return f"they measure how often what is left shows f with seeds other than {seeds_of(certificate)}"
-    aim = f"{percent(certificate.certify_rate)} of {_whole_rate(certificate)}"
+    aim = f"{percent_at_least(certificate.certify_rate)} of {_whole_rate(certificate)}"
     return f"they have to show that what is left keeps {aim}, and that removing {_any_one(pinned)} makes f rarer"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from ddenv.runfile.state import RunState, Test
 from ddenv.words.signs import metres
 
-WHY = "the robot was at rest for good, so that more time could not change the verdict"
+WHY = "the controller had stopped, the robot was at rest, and its end was well inside or outside epsilon"
 _OFF = "from here on all tests run to their end"
 
 

@@ -29,7 +29,7 @@ def failure(result, *, away=0.0, epsilon=0.33):
 
 @pytest.fixture(scope="module")
 def at_the_wall(world_of, husky, scenario_of):
-    """A robot that spins its wheels at a wall until it believes to be at the goal, which takes 3 s, and stays there."""
+    """A robot spins its wheels at a wall for 3 s; then its estimate says that it is at the goal, and it stops."""
     return Template(world_of(WALL), husky, scenario_of(failure={"timeout": 20.0}))
 
 

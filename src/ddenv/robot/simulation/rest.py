@@ -1,4 +1,4 @@
-"""When a run may end early: the robot is at rest for good, and nothing that may still happen changes the verdict."""
+"""When a run may end early: its controller has stopped, and the robot rests well inside or outside epsilon."""
 
 from __future__ import annotations
 

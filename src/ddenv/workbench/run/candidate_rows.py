@@ -14,7 +14,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
-from ddenv.text import count, percent, plain, told_apart
+from ddenv.text import count, percent, percent_at_least, plain, told_apart
 from ddenv.words.claims import made_of_usual, short
 from ddenv.words.early_stop import early_among
 from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
@@ -95,7 +95,8 @@ def listed(snapshot: Snapshot) -> Listed:
 def round_title(state: RunState) -> tuple[str, str]:
     if (certificate := state.certificate) is not None:
         number = f" {certificate.number}" if certificate.number > 1 else ""
-        rows, aim = fresh_runs(state), percent(certificate.certify_rate)
+        rows = fresh_runs(state)
+        aim = percent_at_least(certificate.certify_rate)
         keeps = f"keeps {rows[0].shows_at_least}, aim {aim}" if rows[0].shows_at_least else f"has to show {aim}"
         keeps = "chosen seeds" if certificate.seeds else keeps
         made = sum(one.runs for one in rows)
