@@ -96,7 +96,8 @@ def wedge(width: float, depth: float, height: float) -> Mesh:
     x, y, z = depth / 2, width / 2, height / 2
     vertices = [(-x, -y, -z), (x, -y, -z), (x, y, -z), (-x, y, -z), (x, -y, z), (x, y, z)]
     faces = [(0, 2, 1), (0, 3, 2), (1, 2, 5), (1, 5, 4), (0, 5, 3), (0, 4, 5), (0, 1, 4), (3, 5, 2)]
-    return Mesh("wedge", np.array(vertices), np.array(faces))
+    # Meshes of one name count as one.
+    return Mesh(f"wedge {width} {depth} {height}", np.array(vertices), np.array(faces))
 
 
 @pytest.fixture(scope="session")
