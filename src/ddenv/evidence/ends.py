@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import pdist
 
 from ddenv.runfile.events import EndsElsewhere, Place
 from ddenv.runfile.state import RunState, Test
@@ -48,29 +51,21 @@ class Groups:
 
 def groups_of(ends: Sequence[Place], epsilon: float) -> Groups | None:
     """The coarsest groups of ends (m) that are far apart; None if the ends form a single one."""
-    ends = ends[:MOST]
-    if len(ends) < FEWEST:
+    places = np.array(ends[:MOST])
+    if len(places) < FEWEST:
         return None
-
-    def distance(pair: tuple[int, int]) -> float:
-        return math.dist(ends[pair[0]], ends[pair[1]])
-
-    found = None
-    groups: dict[int, tuple[int, ...]] = {one: (one,) for one in range(len(ends))}
-    # The nearest two groups are joined, until there is one.
-    for pair in sorted(combinations(range(len(ends)), 2), key=distance):
-        joined = groups[pair[0]] + groups[pair[1]]
-        if groups[pair[0]] is groups[pair[1]]:
-            continue
-        apart = distance(pair)
-        large = [group for group in set(groups.values()) if len(group) >= FEW]
-        if len(large) > 1 and apart >= NEAR * epsilon:
-            widest = max(distance(inside) for group in large for inside in combinations(group, 2))
-            if apart >= APART * widest:
-                large.sort(key=lambda group: (-len(group), group))
-                found = Groups(tuple(large), apart)
-        groups |= dict.fromkeys(joined, joined)
-    return found
+    joins = linkage(places, method="single")
+    # The last join is of the two groups that are farthest apart.
+    for apart in joins[::-1, 2]:
+        if apart < NEAR * epsilon:
+            return None
+        labels = fcluster(joins, np.nextafter(apart, 0), criterion="distance")
+        groups = [np.flatnonzero(labels == label) for label in range(1, labels.max() + 1)]
+        large = [group for group in groups if len(group) >= FEW]
+        if len(large) > 1 and apart >= APART * max(pdist(places[group]).max() for group in large):
+            by_size = sorted((tuple(group.tolist()) for group in large), key=lambda group: (-len(group), group))
+            return Groups(tuple(by_size), float(apart))
+    return None
 
 
 def one_place(ends: Sequence[Place], epsilon: float) -> float | None:
