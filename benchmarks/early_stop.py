@@ -17,6 +17,7 @@ import multiprocessing
 import random
 import time
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +88,7 @@ def measured(scenario: Scenario, options: argparse.Namespace) -> list[tuple[Both
         jobs = ((one, ends_of([failure])) for one in in_time(asked, until))
         # Jobs are taken from the list as fast as they are made only where the pool is asked for few at a time.
         pairs = []
-        while batch := [job for job, _ in zip(jobs, range(options.jobs), strict=False)]:
+        while batch := list(islice(jobs, options.jobs)):
             pairs += pool.starmap(both_runs, batch)
     return [(pair, failure) for pair in pairs]
 
