@@ -85,7 +85,11 @@ def test_the_runs_that_decided_are_those_that_one_worker_makes(rates, salt, rule
     _, verdicts, made = in_order(shown, range(len(rates)), rule)
     for candidate in range(len(verdicts)):
         results = [shown(*test) for test in made if test[0] == candidate]
-        assert decided_by(shown, candidate, rule) == (len(results), results.count(True), results.count("broken"))
+        decision = decided_by(shown, candidate, rule)
+        assert decision.runs == len(results)
+        assert decision.shown == results.count(True)
+        assert decision.broken == results.count("broken")
+        assert decision.missed == results.count(False)
 
 
 @given(rates=rates, salt=salts, rule=rules, refused=st.sets(st.integers(0, 4)))

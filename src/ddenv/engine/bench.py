@@ -209,7 +209,7 @@ class Bench:
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
             if verdict:
-                runs, *_ = decided_by(self._journal.shown, environment, self.rule)
+                runs = decided_by(self._journal.shown, environment, self.rule).runs
                 tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
                 self._journal.record(TrialJudged(trial.number, verdict, tests))
             for _, run in wanted:

@@ -321,10 +321,11 @@ def judge(
                     driver.judged(judged, environment, "missed", 0)
             else:
                 # By these runs alone: more of them may have ended.
-                runs, hits, broken = decided_by(driver.shown, environment, rule)
-                misses = runs - hits - broken
-                missed = verdict == "dissimilar" and usual is not None and not usual.verdict(hits, misses)
-                driver.judged(judged, environment, "missed" if missed else verdict, runs)
+                decision = decided_by(driver.shown, environment, rule)
+                missed = (
+                    verdict == "dissimilar" and usual is not None and not usual.verdict(decision.shown, decision.missed)
+                )
+                driver.judged(judged, environment, "missed" if missed else verdict, decision.runs)
             if verdict == "similar":
                 return judged
             judged += 1

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from ddenv.environment import Environment
 from ddenv.evidence.rates import HIGHEST_RATE, SPURIOUS, Shown
@@ -106,6 +106,24 @@ def _by_bayes(rate: float, keep_rate: float, steps_back: int, shown: int, missed
     return "" if is_open and keeps > 0.03 else "dissimilar"
 
 
+class Decision(NamedTuple):
+    """The verdict of a candidate if no `missing` run shows f, and the runs it rests on: how many, with f, and broken."""
+
+    verdict: Verdict
+    missing: Sequence[int]
+    runs: int
+    shown: int
+    broken: int
+
+    @property
+    def missed(self) -> int:
+        """How many runs ended without f."""
+        return self.runs - self.shown - self.broken
+
+
+REFUSED = Decision("dissimilar", (), runs=0, shown=0, broken=0)
+
+
 def standing(
     candidates: Iterable[Environment],
     shown: Callable[[Environment, int], Shown],
@@ -125,19 +143,16 @@ def standing(
     verdicts: list[Verdict] = []
     wanted: list[tuple[int, int]] = []
     for index, candidate in enumerate(candidates, first):
-        verdict, missing, *_ = ("dissimilar", [], 0, 0, 0) if refused(candidate) else _row(shown, candidate, rule)
-        verdicts.append("" if missing else verdict)
-        wanted += [(index, run) for run in missing]
-        if verdict == "similar" or (enough is not None and len(wanted) >= enough):
+        decision = REFUSED if refused(candidate) else decided_by(shown, candidate, rule)
+        verdicts.append("" if decision.missing else decision.verdict)
+        wanted += [(index, run) for run in decision.missing]
+        if decision.verdict == "similar" or (enough is not None and len(wanted) >= enough):
             break
     return verdicts, wanted
 
 
-def _row(
-    shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule
-) -> tuple[Verdict, list[int], int, int, int]:
-    """The verdict if no missing run shows f, the missing runs up to there, how many runs decided, how many of them showed f, and
-    how many broke.
+def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> Decision:
+    """The decision of `rule` on a candidate, by its runs in their order.
 
     A later run that showed f decides nothing while an earlier one is open: else the verdict would depend on timing.
     """
@@ -150,14 +165,10 @@ def _row(
         runs += 1
         broken += known == "broken"
         if known == "broken" and not rule.passes_over(broken, runs):
-            return "unknown", missing, runs, hits, broken
+            verdict = "unknown"
+            break
         hits += known is True
-    return verdict, missing, runs, hits, broken
-
-
-def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[int, int, int]:
-    """How many runs of a candidate decided its verdict, how many of them showed f, and how many broke; all of them are finished."""
-    return _row(shown, candidate, rule)[2:]
+    return Decision(verdict, missing, runs, hits, broken)
 
 
 def unproven(shown: Callable[..., Shown], candidate: Environment, rule: Rule) -> int | None:
