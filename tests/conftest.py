@@ -71,6 +71,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("rates") is None)
 
 
+def pytest_terminal_summary(terminalreporter) -> None:
+    """The table of false claims, where their number was asked for."""
+    if "DDENV_CLAIMS" not in os.environ:
+        return
+    rows = [
+        f"| {report.nodeid.partition('::')[2]} | {row} |"
+        for outcome in ("passed", "failed")
+        for report in terminalreporter.stats.get(outcome, ())
+        for kind, row in report.user_properties
+        if kind == "false claims"
+    ]
+    if rows:
+        terminalreporter.write_line(
+            "| oracle and world | sentence | said falsely | allowed | p |\n|---|---|---|---|---|"
+        )
+        terminalreporter.write_line("\n".join(rows))
+
+
 def pytest_collection_finish() -> None:
     # What was imported stays. Looking through it again and again took a tenth of the tests' time.
     gc.freeze()

@@ -16,9 +16,21 @@ from scipy.stats import binomtest
 import ddenv
 from ddenv.cli.test import elsewhere
 from ddenv.environment import NOTHING, Environment
-from ddenv.evidence.certificate import ERROR, HELPING, REFUTED, Terms, error_of, falls, keeps, settle
-from ddenv.evidence.margins import MOST_OF_NUMBER, Known, Rule, error_each, margin_of, wanted
-from ddenv.evidence.rates import anytime_interval, shows_at
+from ddenv.evidence.certificate import (
+    ERROR,
+    HELPING,
+    REFUTED,
+    Pairs,
+    Terms,
+    certificate_from_here,
+    certificate_tests,
+    error_of,
+    falls,
+    keeps,
+    settle,
+)
+from ddenv.evidence.margins import GONE, MISSED, MOST_OF_NUMBER, SHOWS, Known, Rule, error_each, margin_of, wanted
+from ddenv.evidence.rates import anytime_interval, estimated_rate, shows_at
 from ddenv.evidence.slices import fresh_chance
 from ddenv.reduction.isolation import Passing, passes
 from ddenv.reduction.procedure import certify, procedure
@@ -52,18 +64,24 @@ class World:
         def shown(environment, run):
             own, common = random.Random(f"{salt} {environment.bits} {run}"), random.Random(f"{salt} {run}")
             luck = (common if common.random() < self.together else own).random()
-            f = luck < {WHOLE: self.whole, LEFT: self.left, REST: self.rest}[environment]
+            f = luck < {WHOLE: self.whole, LEFT: self.left}.get(environment, self.rest)
             against = f == (environment != LEFT)
             return "broken" if against and own.random() < self.breaks else f
 
         return shown
 
 
-def check(false, error, simulated=SIMULATED):
-    """Fails if so many false claims are unlikely where each is false with a chance of `error`. With -s it prints a table of all."""
-    kind = os.environ["PYTEST_CURRENT_TEST"].partition("::")[2].removesuffix(" (call)")
-    print(f"| {kind} | {false} of {simulated} | {false / simulated:.1%} | {error:.1%} |")
-    assert binomtest(false, simulated, error, alternative="greater").pvalue > 0.001, f"{false} of {simulated} are false"
+@pytest.fixture
+def check(record_property):
+    """Fails if so many false sentences are unlikely where each is false with a chance of `error`; conftest.py prints all."""
+
+    def counted(false, error, simulated=SIMULATED, sentence=""):
+        chance = binomtest(false, simulated, error, alternative="greater").pvalue
+        row = f"{sentence} | {false} of {simulated} | {error:.2%} | {chance:.2g}"
+        record_property("false claims", row)
+        assert chance > 0.001, row
+
+    return counted
 
 
 KEPT = {
@@ -76,7 +94,7 @@ KEPT = {
 
 
 @pytest.mark.parametrize("world", KEPT.values(), ids=KEPT)
-def test_what_is_kept_is_rarely_less_than_the_bound(world):
+def test_what_is_kept_is_rarely_less_than_the_bound(world, check):
     claims = [settle(keeps(LEFT, WHOLE, TERMS), world.shown(salt)) for salt in range(SIMULATED)]
     check(sum((claim.bound or 0.0) > world.left / world.whole for claim in claims), TERMS.error)
 
@@ -90,7 +108,7 @@ NEEDED = {
 
 
 @pytest.mark.parametrize("world", NEEDED.values(), ids=NEEDED)
-def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world):
+def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world, check):
     claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)) for salt in range(SIMULATED)]
     check(sum((claim.bound or 1.0) < world.rest / world.left for claim in claims), TERMS.error)
 
@@ -106,7 +124,7 @@ TOGETHER = {
 
 
 @pytest.mark.parametrize(("world", "terms"), TOGETHER.values(), ids=TOGETHER)
-def test_what_is_said_of_the_rate_and_of_a_model_together_is_rarely_false(world, terms):
+def test_what_is_said_of_the_rate_and_of_a_model_together_is_rarely_false(world, terms, check):
     """One share of the error is enough for both, as the model has its turn only when the rate is shown to be kept."""
     false = 0
     for salt in range(SIMULATED):
@@ -116,23 +134,42 @@ def test_what_is_said_of_the_rate_and_of_a_model_together_is_rarely_false(world,
     check(false, terms.error)
 
 
-@pytest.mark.parametrize("together", [0.0, 0.8])
-@pytest.mark.parametrize("rate", [0.4, 0.8, 1.0])
-def test_what_changes_nothing_rarely_helps(rate, together):
-    world = World(rate, rate, rate, together)
+WITHOUT = {
+    f"{name}{' and luck' * bool(together)}": replace(world, together=together)
+    for together in (0.0, 0.8)
+    for name, world in {
+        "nothing changes": World(0.4, 0.4, 0.4),
+        "nothing changes, usual": World(0.8, 0.8, 0.8),
+        "nothing changes, sure": World(1.0, 1.0, 1.0),
+        "needed, hardly ever": World(0.05, 0.05, 0.0),
+        "needed, rare": World(0.3, 0.3, 0.21),
+        "needed, usual": World(0.9, 0.9, 0.72),
+    }.items()
+}
+# "Not needed" has no error: docs/statistics.md says in how many cases it is wrong where it is wrong often.
+SEEMS = 0.25
+
+
+@pytest.mark.parametrize("world", WITHOUT.values(), ids=WITHOUT)
+def test_a_model_rarely_helps_or_seems_not_needed_where_that_is_false(world, check):
     claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict for salt in range(SIMULATED)]
-    check(claims.count("helps") + claims.count("needed"), 1.0 / REFUTED + TERMS.error)
+    if world.rest == world.left:
+        check(claims.count("needed"), TERMS.error, sentence="needed")
+        check(claims.count("helps") + claims.count("rarer"), 1.0 / REFUTED, sentence="helps")
+    else:
+        check(claims.count("helps"), 1.0 / REFUTED, sentence="helps")
+        check(claims.count("not needed"), SEEMS, sentence="seems not needed")
 
 
 @pytest.mark.parametrize("together", [0.0, 0.8])
-def test_what_keeps_what_the_search_aims_at_is_rarely_lost(together):
+def test_what_keeps_what_the_search_aims_at_is_rarely_lost(together, check):
     world = World(0.9, 0.721, together=together)
     claims = [settle(keeps(LEFT, WHOLE, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)]
     check(claims.count("lost"), 1.0 / REFUTED)
 
 
 @pytest.mark.parametrize(("reached", "runs"), [(0, 10), (5, 10), (27, 30), (300, 300)])
-def test_a_world_rarely_passes_that_passes_as_seldom_as_the_whole_world(reached, runs):
+def test_a_world_rarely_passes_that_passes_as_seldom_as_the_whole_world(reached, runs, check):
     rule, error = Passing.of(reached, runs), error_of(1) / 2
     rate, passed = min(rule.rather_than, 0.97), 0
     for salt in range(SIMULATED):
@@ -142,7 +179,7 @@ def test_a_world_rarely_passes_that_passes_as_seldom_as_the_whole_world(reached,
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.5, 0.9, 1.0])
-def test_an_interval_rarely_misses_the_rate_although_it_is_looked_at_after_each_run(rate):
+def test_an_interval_rarely_misses_the_rate_although_it_is_looked_at_after_each_run(rate, check):
     missed = 0
     for salt in range(SIMULATED):
         draw, shown = random.Random(salt), 0
@@ -156,7 +193,7 @@ def test_an_interval_rarely_misses_the_rate_although_it_is_looked_at_after_each_
 
 
 @pytest.mark.parametrize("often", [1.1, 2.0, 3.2])
-def test_what_no_run_met_is_rarely_met_more_often_than_said(often):
+def test_what_no_run_met_is_rarely_met_more_often_than_said(often, check):
     runs, false = 20, 0
     for salt in range(SIMULATED):
         draw = random.Random(salt)
@@ -172,6 +209,8 @@ LOOPS = {
     "many that each take a bit": lambda kept: 0.9 * 0.93 ** (5 - len(kept & set("bcdef"))),
     "one that takes a fifth": lambda kept: 0.9 * 0.81 ** ("b" not in kept),
     "either of two": lambda kept: 0.9 * (0.3 + 0.7 * bool(kept & set("bc"))),
+    "two of four": lambda kept: 0.9 * (0.2, 0.6, 1.0, 1.0, 1.0)[len(kept & set("bcde"))],
+    "a model that hides it": lambda kept: 0.9 * (0.5 if "b" in kept else 1.0) * 0.5 ** ("c" not in kept),
 }
 
 
@@ -185,7 +224,7 @@ IN_TIME = {
 
 @pytest.mark.parametrize("in_time", IN_TIME.values(), ids=IN_TIME)
 @pytest.mark.parametrize("rate", LOOPS.values(), ids=LOOPS)
-def test_all_claims_of_a_whole_reduction_are_rarely_false(rate, in_time):
+def test_all_claims_of_a_whole_reduction_are_rarely_false(rate, in_time, check):
     """Also where f gets rarer with each call of the test, or alternates, in all that is kept alike."""
     false = 0
     for salt in range(SIMULATED):
@@ -209,10 +248,12 @@ def test_all_claims_of_a_whole_reduction_are_rarely_false(rate, in_time):
 class Lucky(driving.World):
     """A share `together` of the seeds has the same luck in all environments.
 
-    With `competes` another failure is as frequent in the whole world, and f is the luckier one of the first runs.
+    With `competes` another failure is as frequent in the whole world, and f is the luckier one of the first runs. A share `crashes`
+    of the runs with f breaks.
     """
 
     together: float = 0.0
+    crashes: float = 0.0
 
     def luck(self, environment, run):
         common, own = random.Random(f"{self.seed} {run}"), random.Random(f"{self.seed} {environment.bits} {run}")
@@ -226,7 +267,9 @@ class Lucky(driving.World):
         return self.rate if self.competes and second > first else 0.0
 
     def outcome(self, environment, run):
-        return 0.0 <= self.luck(environment, run) - self.before < self.rate_in(environment)
+        f = 0.0 <= self.luck(environment, run) - self.before < self.rate_in(environment)
+        crashes = random.Random(f"crash {self.seed} {environment.bits} {run}").random() < self.crashes
+        return "broken" if f and crashes else f
 
 
 LUCKY = Lucky(
@@ -235,13 +278,15 @@ LUCKY = Lucky(
 REDUCTIONS = {
     "independent": LUCKY,
     "the same luck": replace(LUCKY, together=0.8),
+    "crashes with f": replace(LUCKY, crashes=0.25),
+    "rare crashes with f": replace(LUCKY, crashes=0.05, together=0.5),
     "competing failures": replace(LUCKY, rate=0.45, competes=True),
     "competing failures, the same luck": replace(LUCKY, rate=0.45, competes=True, together=0.8),
 }
 
 
 @pytest.mark.parametrize("world", REDUCTIONS.values(), ids=REDUCTIONS)
-def test_what_a_whole_reduction_says_is_rarely_false(world):
+def test_what_a_whole_reduction_says_is_rarely_false(world, check):
     """Where each of two models takes a bit more of the rate than a needed one has to, and than the search may lose."""
     said, false = Counter(), Counter()
     for seed in range(SIMULATED):
@@ -253,10 +298,11 @@ def test_what_a_whole_reduction_says_is_rarely_false(world):
         said += Counter({kind for kind, _ in told})
         false += Counter({kind for kind, true in told if not true})
     assert said["bound"] > SIMULATED / 2
-    assert said["lost"] > SIMULATED / 5
-    check(false["bound"], ERROR)
-    check(false["first lost"], 1.0 / REFUTED)
-    check(false["first interval"], 0.05)
+    # Where many runs break, nothing is lost for sure.
+    assert said["lost"] > SIMULATED / 5 or world.crashes
+    check(false["bound"], ERROR, sentence="kept, needed")
+    check(false["first lost"], 1.0 / REFUTED, sentence="lost")
+    check(false["first interval"], 0.05, sentence="interval")
 
 
 def sentences(world, driver):
@@ -273,25 +319,19 @@ def sentences(world, driver):
                     yield "lost", rate < terms.keep_rate * world.rate
                 if not place:
                     # The others are about what the first ones left.
-                    shown = [driver.shown(named.environment, fact.certificate.first_run + run) for run in named.runs]
+                    runs = (driver.shown(named.environment, fact.certificate.first_run + run) for run in named.runs)
+                    shown = [one for one in runs if one != "broken"]
                     low, high = anytime_interval(sum(shown), len(shown))
-                    yield "first interval", low <= rate <= high
+                    # Of the runs that did not break.
+                    sound = rate * (1.0 - world.crashes) / (1.0 - rate * world.crashes)
+                    yield "first interval", low <= sound <= high
                     yield "first lost", not lost or rate < terms.keep_rate * world.rate
             elif left:
                 yield "bound", claim.bound >= rate / left
 
 
-TOO_RARE = {"hardly ever": World(0.05, 0.05, 0.0), "rare": World(0.3, 0.3, 0.21), "usual": World(0.9, 0.9, 0.72)}
-
-
-@pytest.mark.parametrize("world", TOO_RARE.values(), ids=TOO_RARE)
-def test_without_a_model_that_is_said_to_help_f_is_rarely_as_rare_as_without_a_needed_one(world):
-    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict for salt in range(SIMULATED)]
-    check(claims.count("helps"), 1.0 / REFUTED)
-
-
 @pytest.mark.parametrize("share", [0.801, 0.82])
-def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_not(share):
+def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_not(share, check):
     """The runs choose of which of ten models "minimal but for" is said: the error is that of all of them."""
     false = 0
     for seed in range(SIMULATED):
@@ -306,7 +346,7 @@ def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_n
 
 
 @pytest.mark.parametrize(("rate", "without"), [(0.0, 0.0), (0.15, 0.15), (0.9, 0.73), (1.0, 0.805)])
-def test_a_model_is_rarely_needed_in_another_simulator_where_it_is_not(rate, without):
+def test_a_model_is_rarely_needed_in_another_simulator_where_it_is_not(rate, without, check):
     here, said = Claim(None, "kept", 29, 29, 0.88, 1.0), 0
     for salt in range(SIMULATED):
         draw = random.Random(salt)
@@ -320,7 +360,7 @@ def test_a_model_is_rarely_needed_in_another_simulator_where_it_is_not(rate, wit
 
 
 @pytest.mark.parametrize("share", [0.5, 0.4])
-def test_what_still_fails_rarely_fails_at_half_the_rate_that_is_said(share):
+def test_what_still_fails_rarely_fails_at_half_the_rate_that_is_said(share, check):
     low, said = 0.8, 0
     for salt in range(SIMULATED):
         draw = random.Random(salt)
@@ -329,7 +369,7 @@ def test_what_still_fails_rarely_fails_at_half_the_rate_that_is_said(share):
 
 
 @pytest.mark.parametrize("rate", [1.0, 0.7])
-def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate):
+def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate, check):
     """In a window of values alone, as wide as half of the range: beyond it f shows again."""
     asked, false = NumberAsked("x", 0.5, 0.0, 1.0, 1.0, 0.01), 0
     rule = Rule(rate, error_each(rate, MOST_OF_NUMBER))
@@ -342,7 +382,92 @@ def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate):
                 goal, f = window[0] <= value < window[1], draw.random() < rate
                 outcomes.setdefault(value, []).append("pass" if goal else "similar" if f else "other")
         false += margin_of(asked, rule, Known(outcomes, outcomes)).up.to_end
-    check(false, ERROR, SIMULATED // 3)
+    check(false, ERROR, SIMULATED // 3, sentence="to the end")
+
+
+# At each value of a number: the share of its rate at which f shows, and the chance that the robot reaches its goal.
+VALUES = {
+    "f is all but gone": (GONE, 0.0),
+    "f still shows": (SHOWS, 0.0),
+    "f still shows, else the goal": (SHOWS, 1.0),
+    "the goal is mostly missed": (0.0, MISSED),
+}
+
+
+@pytest.mark.parametrize("rate", [1.0, 0.7])
+@pytest.mark.parametrize(("share", "goal"), VALUES.values(), ids=VALUES)
+def test_what_margins_say_of_the_values_of_a_number_is_rarely_false(share, goal, rate, check):
+    """That f shows up to a value, that it is gone at one, and that the robot reaches its goal at one: all of a call together."""
+    asked, false = NumberAsked("x", 0.5, 0.0, 1.0, 1.0, 0.01), 0
+    rule = Rule(rate, error_each(rate, MOST_OF_NUMBER))
+    wrong = {"f"} if share <= GONE else {"other", "goal"}
+    if goal <= MISSED:
+        wrong.add("goal")
+    for salt in range(SIMULATED):
+        draw, outcomes = random.Random(salt), {}
+        while asks := list(wanted(asked, rule, Known(outcomes, outcomes))):
+            for value, _ in asks:
+                f, reached = draw.random() < share * rate, draw.random() < goal
+                outcomes.setdefault(value, []).append("similar" if f else "pass" if reached else "other")
+        tried = [value for side in margin_of(asked, rule, Known(outcomes, outcomes)).sides for value in side.tried]
+        false += any(value.verdict in wrong for value in tried)
+    check(false, ERROR, sentence="f up to, no f at, goal at")
+
+
+AS_NEEDED = {
+    "sure": World(1.0, 1.0),
+    "usual": World(0.9, 0.9),
+    "the same luck": World(0.9, 0.9, together=0.8),
+    "rare": World(0.6, 0.6),
+}
+FORECAST = AS_NEEDED | {
+    "rare, the same luck": World(0.4, 0.4, together=0.8),
+    "removals halve the rate": World(0.9, 0.9, 0.5),
+    "removals take a bit": World(0.9, 0.9, 0.7, together=0.5),
+    "not needed": World(0.9, 0.9, 0.9),
+    "a part is kept": World(0.9, 0.77, 0.3, together=0.3),
+}
+# A forecast says in what range eight of ten certificates are.
+OUTSIDE = 0.2
+PAIRS = 10
+
+
+@pytest.mark.parametrize("world", FORECAST.values(), ids=FORECAST)
+def test_about_eight_of_ten_certificates_take_as_many_tests_as_forecast(world, check):
+    """At the start in the worlds that it takes for granted; once a model has some pairs, in any world."""
+    at_first, later = Counter(), Counter()
+    for salt in range(SIMULATED):
+        took, first, from_here = forecasts(world.shown(salt))
+        at_first[not first[0] <= took <= first[-1]] += 1
+        if from_here is not None:
+            later[not from_here[0] <= took <= from_here[-1]] += 1
+    if world in AS_NEEDED.values():
+        check(at_first[True], OUTSIDE, sentence="forecast at the start")
+    if later.total():
+        check(later[True], OUTSIDE, later.total(), sentence="forecast after ten pairs")
+
+
+def forecasts(shown, models=3):
+    """How many tests a certificate takes, and its forecasts: after a baseline of ten runs, and after ten pairs without a model."""
+    seen = sum(shown(WHOLE, -1 - run) is True for run in range(10))
+    first = certificate_tests(estimated_rate(seen, 10), TERMS.certify_rate, models, TERMS.at_least, 10)
+    kept = settle(keeps(LEFT, WHOLE, TERMS), shown)
+    made, from_here = dict.fromkeys(kept.rests_on), None
+    for place in range(models if kept.verdict != "lost" else 0):
+        error = TERMS.error_of_models(kept.bound)
+        claim = settle(falls(Environment.of([9 + place]), LEFT, error), shown)
+        if from_here is None and len(claim.rests_on) > 2 * PAIRS:
+            pairs = Pairs()
+            done = {**made, **dict.fromkeys(claim.rests_on[: 2 * PAIRS])}
+            for run in range(PAIRS):
+                pairs = pairs.after(*(shown(*test) for test in claim.rests_on[2 * run : 2 * run + 2]))
+            of_left = sum(environment == LEFT for environment, _ in done)
+            still = [PAIRS, *[0] * (models - 1 - place)]
+            from_here = certificate_from_here(len(done), of_left, still, pairs, PAIRS)
+        made |= dict.fromkeys(claim.rests_on)
+        if claim.verdict == "not needed":
+            break
+    return len(made), first, from_here
 
 
 # What a run meets beside five usual models: the chance, of how many groups of models one, and how many are in each.

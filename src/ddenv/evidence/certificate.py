@@ -355,6 +355,7 @@ def certificate_tests(
 ) -> tuple[int, int, int]:
     """Tests of a certificate of `left` needed models, as (low, likely, high): of ten, about eight take between low and high.
 
+    Where f is rare, and the same seeds show it, most take fewer. Where f still shows without a model, most take more.
     `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known.
     """
     # A damaged run file may ask for nothing, or for all.
