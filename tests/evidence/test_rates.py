@@ -1,5 +1,6 @@
 """What runs say of a rate: intervals, re-runs, and which of two rates they speak for."""
 
+import math
 import random
 
 import pytest
@@ -12,6 +13,18 @@ from ddenv.evidence.rates import iterations_needed, miss_chance, shows_at, wilso
 def test_wilson_interval_matches_the_textbook():
     # Wilson (1927) for 8 of 10: 0.4902 to 0.9433.
     assert wilson_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+
+
+def test_wilson_interval_of_ten_runs_covers_as_many_rates_as_the_docs_say():
+    intervals = [wilson_interval(shown, 10) for shown in range(11)]
+
+    def covered(rate):
+        chances = [math.comb(10, shown) * rate**shown * (1 - rate) ** (10 - shown) for shown in range(11)]
+        return sum(chance for chance, (low, high) in zip(chances, intervals, strict=True) if low <= rate <= high)
+
+    shares = [covered(place / 1000) for place in range(1, 1000)]
+    assert sum(shares) / len(shares) == pytest.approx(0.95, abs=0.005)
+    assert min(shares) == pytest.approx(0.84, abs=0.005)
 
 
 @given(trials=st.integers(1, 200), data=st.data())
