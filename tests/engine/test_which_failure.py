@@ -1,4 +1,4 @@
-"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, and another epsilon midway."""
+"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, another epsilon or failure midway."""
 
 import pytest
 
@@ -131,6 +131,35 @@ def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeat
     with RunFile(path) as file:
         assert read_subject(file).scenario.failure.epsilon == 0.15
     assert state_of(path).failures == state.failures
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_with_another_failure_stored_ends_are_judged_again_and_no_test_is_repeated(tmp_path, monkeypatch, jobs):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+    refused = []
+
+    def guide():
+        yield from until(lambda state: state.round is not None and state.round.number == 2)
+        yield "change", {"settings": {"failure": 2}}
+        yield from until(lambda state: state.refusal[0] == 1)
+        refused.append(state_of(path).refusal[1])
+        yield "change", {"settings": {"failure": 3, "epsilon": 0.15}}
+        yield from until(lambda state: state.refusal[0] == 2)
+        refused.append(state_of(path).refusal[1])
+        yield "change", {"settings": {"failure": 2, "epsilon": 0.15}}
+
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
+    pool = Guided(path, two, guide(), jobs)
+    pool.shifted = where
+    state = drive(path, pool)
+    assert refused[0] == "failure: the whole world showed 1 failure; choose one of these"
+    assert refused[1].startswith("there is no failure number 3; 10 runs of the whole world showed these: 1. ")
+    # The wall's failure was the first one, and now that of the beam is f.
+    assert (state.baseline.failures, state.baseline.runs) == (4, 10)
+    assert state.environment == ("beam",)
+    assert {test.outcome for test in state.tests if abs(test.end_pose[0] - 2.0) < 0.01} == {"other"}
+    assert len(pool.made) == len(set(pool.made))
+    assert [decision.words for decision in state.decisions] == ["changed failure from 1 to 2, epsilon from 0.4 to 0.15"]
 
 
 def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp_path, monkeypatch):

@@ -177,16 +177,15 @@ class Control:
         """Obeys a command exactly once, even if the engine is killed: its event holds the command's number."""
         self._journal.command = request.id
         try:
-            command: c.Command | None = None
             try:
                 command = c.parse(request.kind, request.data)
                 why = c.refusal(command, c.Situation(self._journal.state))
+                if not why:
+                    self._do(command)
             except UserError as error:
                 why = str(error)
-            if why or command is None:
+            if why:
                 self._journal.record(events.CommandRefused(why))
-            else:
-                self._do(command)
         finally:
             # A stop raises an exception, and must not be read again.
             self._journal.command = None
@@ -247,7 +246,7 @@ def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
 def _changed(journal: Journal, asked: c.Change) -> events.Event:
     state = journal.state
     new = asked.new(state)
-    if "epsilon" not in new or state.baseline is None:
+    if c.JUDGES.isdisjoint(new) or state.baseline is None:
         return events.Changed(new)
     # Stored ends are judged again.
     after = state.changed(scenario=with_settings(state.scenario, new))

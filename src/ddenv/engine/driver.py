@@ -34,6 +34,7 @@ from ddenv.runfile import events
 from ddenv.runfile.fold import digest
 from ddenv.runfile.fold_decisions import broken_runs, exact_runs
 from ddenv.runfile.progress import Certificate, Node
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY
 from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
@@ -278,7 +279,7 @@ class Driver:
             trajectories,
             spec=spec_of(journal.state),
             iterations=asked.iterations,
-            wanted=asked.failure,
+            wanted=settings(journal.state).failure,
             chose=chose,
             usual=asked.baseline_runs,
         )
