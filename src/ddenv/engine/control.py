@@ -92,14 +92,21 @@ def clock_offset() -> float:
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start.
+    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start. `attended`:
+    somebody looks at the run and can answer.
     """
 
     def __init__(
-        self, journal: Journal, terminated: threading.Event, after: float = math.inf, disk: DiskSpace | None = None
+        self,
+        journal: Journal,
+        terminated: threading.Event,
+        after: float = math.inf,
+        disk: DiskSpace | None = None,
+        attended: bool = False,
     ) -> None:
         self._journal = journal
         self._terminated = terminated
+        self._attended = attended
         self._paused = False
         self._credit: int | None = None
         self._pause_after_round = False
@@ -171,6 +178,11 @@ class Control:
     def round_finished(self) -> None:
         """A round, or the baseline, is over."""
         if self._pause_after_round:
+            self._pause()
+
+    def offered(self) -> None:
+        """A note offers another way: whoever looks has time to choose it, and an unattended run goes on."""
+        if self._attended and not self._paused:
             self._pause()
 
     def _obey(self, request: Request) -> None:
