@@ -111,7 +111,8 @@ def test_what_may_change_on_the_way_is_in_the_dialog_and_nothing_else():
     from ddenv.workbench.run.change import OTHERS
 
     assert {*(one.name for one in OTHERS), "pair", "algorithm"} == set(CHANGEABLE)
-    assert set(CHANGEABLE) == {"pair", "algorithm", "accept_rate", "exact_seeds", "iterations", "budget", "epsilon"}
+    method = {"pair", "algorithm", "accept_rate", "exact_seeds", "iterations", "budget"}
+    assert set(CHANGEABLE) == method | {"epsilon", "failure"}
 
 
 def test_nothing_slow_is_imported_for_them():

@@ -177,6 +177,7 @@ class Reduction:
         least=1,
         most=1000,
         shown="more",
+        may_change=True,
         more="The baseline lists them with their numbers.",
         cost="A rarer failure needs more re-runs.",
     )

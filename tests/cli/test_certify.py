@@ -89,3 +89,10 @@ def test_what_cannot_be_certified_is_refused_in_one_line(run, command):
     fake_run.FakeRun.baseline(run)
     with run.engine():
         is_one_line(command("certify", run.path), "another engine is working on this run")
+
+
+def test_the_time_of_a_run_counts_up_to_its_last_event_if_its_engine_said_no_end(run):
+    state = fake_moments.finished(run).state
+    killed = replace(state, working_seconds=2.0, started_at=100.0, updated_at=105.4)
+    assert summary(killed, run.path)["wall_seconds"] == 7.4
+    assert any(line.endswith("s, 7 s") for line in summary_lines(killed, run.path))

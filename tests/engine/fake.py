@@ -159,6 +159,7 @@ def engine(
     others: dict[Key, Place] | None = None,
     terminated: threading.Event | None = None,
     watch: Callable[[RunFile], DiskSpace | None] = lambda _: None,
+    attended: bool = False,
 ) -> Iterator[Engine]:
     """An engine as the program has it, in this process."""
     with RunFile(path) as file:
@@ -168,7 +169,7 @@ def engine(
         journal = Journal(file)
         _begin(journal, pool.jobs, accept_mode)
         prepare(file)
-        control = Control(journal, terminated or threading.Event(), time.time(), disk)
+        control = Control(journal, terminated or threading.Event(), time.time(), disk, attended)
         yield Engine(scenario, world, journal, Bench(journal, pool, control, others), control)
 
 

@@ -147,7 +147,11 @@ def test_the_command_offers_to_go_on_or_to_make_all_tests_again(home):
     mixed = ddenv("resume", run, "--mixed")
     assert mixed.returncode == 1, mixed.stderr
     assert "different bits: from here on the tests are mixed" in mixed.stdout
-    again = ddenv("resume", run, "--again")
+    refused = ddenv("resume", run, "--timeout", 7)
+    assert refused.returncode == 2 and refused.stderr.count("\n") == 1
+    assert f"'ddenv resume {run} --again --timeout 7' makes all tests in a new run" in refused.stderr
+    again = ddenv("resume", run, "--again", "--timeout", 7)
     assert "wall-2.ddenv" in again.stderr and again.returncode == 1
     state = state_of(home / "runs" / "wall-2.ddenv")
     assert state.tests_done == 6 and not state.physics.mixed
+    assert state.scenario["failure"]["timeout"] == 7.0

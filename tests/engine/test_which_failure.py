@@ -1,8 +1,7 @@
-"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, and another epsilon midway."""
+"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, another epsilon or failure midway."""
 
 import pytest
 
-from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.limits import note_start
 from ddenv.errors import UserError
@@ -10,6 +9,7 @@ from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import read_subject
 from ddenv.words.claims import verdict_on
+from ddenv.words.explain import _offered
 from ddenv.world.scenario import Oracle
 from tests.engine.fake import FakePool, drive, engine, new_run
 from tests.engine.guided import Guided, until
@@ -51,18 +51,38 @@ def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_o
     )
 
 
-def test_ends_that_scatter_stop_the_run_with_the_epsilon_that_joins_them(tmp_path):
+def scattered(_, seed):
+    return 0.02 * (seed * 37 % 127)
+
+
+def test_ends_that_scatter_are_told_with_the_epsilon_that_joins_them_and_the_run_goes_on(tmp_path):
     path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
     pool = FakePool(lambda keep, _: "similar" if "wall" in keep else "pass", 1)
-    pool.shifted = lambda _, seed: 0.02 * (seed * 37 % 127)
-    with pytest.raises(Stopped, match="goes on with a wider epsilon"):
-        drive(path, pool)
-    state = state_of(path)
+    pool.shifted = scattered
+    state = drive(path, pool)
     assert "--epsilon 1.4 makes them one failure" in dict(state.notes)["scatter"]
     assert "rare" not in dict(state.notes)
-    assert {test.phase for test in state.tests} == {"baseline"}
-    # Who resumes it wants this one.
-    assert drive(path, pool).status == "finished"
+    # Nobody is there to choose.
+    assert state.status == "finished"
+
+
+def test_somebody_who_looks_on_can_choose_before_the_search_begins(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+
+    def guide():
+        state = yield from until(lambda state: state.paused)
+        paused.append(state)
+        yield "change", {"settings": {"epsilon": 1.4}}
+        yield "resume", {}
+
+    paused = []
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
+    pool = Guided(path, lambda keep, _: "similar" if "wall" in keep else "pass", guide())
+    pool.shifted = scattered
+    state = drive(path, pool, attended=True)
+    assert {test.phase for test in paused[0].tests} == {"baseline"}
+    assert any(words.endswith("makes them one failure. Press c to change it.") for words in _offered(paused[0]))
+    assert (state.baseline.failures, state.environment) == (10, ("wall",))
 
 
 def warm(pool, shows=lambda made: made <= 10):
@@ -133,6 +153,35 @@ def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeat
     assert state_of(path).failures == state.failures
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_with_another_failure_stored_ends_are_judged_again_and_no_test_is_repeated(tmp_path, monkeypatch, jobs):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+    refused = []
+
+    def guide():
+        yield from until(lambda state: state.round is not None and state.round.number == 2)
+        yield "change", {"settings": {"failure": 2}}
+        yield from until(lambda state: state.refusal[0] == 1)
+        refused.append(state_of(path).refusal[1])
+        yield "change", {"settings": {"failure": 3, "epsilon": 0.15}}
+        yield from until(lambda state: state.refusal[0] == 2)
+        refused.append(state_of(path).refusal[1])
+        yield "change", {"settings": {"failure": 2, "epsilon": 0.15}}
+
+    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10)
+    pool = Guided(path, two, guide(), jobs)
+    pool.shifted = where
+    state = drive(path, pool)
+    assert refused[0] == "failure: the whole world showed 1 failure; choose one of these"
+    assert refused[1].startswith("there is no failure number 3; 10 runs of the whole world showed these: 1. ")
+    # The wall's failure was the first one, and now that of the beam is f.
+    assert (state.baseline.failures, state.baseline.runs) == (4, 10)
+    assert state.environment == ("beam",)
+    assert {test.outcome for test in state.tests if abs(test.end_pose[0] - 2.0) < 0.01} == {"other"}
+    assert len(pool.made) == len(set(pool.made))
+    assert [decision.words for decision in state.decisions] == ["changed failure from 1 to 2, epsilon from 0.4 to 0.15"]
+
+
 def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp_path, monkeypatch):
     monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
 
@@ -146,16 +195,20 @@ def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp
     assert drive(path, pool).baseline.failures == 6
 
 
-def test_a_very_rare_failure_asks_how_to_go_on_and_can_be_reduced_exactly(tmp_path):
+def test_a_very_rare_failure_asks_who_looks_on_how_to_go_on_and_can_be_reduced_exactly(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+
+    def guide():
+        state = yield from until(lambda state: state.paused)
+        assert dict(state.notes)["rare"].startswith("f shows in 3 of 70 runs: ")
+        yield "change", {"settings": {"accept_rate": "exact"}}
+        yield "resume", {}
+
+    def rare(keep, seed):
+        return "similar" if "wall" in keep and seed in (20, 30, 40) else "pass"
+
     path = new_run(tmp_path, accept_rate="kept", baseline_runs=70)
-    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep and seed in (20, 30, 40) else "pass", 1)
-    with pytest.raises(
-        Stopped, match="f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces"
-    ):
-        drive(path, pool)
-    with RunFile(path) as file:
-        file.send("change", settings={"accept_rate": "exact"})
-    state = drive(path, pool)
+    state = drive(path, Guided(path, rare, guide()), attended=True)
     assert state.environment == ("wall",)
     assert state.certificate.seeds == (20, 30, 40)
     assert sum(test.phase == "baseline" for test in state.tests) == 70

@@ -57,6 +57,19 @@ def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
     check_trusted(loaded, "mail.ddenv")
 
 
+def test_what_cannot_be_remembered_is_trusted_all_the_same(scenario, home, monkeypatch):
+    loaded = load_scenario(scenario(BRINGS["command"]))
+    (home / "file").touch()
+    monkeypatch.setenv("DDENV_HOME", str(home / "file" / "no folder"))
+    # Put back at the end.
+    monkeypatch.setenv("DDENV_TRUSTED", "")
+    trust_own(loaded, home / "own" / "s.yaml")
+    check_trusted(loaded, "s.yaml")
+    monkeypatch.setenv("DDENV_TRUSTED", "")
+    with pytest.raises(UserError, match="give --trust"):
+        check_trusted(loaded, "s.yaml")
+
+
 def test_a_run_file_with_the_name_of_the_module_changes_nothing(scenario):
     loaded = load_scenario(scenario(BRINGS["simulator"]))
     trust(program_of(loaded))

@@ -1,7 +1,9 @@
 """Names, files and hands that mean no good: whatever they are, the screen stands, and the terminal is not steered."""
 
 import html
+import io
 import json
+import os
 import random
 import sqlite3
 import sys
@@ -195,6 +197,21 @@ def test_what_is_no_terminal_for_a_screen_is_told(monkeypatch, terminal, encodin
         check_terminal()
     monkeypatch.setenv("TEXTUAL_DRIVER", "textual.drivers.web_driver:WebDriver")
     check_terminal()
+
+
+def test_stderr_may_be_a_file_if_the_output_is_a_terminal(monkeypatch, tmp_path):
+    leader, terminal = os.openpty()
+    monkeypatch.delenv("TEXTUAL_DRIVER", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    with os.fdopen(terminal, "w+b", 0) as raw, io.TextIOWrapper(raw, encoding="utf-8") as shown:
+        with (tmp_path / "log").open("w", encoding="utf-8") as errors:
+            monkeypatch.setattr(sys, "__stdin__", shown)
+            monkeypatch.setattr(sys, "__stdout__", shown)
+            monkeypatch.setattr(sys, "__stderr__", errors)
+            check_terminal()
+            # The screen is drawn there.
+            assert errors.isatty()
+    os.close(leader)
 
 
 @pytest.mark.parametrize("key", slow(pytest.mark.screens, ["o", "y", "l", "h"], but=["h"]))

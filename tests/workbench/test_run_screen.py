@@ -222,7 +222,7 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, started)
         await session.press("s")
         assert "space starts one" in session.said()
         await session.press("space")
-        assert started == [(run.path.name, 2, {"accept_mode": "automatic"})]
+        assert started == [(run.path.name, 2, {"accept_mode": "automatic", "attended": "yes"})]
         await session.look()
         assert "engine starts" in session.text("#status")
         await session.press("r")

@@ -12,7 +12,7 @@ from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, run_path
-from ddenv.settings import CHANGEABLE, SETTINGS, Value
+from ddenv.settings import CHANGEABLE, SETTINGS, Value, number_text
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_world
 
@@ -79,7 +79,7 @@ def announce_needs(sdf: Path, uris: list[str]) -> None:
 @click.option("--mixed", is_flag=True, help="Continue even if other versions or another processor change results.")
 @click.option("--anyway", is_flag=True, help="Continue even if the engine has died again and again.")
 @click.option("--again", is_flag=True, help="Repeat all tests in a new run of the same scenario.")
-@options.setting_options(only=CHANGEABLE)
+@options.setting_options(only=(*CHANGEABLE, "timeout"))
 @options.engine_options
 def resume_command(
     run: str,
@@ -90,11 +90,13 @@ def resume_command(
     again: bool,
     trust: bool,
     as_json: bool,
+    timeout: float | None,
     **given: Value,
 ) -> int:
     """Continues RUN (a name or a file) without a screen; no finished test is repeated.
 
-    With new settings it goes on as key c of the workbench does; with another epsilon all stored ends are judged again.
+    With new settings it goes on as key c of the workbench does; with another epsilon or failure all stored ends are judged again.
+    Another timeout needs --again.
 
     If Drake, Python or the processor has changed, the first run of the whole world is repeated and compared.
     """
@@ -118,6 +120,11 @@ def resume_command(
     }
     if new and again:
         raise UserError("--again repeats the tests of the same scenario: leave out the new settings")
+    if timeout is not None and not again:
+        raise UserError(
+            "--timeout: with another one every run may end elsewhere, so no stored end can be judged again; "
+            f"'ddenv resume {run} --again --timeout {number_text(timeout)}' makes all tests in a new run"
+        )
     with RunFile(path) as file:
         scenario = trusted_scenario(file, asking(trust), cluster)
         if not again:
@@ -133,6 +140,9 @@ def resume_command(
     # Without a screen there is nobody to ask.
     how = {"bits": "mixed" if mixed else "same", "anyway": "yes" if anyway else "no", "accept_mode": "automatic"}
     if again:
+        if timeout is not None:
+            failure = scenario.failure.model_copy(update={"timeout": timeout})
+            scenario = scenario.model_copy(update={"failure": failure})
         copy = run_path(scenario.name, None, path.parent)
         create_like(path, scenario, copy)
         announce(f"repeating the tests of {path} in {copy}")

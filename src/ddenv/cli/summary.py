@@ -10,7 +10,7 @@ from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_mi
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.slices import simulated
 from ddenv.runfile.progress import Node
-from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.state import BROKEN, RunState, spent
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
 from ddenv.words.claims import drift, meaning, means, missing, promise, rate, seen, smaller_known, verdict_on, what_ran
@@ -38,7 +38,7 @@ def summary(state: RunState, path: Path) -> dict[str, Any]:
         "rate_left": _rate(state.here),
         "rate_whole_world": _rate(state.nodes[0] if state.nodes else None),
         "certificate": certificate(state),
-        "wall_seconds": round(state.working_seconds, 3),
+        "wall_seconds": round(spent(state, state.updated_at), 3),
         "status": state.status,
         "reason": state.reason,
         "smaller_known": smaller_known(state) or None,
@@ -120,7 +120,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
         *_certificate_lines(state),
         f"{state.tests_done} tests ({tests}; {count(state.deflake_runs, 're-run')}{more}) in {count(state.rounds_done, 'round')}, "
-        f"{state.working_seconds:.0f} s",
+        f"{spent(state, state.updated_at):.0f} s",
         *([off] if (off := why_off(state)) else []),
         *([known] if (known := smaller_known(state)) else []),
         *([f"{count(len(broken), 'test')} broke; the last one: {broken[-1].failure}"] if broken else []),

@@ -39,6 +39,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     parser.add_argument("--cluster", help="where the tests are made, in place of what the scenario says")
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    parser.add_argument("--attended", choices=("yes", "no"), default="no", help="pause where there is an offer")
     parser.add_argument("--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow")
     parser.add_argument("--anyway", choices=("yes", "no"), default="no", help="start after engines died at once")
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
@@ -91,7 +92,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     stood, before = journal.state.status, journal.state.reason
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
-        control = Control(journal, terminated, after, disk)
+        control = Control(journal, terminated, after, disk, attended=options.attended == "yes")
         others = None if options.share is None else tests_of_others(file, scenario, options.share)
         with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
             bench = Bench(journal, pool, control, others)

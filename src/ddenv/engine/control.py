@@ -92,14 +92,21 @@ def clock_offset() -> float:
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start.
+    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start. `attended`:
+    somebody looks at the run and can answer.
     """
 
     def __init__(
-        self, journal: Journal, terminated: threading.Event, after: float = math.inf, disk: DiskSpace | None = None
+        self,
+        journal: Journal,
+        terminated: threading.Event,
+        after: float = math.inf,
+        disk: DiskSpace | None = None,
+        attended: bool = False,
     ) -> None:
         self._journal = journal
         self._terminated = terminated
+        self._attended = attended
         self._paused = False
         self._credit: int | None = None
         self._pause_after_round = False
@@ -173,20 +180,24 @@ class Control:
         if self._pause_after_round:
             self._pause()
 
+    def offered(self) -> None:
+        """A note offers another way: whoever looks has time to choose it, and an unattended run goes on."""
+        if self._attended and not self._paused:
+            self._pause()
+
     def _obey(self, request: Request) -> None:
         """Obeys a command exactly once, even if the engine is killed: its event holds the command's number."""
         self._journal.command = request.id
         try:
-            command: c.Command | None = None
             try:
                 command = c.parse(request.kind, request.data)
                 why = c.refusal(command, c.Situation(self._journal.state))
+                if not why:
+                    self._do(command)
             except UserError as error:
                 why = str(error)
-            if why or command is None:
+            if why:
                 self._journal.record(events.CommandRefused(why))
-            else:
-                self._do(command)
         finally:
             # A stop raises an exception, and must not be read again.
             self._journal.command = None
@@ -247,7 +258,7 @@ def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
 def _changed(journal: Journal, asked: c.Change) -> events.Event:
     state = journal.state
     new = asked.new(state)
-    if "epsilon" not in new or state.baseline is None:
+    if c.JUDGES.isdisjoint(new) or state.baseline is None:
         return events.Changed(new)
     # Stored ends are judged again.
     after = state.changed(scenario=with_settings(state.scenario, new))

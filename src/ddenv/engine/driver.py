@@ -34,6 +34,7 @@ from ddenv.runfile import events
 from ddenv.runfile.fold import digest
 from ddenv.runfile.fold_decisions import broken_runs, exact_runs
 from ddenv.runfile.progress import Certificate, Node
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY
 from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
@@ -51,14 +52,6 @@ OTHER_WAY = (
     "continue with those, or start a new run"
 )
 NOT_EXACT = "runs do not repeat, so nothing exact can be said of them; keep the rate of f instead: --accept-rate kept"
-SCATTERED = (
-    "f is a small part of what fails: 'ddenv resume RUN --epsilon NUMBER' goes on with a wider epsilon, 'ddenv resume RUN' with "
-    "this one"
-)
-VERY_RARE = (
-    "f shows in less than 5 % of the runs: 'ddenv resume RUN --accept-rate exact' reduces its failing runs, 'ddenv resume RUN' "
-    "keeps its rate"
-)
 NO_MODEL = "fails without any model: look at the ground, the robot, its controller, or something that is missing"
 # Of a rarer f no few replays say whether it still shows.
 FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
@@ -278,7 +271,7 @@ class Driver:
             trajectories,
             spec=spec_of(journal.state),
             iterations=asked.iterations,
-            wanted=asked.failure,
+            wanted=settings(journal.state).failure,
             chose=chose,
             usual=asked.baseline_runs,
         )
@@ -291,10 +284,9 @@ class Driver:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
-        if note_ends(self._journal) and self._reduction.accept_rate == "kept":
-            raise Stopped(SCATTERED)
-        if note_rare(self._journal):
-            raise Stopped(VERY_RARE)
+        scatters = note_ends(self._journal) and self._reduction.accept_rate == "kept"
+        if note_rare(self._journal) or scatters:
+            self._control.offered()
         self._control.round_finished()
         return self._first_leg()
 

@@ -235,7 +235,7 @@ class GoBack(Asked):
 
 
 class Change(Asked):
-    """Go on with other settings; all names are in `CHANGEABLE`. With another epsilon all ends are judged again, and a new search
+    """Go on with other settings; all names are in `CHANGEABLE`. With one of `JUDGES` all ends are judged again, and a new search
     begins from the whole world.
     """
 
@@ -250,12 +250,16 @@ class Change(Asked):
         budget, done = new.get("budget"), now.state.made
         if isinstance(budget, int) and budget <= done:
             return f"budget: {count(done, 'test')} were made already; enter more, or leave it empty"
+        baseline, failure = now.state.baseline, new.get("failure")
+        # Another epsilon may tell more failures apart.
+        if baseline is not None and isinstance(failure, int) and failure > len(baseline.seen) and "epsilon" not in new:
+            return f"failure: the whole world showed {count(len(baseline.seen), 'failure')}; choose one of these"
         return "" if new else "these are the settings already"
 
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
         words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
-        size = len(state.elements) if "epsilon" in self.new(state) else None
+        size = None if JUDGES.isdisjoint(self.new(state)) else len(state.elements)
         then = f". {new_search(state, size)}" if self.begins_anew(state) else ""
         return Words("change settings", f"from now on: {words}{then}")
 
@@ -271,6 +275,8 @@ class Change(Asked):
 
 # The settings that may change during a run: all others define what a test is, or how f was fixed.
 CHANGEABLE = {one.name: one for one in SETTINGS.values() if one.may_change}
+# Those that say what f is.
+JUDGES = frozenset({"epsilon", "failure"})
 ONLY_CHANGEABLE = f"only {', '.join(CHANGEABLE)} can be changed during a run"
 
 

@@ -38,6 +38,8 @@ SSH = "ssh:"
 # A scheduler's address; a bracket holds the colons of IPv6.
 SCHEDULER = re.compile(r"(tcp|tls)://(\[[\w:.%]+\]|[\w.-]+):\d{1,5}")
 FILE = "trusted.json"
+# The environment variable with what is trusted without being remembered.
+UNREMEMBERED = "DDENV_TRUSTED"
 # Begins a scenario's file that ddenv wrote: it may be of a run that somebody sent, whose program nobody here has chosen.
 WRITTEN = "# Written by ddenv; a program that it starts is asked about.\n"
 # Maximum number of files of one program that are looked at.
@@ -108,13 +110,16 @@ def untrusted(scenario: Scenario) -> Program | None:
 
 
 def trust(program: Program) -> None:
-    """Remembers that the user trusts it."""
+    """Remembers that the user trusts it; where nothing can be remembered, for this process and the engines it starts."""
     write_state(FILE, sorted({*_trusted(), *program.digests}))
+    if not _trusted().issuperset(program.digests):
+        os.environ[UNREMEMBERED] = " ".join(sorted({*_trusted(), *program.digests}))
 
 
 def _trusted() -> set[str]:
     known = read_state(FILE)
-    return {digest for digest in known if isinstance(digest, str)} if isinstance(known, list) else set()
+    remembered = {digest for digest in known if isinstance(digest, str)} if isinstance(known, list) else set()
+    return remembered.union(os.environ.get(UNREMEMBERED, "").split())
 
 
 def is_own(path: Path) -> bool:

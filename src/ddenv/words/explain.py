@@ -110,9 +110,12 @@ def _implied(state: RunState) -> tuple[str, ...]:
 
 
 def _offered(state: RunState) -> tuple[str, ...]:
-    """What a rare f costs, and would cost in another way, until something is left out."""
-    rare = dict(state.notes).get("rare", "")
-    return (f"{as_sentence(plain(rare))} Press c to change it.",) if rare and not state.node and not state.ended else ()
+    """Another way for an f that is rare, or whose ends scatter, until something is left out."""
+    notes = dict(state.notes)
+    offers = [notes[about] for about in ("scatter", "rare") if about in notes]
+    if state.node or state.ended:
+        return ()
+    return tuple(f"{as_sentence(plain(offer))} Press c to change it." for offer in offers)
 
 
 def _by_hand(state: RunState) -> tuple[str, ...]:

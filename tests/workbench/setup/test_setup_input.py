@@ -20,7 +20,7 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
         session.fill(jobs="3")
         await session.press("f6")
         assert session.wrong_or_run() == "crates-1"
-        assert started == [("crates-1.ddenv", 3, {"accept_mode": "automatic"})]
+        assert started == [("crates-1.ddenv", 3, {"accept_mode": "automatic", "attended": "yes"})]
         with RunFile(runs / "crates-1.ddenv") as run:
             assert [(command.kind, command.data) for command in run.commands()] == [("step", {"unit": "round"})]
 

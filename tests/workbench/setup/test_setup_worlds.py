@@ -42,7 +42,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert list(runs.iterdir()) == []
         session.fill(spawn_z="0.16")
         await session.press("ctrl+s")
-        assert started == [("crates-1.ddenv", 4, {"accept_mode": "automatic"})]
+        assert started == [("crates-1.ddenv", 4, {"accept_mode": "automatic", "attended": "yes"})]
 
 
 @pytest.mark.screens
