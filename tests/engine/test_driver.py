@@ -250,3 +250,9 @@ def test_each_round_has_a_forecast_when_it_begins(tmp_path):
     forecasts = told(path, "forecast")
     assert [each["round"] for each in forecasts] == [each["round"] for each in told(path, "round_started")]
     assert all(low <= likely <= high for low, likely, high in (each["tests"] for each in forecasts))
+
+
+def test_a_model_that_is_left_and_cannot_be_seen_is_named_beside_the_result(tmp_path):
+    state = drive(new_run(tmp_path), FakePool(needs("post"), 1))
+    words = "what is left has models without a visual, which can be hit but not seen: post"
+    assert dict(state.notes)["unseen"] == words
