@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 from types import SimpleNamespace
 
 import pytest
@@ -374,3 +375,18 @@ def test_a_crash_is_no_failure_of_the_robot(monkeypatch, home, error, command):
 
     monkeypatch.setattr(single_test, "subject_in", crash)
     assert command("reproduce", "run").returncode == CANNOT_SAY
+
+
+@pytest.mark.parametrize(
+    "error",
+    [MemoryError(), ImportError("libopenblas.so: failed to map segment from shared object")],
+    ids=["a file", "a library"],
+)
+def test_too_little_memory_is_one_line(error, monkeypatch, capsys):
+    from ddenv.cli import command_line
+
+    monkeypatch.setattr(command_line, "app", Mock(side_effect=error))
+    with pytest.raises(SystemExit) as ended:
+        command_line.main()
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "ddenv: out of memory; 'ulimit -v' says how much a process may use\n"

@@ -129,6 +129,9 @@ def _told(error: Exception, all_of_it: bool) -> int:
         if isinstance(error, BrokenPipeError):
             return 1
         print(f"ddenv: cannot print: {error.strerror}", file=sys.stderr)
+    elif isinstance(error, MemoryError) or (isinstance(error, ImportError) and "failed to map" in str(error)):
+        # A library that does not fit cannot be imported.
+        announce("ddenv: out of memory; 'ulimit -v' says how much a process may use")
     elif all_of_it:
         traceback.print_exception(error)
     else:

@@ -61,7 +61,7 @@ def read(path: Path, limit: int) -> bytes:
         raise Unusable(f"{size / 1e6:.0f} MB is too large; the maximum is {limit / 1e6:.0f} MB")
     try:
         with path.open("rb") as file:
-            return file.read(limit)
+            return file.read(size)
     except OSError as error:
         raise Unusable(reason(error)) from None
 
