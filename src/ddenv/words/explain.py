@@ -110,9 +110,12 @@ def _implied(state: RunState) -> tuple[str, ...]:
 
 
 def _offered(state: RunState) -> tuple[str, ...]:
-    """What a rare f costs, and would cost in another way, until something is left out."""
-    rare = dict(state.notes).get("rare", "")
-    return (f"{as_sentence(plain(rare))} Press c to change it.",) if rare and not state.node and not state.ended else ()
+    """What a rare f, or one that never differs, costs, and would cost in another way, until something is left out."""
+    notes = dict(state.notes)
+    offer = notes.get("rare") or notes.get("alike")
+    if not offer or state.node or state.ended:
+        return ()
+    return (f"{as_sentence(plain(offer))} Press c to change it.",)
 
 
 def _by_hand(state: RunState) -> tuple[str, ...]:
@@ -213,8 +216,11 @@ def _out_of_budget(state: RunState) -> tuple[str, ...]:
 
 def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     tests = state.finished_tests
+    times = count(options.baseline_runs, "time")
+    if options.reduces_one_run:
+        times = f"twice, or {times} if these two runs differ"
     first = (
-        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. f is the "
+        f"The robot runs in the whole world {times}, each with its own seed. f is the "
         "failure that most runs end in: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
