@@ -9,8 +9,8 @@ import sqlite3
 import subprocess
 import sys
 from pathlib import Path
-from unittest.mock import Mock
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import yaml

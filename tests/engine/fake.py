@@ -77,6 +77,8 @@ class FakePool:
         # The models that move by themselves wherever they are kept.
         self.moves: frozenset[str] = frozenset()
         self.aside: Callable[[frozenset[str], int], float] = lambda *_: 0.0
+        # The same for the models that move by themselves.
+        self.aside_of_others: Callable[[frozenset[str], int], float] = lambda *_: 0.0
         self.settling = 0
         self.settled = Settled()
         self.limits: list[float | None] = []
@@ -116,6 +118,8 @@ class FakePool:
         made = result(outcome, seed, x + self.shifted(keep, seed), bool(cut))
         made.trajectory[1, 2] = self.aside(keep, seed)
         motions = {name: made.trajectory.copy() for name in self.moves & keep}
+        for rows in motions.values():
+            rows[1, 2] += self.aside_of_others(keep, seed)
         more = {"took_part": self.took_part(keep, seed), "first_sensed": self.sensed(keep, seed)}
         return [(test, replace(made, motions=motions, **more))]
 

@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
+from ddenv.runfile.fold_decisions import stands_for_all
 from ddenv.runfile.state import CERTIFY
 from ddenv.schemas import names
+from ddenv.words.baseline import baseline
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import guided, until
 from tests.engine.killing import killed, resumed, story
@@ -65,7 +67,7 @@ def test_the_end_fails_with_a_chosen_seed_and_with_none_without_any_one_model(sa
     ]
     # Fresh runs say how often it fails with other seeds.
     fresh = [test for test in state.tests if test.phase == CERTIFY]
-    assert len(fresh) == end.runs == 20
+    assert len(fresh) == end.runs == (1 if stands_for_all(state) else 20)
     assert end.shown == sum(oracle(left, test.seed) == "similar" for test in fresh)
     assert not {test.seed for test in fresh} & {test.seed for test in state.tests if test.phase != CERTIFY}
 
@@ -154,7 +156,7 @@ def test_it_can_be_chosen_during_a_run(tmp_path, monkeypatch, jobs):
     state = guided(new_run(tmp_path, accept_rate="kept"), needs("wall", "beam"), guide(), jobs)
     assert state.environment == ("wall", "beam")
     assert state.certificate.seeds == (0,)
-    assert [claim.runs for claim in state.certificate.claims] == [20, 1, 1]
+    assert [claim.runs for claim in state.certificate.claims] == [1, 1, 1]
 
 
 def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_path):
@@ -178,3 +180,62 @@ def test_the_price_of_a_certificate_of_a_rare_failure_is_said_before_it_begins(t
     assert ": the certificate takes about " in words
     assert words.endswith("(--exact)")
     assert "price" not in notes(5)
+
+
+def test_where_all_runs_are_alike_one_run_of_them_is_reduced_with_the_search_alone(tmp_path):
+    pool = FakePool(needs("wall", "beam"), 1)
+    state = drive(exact_run(tmp_path, exact_seeds=1, baseline_runs=10), pool)
+    assert pool.made.count((frozenset(ELEMENTS), 0)) == 1
+    assert sum(test.phase == "baseline" for test in state.tests) == 2
+    # One fresh run, and what is left and each removal once more.
+    searched = [test for test in state.tests if test.phase == "round"]
+    assert len(pool.made) == 2 + len(searched) + 1 + 3
+    assert state.minimal
+    assert state.reason.startswith("f shows with seed 0 each time; without any one of these 2 models it does not")
+    assert "; with other seeds f in 1 of 1 fresh run" in state.reason
+    assert "alike to the last bit, so no more were made" in baseline(state)
+
+
+@pytest.mark.parametrize("what", ["the way", "what else moves", "the outcome"])
+def test_where_the_first_two_runs_differ_in_a_bit_all_runs_of_the_baseline_are_made(tmp_path, what):
+    shows = needs("wall")
+    pool = FakePool(lambda keep, seed: "pass" if what == "the outcome" and seed == 1 else shows(keep, seed), 2)
+    if what == "the way":
+        pool.aside = lambda keep, seed: 1e-12 * (seed == 1)
+    if what == "what else moves":
+        pool.moves = frozenset({"beam"})
+        pool.aside_of_others = lambda keep, seed: 1e-12 * (seed == 1)
+    state = drive(exact_run(tmp_path, exact_seeds=1, baseline_runs=10), pool)
+    assert sum(test.phase == "baseline" for test in state.tests) == 10
+    assert not state.baseline.alike
+    assert state.certificate.claims[0].runs == 20
+
+
+def test_alike_runs_that_do_not_fail_end_no_baseline(tmp_path):
+    pool = FakePool(lambda keep, seed: "similar" if "wall" in keep and seed > 1 else "pass", 2)
+    state = drive(exact_run(tmp_path, exact_seeds=1, baseline_runs=10), pool)
+    assert (state.baseline.runs, state.baseline.failures) == (10, 8)
+
+
+def test_a_run_that_other_seeds_only_seemed_to_repeat_is_refused_at_the_end(tmp_path):
+    """From the third run on, the simulator drifts."""
+    pool = FakePool(needs("wall"), 1)
+    pool.aside = lambda keep, seed: 1e-9 * max(0, len(pool.made) - 2)
+    state = drive(exact_run(tmp_path, exact_seeds=1, baseline_runs=10), pool)
+    assert not state.minimal
+    assert state.reason.startswith("not shown that each model is needed")
+
+
+@pytest.mark.parametrize("accept_rate", ["kept", "first"])
+def test_to_reduce_one_run_is_offered_with_both_costs_where_all_runs_are_alike_and_not_elsewhere(tmp_path, accept_rate):
+    def notes(aside):
+        pool = FakePool(needs("wall"), 1)
+        pool.aside = lambda keep, seed: aside * seed
+        return dict(drive(new_run(tmp_path, accept_rate=accept_rate, baseline_runs=10), pool).notes)
+
+    assert "alike" not in notes(1e-12)
+    words = notes(0.0)["alike"]
+    assert words.startswith(
+        "all 10 runs of the whole world are alike to the last bit: the search and its certificate take"
+    )
+    assert words.endswith("(--accept-rate exact --exact-seeds 1)")

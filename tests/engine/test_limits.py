@@ -157,6 +157,8 @@ def pace(simulated, real, slot=0):
 
 def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     path, pool = new_run(tmp_path), FakePool(needs("wall"), 2)
+    # Its runs differ: of runs that are alike there is another note.
+    pool.aside = lambda keep, seed: 1e-9 * seed
     pool.pace = [pace(50.0, 12.0), pace(3.0, 12.0, 1)]
     drive(path, pool)
     written = events(path)
@@ -177,7 +179,7 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
 def test_a_fast_world_is_not_called_slow_and_one_that_has_just_begun_neither(tmp_path, simulated, real):
     path, pool = new_run(tmp_path), FakePool(needs("wall"), 2)
     pool.pace = [pace(simulated, real)]
-    assert drive(path, pool).notes == ()
+    assert "slow" not in dict(drive(path, pool).notes)
 
 
 def test_a_world_whose_runs_all_take_too_long_is_given_up_soon(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -14,12 +14,12 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
-from ddenv.engine.limits import limit_after, note, note_ends, note_price, note_rare
+from ddenv.engine.limits import limit_after, note, note_alike, note_ends, note_price, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import RUNS_BESIDE, SURELY, error_of
+from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, SURELY, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
 from ddenv.evidence.ends import elsewhere, ends_of, of_baseline
 from ddenv.evidence.rates import anytime_interval, estimated_rate, iterations_needed
@@ -32,10 +32,10 @@ from ddenv.reduction.verdict import Acceptance
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
-from ddenv.runfile.fold_decisions import broken_runs, exact_runs
+from ddenv.runfile.fold_decisions import broken_runs, exact_runs, stands_for_all
 from ddenv.runfile.progress import Certificate, Node
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import BROKEN, CERTIFY
+from ddenv.runfile.state import BROKEN, CERTIFY, Test
 from ddenv.runfile.supports import stacks_of
 from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
@@ -56,6 +56,8 @@ NOT_EXACT = "runs do not repeat, so nothing exact can be said of them; keep the 
 NO_MODEL = "fails without any model: look at the ground, the robot, its controller, or something that is missing"
 # Of a rarer f no few replays say whether it still shows.
 FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
+# To reduce a single run exactly takes so many of the whole world if they are alike: one shows f, the other that it repeats.
+ENOUGH_ALIKE = 2
 LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
@@ -93,7 +95,8 @@ class Driver:
         self._settle()
         leg = None if journal.state.baseline is None else self._first_leg()
         whole, keeps_rate = journal.state.environments[0], reduction.accept_rate == "kept"
-        procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg)
+        alike = ENOUGH_ALIKE if settings(journal.state).reduces_one_run else None
+        procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg, enough_alike=alike)
         if self._carry_out(procedure) is None:
             self._end(False, str(self._baseline))
         else:
@@ -201,6 +204,9 @@ class Driver:
         exact, last = exact_runs(journal.state), journal.state.leg
         if not exact or (last is not None and last.settings["accept_rate"] == "exact"):
             return
+        if stands_for_all(journal.state):
+            # Other seeds have repeated it. The runs behind the result are replayed at the end.
+            return
         test = journal.test(journal.whole, exact[0])
         if test is not None and test.phase == "baseline" and self._bench.made_again(test) is not None:
             raise UserError(
@@ -278,13 +284,21 @@ class Driver:
         )
         if isinstance(found, str):
             return None
+        found = self._baseline = replace(found, alike=found.failures == runs > 1 and self._alike(tests))
         f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)
-        return steps.Baseline(found.failures, any(COMPETES * one.runs >= f.runs for one in others))
+        competed = any(COMPETES * one.runs >= f.runs for one in others)
+        return steps.Baseline(found.failures, competed, found.alike)
+
+    def _alike(self, tests: Sequence[Test]) -> bool:
+        """Whether the robot and all that moved went the same way in these tests, to the last bit."""
+        first, *others = (self._journal.file.samples(test.id) for test in tests)
+        return all(other == first for other in others)
 
     def failure_fixed(self, runs: int) -> steps.Leg:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
+        note_alike(self._journal)
         scatters = note_ends(self._journal) and self._reduction.accept_rate == "kept"
         if note_rare(self._journal) or scatters:
             self._control.offered()
@@ -418,7 +432,8 @@ class Driver:
             exact = () if self._certify_rate else self._leg.rule.exact
             shown = [run for run in exact if journal.shown(journal.environment, run)]
             seeds = tuple(journal.state.tests[test - 1].seed for test in journal.tests(journal.environment, shown))
-            at_least = max(self._only_certify or 0, RUNS_BESIDE) if seeds else self._only_certify or asked.baseline_runs
+            beside = RUNS_BESIDE_ALIKE if stands_for_all(journal.state) else RUNS_BESIDE
+            at_least = max(self._only_certify or 0, beside) if seeds else self._only_certify or asked.baseline_runs
             first, error = (before.first_run, before.error) if before else (journal.fresh_run, error_of(number))
             rate, share = journal.rate_of_whole(), self._certify_rate or asked.certify_rate
             note_price(journal, share, at_least)

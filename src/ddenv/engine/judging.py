@@ -150,7 +150,8 @@ def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
     if isinstance(found, str):
         raise UserError(found)
     f = Failure(found.position, trajectories[found.failure_test], spec.epsilon, spec.similarity)
-    return replace(found, judged=rejudged(file, state, (f,)), wall_limit=before.wall_limit)
+    alike = before.alike and found.failures == found.runs
+    return replace(found, judged=rejudged(file, state, (f,)), wall_limit=before.wall_limit, alike=alike)
 
 
 def fix_failure(

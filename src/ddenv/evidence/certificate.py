@@ -54,6 +54,8 @@ ABOUT_AS_OFTEN = 0.9
 VAIN, SURELY = 30, 0.999
 # Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
 RUNS_BESIDE = 20
+# Where the whole world repeats to the last bit with any seed, one run shows whether what is left depends on the seed.
+RUNS_BESIDE_ALIKE = 1
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.

@@ -78,10 +78,13 @@ Work = Generator[tuple[Test, ...], None, Result]
 
 @dataclass(frozen=True)
 class Baseline:
-    """How many of the runs that give the rate showed f, and whether several failures competed to be f."""
+    """How many of the runs that give the rate showed f, whether several failures competed to be f, and whether all runs show f
+    and have the same bits.
+    """
 
     failures: int
     competed: bool = False
+    alike: bool = False
 
 
 @dataclass(frozen=True)
@@ -227,10 +230,17 @@ class Changed(Exception):
 
 
 def procedure(
-    driver: Driver, whole: Environment, baseline_runs: int, keeps_rate: bool, leg: Leg | None = None
+    driver: Driver,
+    whole: Environment,
+    baseline_runs: int,
+    keeps_rate: bool,
+    leg: Leg | None = None,
+    enough_alike: int | None = None,
 ) -> Work[Certified | None]:
     """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no failure to reduce."""
-    leg, certified = leg or (yield from baseline(driver, whole, baseline_runs, keeps_rate)), None
+    certified = None
+    if leg is None:
+        leg = yield from baseline(driver, whole, baseline_runs, keeps_rate, enough_alike)
     while leg is not None:
         try:
             chain = yield from search_on(driver, leg)
@@ -242,16 +252,23 @@ def procedure(
     return certified
 
 
-def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Work[Leg | None]:
-    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing.
+def baseline(
+    driver: Driver, whole: Environment, runs: int, keeps_rate: bool, enough_alike: int | None = None
+) -> Work[Leg | None]:
+    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing. If the
+    first `enough_alike` runs are alike to the last bit, no more are made.
 
     Where several failures competed, the most frequent one was lucky in the runs that chose it: as many others give its rate.
     """
     chose, usual = 0, runs
+    runs = min(usual, enough_alike or usual)
     while True:
         while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
             yield tuple(Test(whole, run, "baseline") for run in missing)
         found = driver.baseline_ran(runs, chose)
+        if runs < usual and not (found and found.alike):
+            runs = usual
+            continue
         if found is None:
             return None
         if keeps_rate and found.failures < FEWEST_SHOWN and runs < LONGEST_BASELINE:

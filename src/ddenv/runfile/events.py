@@ -240,7 +240,8 @@ class BaselineFinished(Event):
     that chose, the most frequent first, in the numbers of the setting `failure`. `miss_chance` is
     (1-p)^(1+iterations), the chance that all tests of a candidate miss f; `iterations_95` is the number of iterations for a 95 %
     chance of seeing f. `position` is f's end, x, y, z m. `wall_limit` is what a later test may take in real time by the speed
-    of these runs, s, None if unknown. It is the one thing here that differs from machine to machine.
+    of these runs, s, None if unknown. It is the one thing here that differs from machine to machine. `alike`: several runs were
+    made, and all of them show f and have the same bits.
     """
 
     runs: Natural
@@ -257,6 +258,7 @@ class BaselineFinished(Event):
     wall_limit: Seconds | None = field(default=None, compare=False)
     seen: tuple[SeenFailure, ...] = ()
     chose: Natural = 0
+    alike: bool = False
 
     @property
     def others(self) -> tuple[tuple[int, SeenFailure], ...]:

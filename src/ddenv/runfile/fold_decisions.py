@@ -266,6 +266,11 @@ def exact_runs(state: RunState) -> tuple[int, ...]:
     return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
 
 
+def stands_for_all(state: RunState) -> bool:
+    """Whether a single run is reduced exactly that has the same bits with any seed, as far as the baseline shows."""
+    return state.baseline is not None and state.baseline.alike and settings(state).reduces_one_run
+
+
 def broken_runs(state: RunState) -> tuple[int, ...]:
     """The runs of the baseline that broke each time, ascending."""
     runs: dict[int, bool] = {}

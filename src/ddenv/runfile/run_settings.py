@@ -22,6 +22,11 @@ class Settings(Reduction, Failure):
         """How many runs without f, and none with it, a candidate may have."""
         return self.exact_seeds if self.accept_rate == "exact" else 1 + self.iterations
 
+    @property
+    def reduces_one_run(self) -> bool:
+        """Whether a single failing run is reduced exactly."""
+        return self.accept_rate == "exact" and self.exact_seeds == 1
+
 
 def settings(state: RunState) -> Settings:
     """What the run is asked to do now."""

@@ -9,8 +9,9 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from ddenv.evidence.certificate import RUNS_BESIDE, certificate_tests
+from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, certificate_tests
 from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_making
+from ddenv.runfile.fold_decisions import stands_for_all
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.settings import Reduction
@@ -109,7 +110,8 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
     asked = settings(state)
     certificate = certificate_tests(rate, asked.certify_rate, left, baseline.runs, baseline.runs)
-    certificate = (RUNS_BESIDE,) * 3 if asked.accept_rate == "exact" else certificate
+    if asked.accept_rate == "exact":
+        certificate = (RUNS_BESIDE_ALIKE if stands_for_all(state) else RUNS_BESIDE,) * 3
     search = _after(forecast.tests, state.tests_done - forecast.tests_done)
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high

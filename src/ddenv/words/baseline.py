@@ -22,6 +22,8 @@ def baseline(state: RunState) -> str:
     interval = f"95 % interval {percent(found.low)} to {percent(found.high)}"
     often = f"{found.failures} of {count(found.runs, 'run')} ({percent(found.rate)}, {interval})"
     said = [f"Baseline: the robot {failed_in(state, found)} in {often}{broke}."]
+    if found.alike and found.runs < settings(state).baseline_runs:
+        said.append("These runs are alike to the last bit, so no more were made.")
     if listed := [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]:
         others = f"other failures: {first_of(listed, MOST_FAILURES)}"
         f = next((one for one in found.seen if one.test == found.failure_test), None)

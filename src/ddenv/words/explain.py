@@ -110,9 +110,9 @@ def _implied(state: RunState) -> tuple[str, ...]:
 
 
 def _offered(state: RunState) -> tuple[str, ...]:
-    """Another way for an f that is rare, or whose ends scatter, until something is left out."""
+    """Another way for an f that is rare, never differs, or whose ends scatter, until something is left out."""
     notes = dict(state.notes)
-    offers = [notes[about] for about in ("scatter", "rare") if about in notes]
+    offers = [notes[about] for about in ("scatter", "rare", "alike") if about in notes]
     if state.node or state.ended:
         return ()
     return tuple(f"{as_sentence(plain(offer))} Press c to change it." for offer in offers)
@@ -216,8 +216,11 @@ def _out_of_budget(state: RunState) -> tuple[str, ...]:
 
 def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     tests = state.finished_tests
+    times = count(options.baseline_runs, "time")
+    if options.reduces_one_run:
+        times = f"twice, or {times} if these two runs differ"
     first = (
-        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed. f is the "
+        f"The robot runs in the whole world {times}, each with its own seed. f is the "
         "failure that most runs end in: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
