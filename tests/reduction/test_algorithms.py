@@ -2,12 +2,14 @@
 
 from contextlib import suppress
 from dataclasses import replace
+from random import Random
 from zlib import crc32
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import ddenv
 from ddenv.environment import NOTHING, Environment
 from ddenv.reduction.algorithms import sweep
 from ddenv.reduction.guide import make_guide, search
@@ -151,3 +153,20 @@ def test_an_algorithm_uses_the_parts_of_the_pair_that_it_is_said_to_use(algorith
 
     carried_through(search(algorithm, range(9), replace(guide, split=split, rank=rank)), Environment.of((1, 7)).__le__)
     assert used == set(uses(algorithm))
+
+
+def test_many_needed_models_far_apart_take_ddenv_little_more_than_splitting_and_as_printed_stays():
+    draw = Random(0)
+    elements = [f"m{number}" for number in range(100)]
+    places = {name: (draw.uniform(0, 20), draw.uniform(0, 20), 0.0) for name in elements}
+    needed = frozenset(draw.sample(elements, 20))
+
+    def tests(**options):
+        found = ddenv.reduce(
+            elements, needed.issubset, positions=places, failure_pose=(10, 10, 0), accept_rate="first", **options
+        )
+        assert frozenset(found.kept) == needed
+        return found.search_tests
+
+    assert tests() < 1.3 * tests(algorithm="splitting")
+    assert tests(growth="paper", skip="known") > 2 * tests()

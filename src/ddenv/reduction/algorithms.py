@@ -29,6 +29,8 @@ from ddenv.reduction.round import (
 
 # A model is taken to be needed once the probability that it is not is below this; it is tried again at the end.
 DOUBT = 0.25
+# After a round in which each of so many parts was needed, many models are: binary splitting finds them in fewer tests.
+MANY_NEEDED = 6
 
 
 def ddenv(elements: Partition, guide: Guide) -> Search:
@@ -39,7 +41,8 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
     Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and would end one granularity early.)
     The last model is tested, too: f may need no model at all. With the guide's `growth` "steady", n grows only after rounds that
     found nothing, and a round always has n partitions; with `skip` "implied", candidates that lack everything that was missed
-    before are skipped. The search `proves` that its end is minimal by trying to leave out each single model all the same.
+    before are skipped. Where none of `MANY_NEEDED` parts could go, a "steady" search ends as `splitting`
+    does. The search `proves` that its end is minimal by trying to leave out each single model all the same.
     """
     environment, n = elements, guide.n_partitions
     missed: list[Environment] = []
@@ -57,6 +60,8 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
             environment = tuple(model for model in environment if model in winner.models)
         elif round.exhaustive:
             break
+        if winner is None and guide.growth == "steady" and n >= MANY_NEEDED:
+            return (yield from splitting(environment, guide))
         if winner is None or guide.growth == "paper":
             n += 1
     return Environment.of(environment)
