@@ -21,7 +21,7 @@ def test_lines_of_a_listing_are_in_order_and_every_step_has_one(shown):
 
 def test_the_listing_says_when_n_grows():
     assert (15, " n_partitions ← n_partitions + 1") in listing("ddenv").lines
-    assert (15, " if none similar: n_partitions + 1") in listing("ddenv", "steady").lines
+    assert (15, " if none similar: n_partitions + 1, or splitting") in listing("ddenv", "steady").lines
 
 
 def test_every_bundled_algorithm_has_its_own_listing():

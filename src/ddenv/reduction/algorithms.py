@@ -41,8 +41,8 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
     Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and would end one granularity early.)
     The last model is tested, too: f may need no model at all. With the guide's `growth` "steady", n grows only after rounds that
     found nothing, and a round always has n partitions; with `skip` "implied", candidates that lack everything that was missed
-    before are skipped. Where none of `MANY_NEEDED` parts could go, a "steady" search ends as `splitting`
-    does. The search `proves` that its end is minimal by trying to leave out each single model all the same.
+    before are skipped. Where none of `MANY_NEEDED` parts could go, a "steady" search ends as
+    `splitting` does. The search `proves` that its end is minimal by trying to leave out each single model all the same.
     """
     environment, n = elements, guide.n_partitions
     missed: list[Environment] = []

@@ -104,7 +104,7 @@ ANY = _listing(
     (6, "return E'", "returned"),
 )
 # With the scenario's `growth: steady`.
-STEADY = DDENV.but({15: " if none similar: n_partitions + 1"})
+STEADY = DDENV.but({15: " if none similar: n_partitions + 1, or splitting"})
 LISTINGS = {"ddenv": DDENV, "ddmin": DDMIN, "probdd": PROBDD, "splitting": SPLITTING}
 
 
