@@ -203,14 +203,14 @@ def test_stderr_may_be_a_file_if_the_output_is_a_terminal(monkeypatch, tmp_path)
     leader, terminal = os.openpty()
     monkeypatch.delenv("TEXTUAL_DRIVER", raising=False)
     monkeypatch.setenv("TERM", "xterm")
-    with os.fdopen(terminal, "w+b", 0) as raw, io.TextIOWrapper(raw, encoding="utf-8") as shown:
-        with (tmp_path / "log").open("w", encoding="utf-8") as errors:
-            monkeypatch.setattr(sys, "__stdin__", shown)
-            monkeypatch.setattr(sys, "__stdout__", shown)
-            monkeypatch.setattr(sys, "__stderr__", errors)
-            check_terminal()
-            # The screen is drawn there.
-            assert errors.isatty()
+    raw = os.fdopen(terminal, "w+b", 0)
+    with io.TextIOWrapper(raw, encoding="utf-8") as shown, (tmp_path / "log").open("w", encoding="utf-8") as errors:
+        monkeypatch.setattr(sys, "__stdin__", shown)
+        monkeypatch.setattr(sys, "__stdout__", shown)
+        monkeypatch.setattr(sys, "__stderr__", errors)
+        check_terminal()
+        # The screen is drawn there.
+        assert errors.isatty()
     os.close(leader)
 
 

@@ -180,7 +180,9 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, sta
         screen = await opened(session)
         assert "world that passes" in session.text(KeyFooter)
         await session.press("i")
-        assert started == [(run.path.name, run.state.jobs, {"accept_mode": "automatic", "attended": "yes", "isolate": 0})]
+        assert started == [
+            (run.path.name, run.state.jobs, {"accept_mode": "automatic", "attended": "yes", "isolate": 0})
+        ]
         # The engine begins.
         run.hold()
         run.start_isolation(2)
