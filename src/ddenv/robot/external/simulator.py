@@ -313,7 +313,8 @@ class PoseLog:
 
     def _wrong(self, text: str) -> BadLog:
         shown = printable(text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}...")
-        hint = "; write decimal points, and commas between the numbers" if ";" in text else ""
+        commas = ";" in text or text.count(",") + 1 == 2 * len(COLUMNS)
+        hint = "; write decimal points, and commas between the numbers" if commas else ""
         numbers = [number for field in text.split(",") if (number := _number(field)) is not None]
         if not all(map(math.isfinite, numbers)):
             hint = "; a number is not finite"
