@@ -15,6 +15,7 @@ from ddenv.engine.driver import Driver
 from ddenv.errors import UserError
 from ddenv.runfile.events import RoundStarted
 from ddenv.schemas import names
+from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import Guided, at_once, guided, until  # noqa: F401
 from tests.engine.killing import Killed, finished_tests, kill_after, killed, resumed, story
@@ -250,3 +251,14 @@ def test_each_round_has_a_forecast_when_it_begins(tmp_path):
     forecasts = told(path, "forecast")
     assert [each["round"] for each in forecasts] == [each["round"] for each in told(path, "round_started")]
     assert all(low <= likely <= high for low, likely, high in (each["tests"] for each in forecasts))
+
+
+def test_a_model_that_is_left_and_cannot_be_seen_is_named_beside_the_result(tmp_path):
+    text = (DATA / "wall.sdf").read_text()
+    drawn = '<visual name="visual"><geometry><box><size>0.2 3 1</size></box></geometry></visual>'
+    assert text.count(drawn) == 1
+    (tmp_path / "odd.sdf").write_text(text.replace(drawn, ""))
+    state = drive(new_run(tmp_path, world=tmp_path / "odd.sdf"), FakePool(needs("wall"), 1))
+    assert (
+        dict(state.notes)["unseen"] == "what is left has models without a visual, which can be hit but not seen: wall"
+    )

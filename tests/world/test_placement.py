@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
+from ddenv.cli.world import world_lines
 from ddenv.errors import UserError
 from ddenv.world.load import SDF
 from ddenv.world.model import (
@@ -35,6 +36,7 @@ from ddenv.world.placement import (
     hull,
     inside,
     note_inside,
+    note_unseen,
     notes_on_start,
     overlap,
 )
@@ -235,3 +237,30 @@ def test_a_goal_inside_a_post_is_noted():
     start = Spawn(x=0, y=0, z=0.45)
     assert [about for about, _ in notes_on_start(WALL, HUSKY, start, (0.0, -4.0))] == ["goal"]
     assert list(notes_on_start(WALL, HUSKY, start, (0.0, -3.0))) == []
+
+
+def seen_as(*visuals):
+    """A world of a post that all can see, and one with a collision of 1.5 m that is drawn in these `visuals`."""
+    box = "<geometry><box><size>{0} {0} 2</size></box></geometry>"
+    link = "<link name='l'><collision name='c'>{}</collision>{}</link>"
+    models = [
+        f"<model name='{name}'><static>1</static>{link.format(box.format(1.5), drawn)}</model>"
+        for name, drawn in (
+            ("post", f"<visual name='v'>{box.format(1)}</visual>"),
+            ("odd", "".join(f"<visual name='{size}'>{box.format(size)}</visual>" for size in visuals)),
+        )
+    ]
+    return parse_world(f"<sdf version='1.9'><world name='w'>{''.join(models)}</world></sdf>".encode(), Path("w.sdf"))
+
+
+def test_what_can_be_hit_where_nothing_is_seen_is_named():
+    names = ("post", "odd")
+    assert list(note_unseen(seen_as(1.0), names)) == []
+    assert list(note_unseen(seen_as(), names)) == [
+        ("unseen", "models without a visual, which can be hit but not seen: odd")
+    ]
+    assert list(note_unseen(seen_as(0.05), names)) == [
+        ("larger", "models whose collision is more than 3 times as wide as what is seen: odd")
+    ]
+    assert list(note_unseen(seen_as(0.05), ("post",))) == []
+    assert "models without a visual, which can be hit but not seen: odd" in world_lines(seen_as())

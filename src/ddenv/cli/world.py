@@ -139,7 +139,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
 
     No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
-    from ddenv.world.placement import note_inside
+    from ddenv.world.placement import note_inside, note_unseen
     from ddenv.world.sdf.official import refused
 
     numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
@@ -153,7 +153,8 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
         places.setdefault(why, []).append(place)
-    wrong = [words for _, words in note_inside(world)]
+    odd = (*note_inside(world), *note_unseen(world, world.elements()))
+    wrong = [words for _, words in odd]
     for why, at in places.items():
         more = f", and {len(at) - 1} more" if len(at) > 1 else ""
         wrong.append(printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{more}"))

@@ -42,6 +42,7 @@ from ddenv.schemas import split_pair
 from ddenv.text import count
 from ddenv.words.claims import verdict_on
 from ddenv.world.model import World
+from ddenv.world.placement import note_unseen
 from ddenv.world.scenario import Reduction, Scenario
 
 # Another failure competes to be f if it shows at least once where f shows so often. Rarer ones hardly ever win by luck.
@@ -537,6 +538,8 @@ class Driver:
 
     def _end(self, minimal: bool, reason: str) -> None:
         self._bench.finish_trials()
+        for about, words in note_unseen(self._world, self._journal.state.environment):
+            note(self._journal, about, f"what is left has {words}")
         # Tests of later candidates are no longer needed.
         self._journal.lose_running()
         self._journal.record(events.Finished(minimal, reason))

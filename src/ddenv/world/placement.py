@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice, product, starmap
 
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.text import count
-from ddenv.world.extent import Bounds, bounds, filled_bounds, shape_bounds, stacked, vertices_of
+from ddenv.text import count, first_of
+from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
 from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
+# A collision that is so many times as wide as what is seen of its model is named; a line names so many models.
+LARGER = 3.0
+MOST_NAMES = 3
 # The steps in which a free place is looked for, and how far, m.
 STEP, FAR = 0.2, 2.0
 
@@ -137,6 +140,33 @@ def note_inside(world: World) -> Iterator[tuple[str, str]]:
         more = f", and {count(len(pairs) - 1, 'more pair')}" if len(pairs) > 1 else ""
         start = f"{deepest.name} starts {deepest.depth:.2f} m inside {deepest.other}"
         yield "inside", f"{start}{more}: they push each other apart"
+
+
+def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
+    """What `among` these models the robot may hit where nothing is seen. A world without any visual is not made to be looked at."""
+    if not any(link.visuals for model in world.models for link in model.links):
+        return
+    # A visual that was not read may be there.
+    unread = {note.model for note in world.notes if note.kind == "ignored"}
+    unseen = list[str]()
+    larger = list[str]()
+    for model in world.models:
+        hit = model_bounds(model)
+        if hit is None or model.name not in among or model.name in unread:
+            continue
+        visuals = (visual for link in model.links for visual in link.visuals)
+        seen = around(shape_bounds(visual.shape, visual.pose) for visual in visuals)
+        if seen is None:
+            unseen.append(model.name)
+        elif ((hit[1] - hit[0])[:2] > LARGER * (seen[1] - seen[0])[:2]).any():
+            larger.append(model.name)
+    if unseen:
+        yield "unseen", f"models without a visual, which can be hit but not seen: {first_of(unseen, MOST_NAMES)}"
+    if larger:
+        yield (
+            "larger",
+            f"models whose collision is more than {LARGER:g} times as wide as what is seen: {first_of(larger, MOST_NAMES)}",
+        )
 
 
 def inside(world: World) -> list[Inside]:
