@@ -144,12 +144,13 @@ WITHOUT = {
         "nothing changes, usual": World(0.8, 0.8, 0.8),
         "nothing changes, sure": World(1.0, 1.0, 1.0),
         "needed, hardly ever": World(0.05, 0.05, 0.0),
+        "needed, just": World(0.2, 0.2, 0.158),
         "needed, rare": World(0.3, 0.3, 0.21),
         "needed, usual": World(0.9, 0.9, 0.72),
     }.items()
 }
 # "Not needed" has no error: docs/statistics.md says in how many cases it is wrong where it is wrong often.
-SEEMS = 0.25
+SEEMS = 0.4
 
 
 @pytest.mark.parametrize("world", WITHOUT.values(), ids=WITHOUT)
