@@ -27,7 +27,7 @@ class Engine:
 
     def __init__(self, lab: Lab, run: Path, jobs: int, share: Path | None = None) -> None:
         self._lab, self._run = lab, run
-        given = {"jobs": jobs, "cluster": None, "share": share, "after": None, "anyway": "no"}
+        given = {"jobs": jobs, "cluster": None, "share": share, "after": None, "anyway": "no", "attended": "no"}
         self._options = Namespace(
             accept_mode="automatic", bits="same", certify=None, isolate=None, margins=None, **given
         )
