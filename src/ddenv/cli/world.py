@@ -153,8 +153,8 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
         places.setdefault(why, []).append(place)
-    odd = (*note_inside(world), *note_unseen(world, world.elements()))
-    wrong = [words for _, words in odd]
+    remarks = (*note_inside(world), *note_unseen(world, world.elements()))
+    wrong = [words for _, words in remarks]
     for why, at in places.items():
         more = f", and {len(at) - 1} more" if len(at) > 1 else ""
         wrong.append(printable(f"the official checker (ign sdf -k) refuses {why}: {at[0]}{more}"))

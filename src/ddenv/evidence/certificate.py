@@ -355,7 +355,7 @@ EIGHT_OF_TEN = 1.28
 def certificate_tests(
     rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0
 ) -> tuple[int, int, int]:
-    """Tests of a certificate of `left` needed models, as (low, likely, high): of ten, about seven or more take
+    """Tests of a certificate of `left` needed models, as (low, likely, high): about seven of ten or more take
     between low and high, if f never shows without one of these models.
 
     Where f is rare, and the same seeds show it, most take fewer. Where f still shows without a model, most take more.

@@ -250,7 +250,8 @@ class Change(Asked):
         budget, done = new.get("budget"), now.state.made
         if isinstance(budget, int) and budget <= done:
             return f"budget: {count(done, 'test')} were made already; enter more, or leave it empty"
-        baseline, failure = now.state.baseline, new.get("failure")
+        baseline = now.state.baseline
+        failure = new.get("failure")
         # Another epsilon may tell more failures apart.
         if baseline is not None and isinstance(failure, int) and failure > len(baseline.seen) and "epsilon" not in new:
             return f"failure: the whole world showed {count(len(baseline.seen), 'failure')}; choose one of these"

@@ -111,15 +111,18 @@ def untrusted(scenario: Scenario) -> Program | None:
 
 def trust(program: Program) -> None:
     """Remembers that the user trusts it; where nothing can be remembered, for this process and the engines it starts."""
-    write_state(FILE, sorted({*_trusted(), *program.digests}))
+    trusted = sorted({*_trusted(), *program.digests})
+    write_state(FILE, trusted)
     if not _trusted().issuperset(program.digests):
-        os.environ[UNREMEMBERED] = " ".join(sorted({*_trusted(), *program.digests}))
+        os.environ[UNREMEMBERED] = " ".join(trusted)
 
 
 def _trusted() -> set[str]:
+    trusted = set(os.environ.get(UNREMEMBERED, "").split())
     known = read_state(FILE)
-    remembered = {digest for digest in known if isinstance(digest, str)} if isinstance(known, list) else set()
-    return remembered.union(os.environ.get(UNREMEMBERED, "").split())
+    if isinstance(known, list):
+        trusted.update(digest for digest in known if isinstance(digest, str))
+    return trusted
 
 
 def is_own(path: Path) -> bool:

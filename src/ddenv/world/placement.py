@@ -151,8 +151,8 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
         return
     # A visual that was not read may be there.
     unread = {note.model for note in world.notes if note.kind == "ignored"}
-    unseen = list[str]()
-    larger = list[str]()
+    unseen: list[str] = []
+    larger: list[str] = []
     for model in world.models:
         hit = model_bounds(model)
         if hit is None or model.name not in among or model.name in unread:

@@ -34,8 +34,7 @@ class Engine:
         from ddenv.runs.programs import start_engine
 
         try:
-            how = {"accept_mode": accept_mode, "attended": "yes"}
-            self._process = start_engine(self.run, max(1, jobs), **how, **options)
+            self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode, attended="yes", **options)
         except OSError as error:
             raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
         self._worked, self._last_words = False, ""
