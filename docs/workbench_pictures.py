@@ -152,8 +152,7 @@ async def make_all() -> None:
     run = new_run("ditch", slice=False, seed=2)
     engine = start_engine(run, 1, accept_mode="ask")
     async with opened(run) as pilot:
-        async with slowed(engine):
-            await begin(pilot, run)
+        await begin(pilot, run, engine)
         await guide(pilot)
         await look_back(pilot)
         await tell_why(pilot)
@@ -245,10 +244,11 @@ async def slowed(engine: Popen[bytes]) -> AsyncIterator[None]:
         os.killpg(engine.pid, signal.SIGCONT)
 
 
-async def begin(pilot: Pilot[int], run: Path) -> None:
+async def begin(pilot: Pilot[int], run: Path, engine: Popen[bytes]) -> None:
     """From the baseline to the middle of a round."""
-    await until(pilot, lambda: is_under_way(pilot, tests=4))
-    await take(pilot, "baseline")
+    async with slowed(engine):
+        await until(pilot, lambda: is_under_way(pilot, tests=4))
+        await take(pilot, "baseline")
     await until(pilot, lambda: state(pilot).status == "waiting")
     await take(pilot, "waiting")
     await take_dialogs(pilot)
@@ -257,14 +257,15 @@ async def begin(pilot: Pilot[int], run: Path) -> None:
     await press(pilot, "p", "enter")
     await take(pilot, "reduction-waits")
     await press(pilot, "escape", "a")
-    await take_live(pilot, "run", pilot)
+    async with slowed(engine):
+        await take_live(pilot, "run", pilot)
     # The next screens take a moment to open.
     await pause(pilot, True)
     await other_failures(pilot)
-    await from_elsewhere(pilot, run)
+    await from_elsewhere(pilot, run, engine)
 
 
-async def from_elsewhere(pilot: Pilot[int], run: Path) -> None:
+async def from_elsewhere(pilot: Pilot[int], run: Path, engine: Popen[bytes]) -> None:
     """The same round on other screens. All are opened first: the rounds of this run are soon over."""
     async with AsyncExitStack() as stack:
 
@@ -276,8 +277,9 @@ async def from_elsewhere(pilot: Pilot[int], run: Path) -> None:
         views["watch"] = await other(MIDDLE, watch=True)
         await press(views["run-map"], "1")
         await press(views["run-table"], "2")
-        for name, view in views.items():
-            await take_live(view, name, pilot)
+        async with slowed(engine):
+            for name, view in views.items():
+                await take_live(view, name, pilot)
     await pause(pilot, True)
 
 
@@ -504,6 +506,8 @@ async def take_live(pilot: Pilot[int], name: str, guiding: Pilot[int]) -> None:
     await pause(guiding, False)
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
+        if state(guiding).status == "finished":
+            raise RuntimeError(f"{name}: the run ended before a robot that moves could be shown")
         await accept_if_waiting(guiding)
         await pilot.pause(0.02)
         if is_under_way(pilot):

@@ -27,6 +27,7 @@ from tests.waiting import PATIENCE, eventually, wait_until
 CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at")
 
+ROBOT_YELLOW = (240, 190, 20)
 _FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader"),
     *("--enable-unsafe-swiftshader", "--no-first-run", "--disable-background-networking", "--disable-component-update"),
@@ -97,9 +98,11 @@ class Page:
         result = await self.do("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         return result["result"].get("value")
 
-    async def screenshot(self) -> bytes:
-        """The picture, as PNG."""
-        return base64.b64decode((await self.do("Page.captureScreenshot", format="png"))["data"])
+    async def picture(self) -> np.ndarray:
+        """What the window shows, height x width x (red, green, blue)."""
+        screenshot = await self.do("Page.captureScreenshot", format="png")
+        image = Image.open(io.BytesIO(base64.b64decode(screenshot["data"])))
+        return np.asarray(image.convert("RGB"))
 
 
 async def shows(page: Page, expression: str) -> None:
@@ -139,7 +142,13 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
         await shows(page, "viewer.scene_tree.find(['world', 'removed', 'all']).object.visible === true")
         await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
         assert await page.value("forbidden") == []
-        picture = np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB"))
+
+        async def is_drawn() -> bool:
+            return near(await page.picture(), ROBOT_YELLOW) > 100
+
+        # The browser shows a frame some time after it was drawn: until then the canvas is white.
+        await eventually(is_drawn, lambda: "no robot's yellow")
+        picture = await page.picture()
         process.terminate()
         process.wait(PATIENCE)
         await shows(page, "document.getElementById('lost').style.display === 'block'")
@@ -150,7 +159,7 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
             "document.getElementById('lost').style.display !== 'block' && typeof play !== 'undefined' && play !== null",
         )
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 200
-    assert near(picture, (240, 190, 20)) > 100, "the robot's yellow"
+    assert near(picture, ROBOT_YELLOW) > 100
     assert near(picture, (20, 180, 75)) > 100, "the goal's green"
     assert near(picture, (235, 40, 35)) > 100, "the failure's red"
 
