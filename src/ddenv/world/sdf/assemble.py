@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ddenv.world.model import Joint, Link, Model, is_ground
+from ddenv.world.model import Joint, Link, Model, is_ground, still_links
 from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
@@ -33,17 +33,18 @@ class Saved:
     models: dict[str, Saved]
 
 
-def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: Context) -> Model:
-    """The model of `part`, called by the unique `name`. Raises UserError."""
+def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context: Context) -> Model:
+    """The model of `part`, called by the unique `name`, with its `entry` in `<state>`. Raises UserError, also TooFar."""
     context.model = name
+    saved = None if entry is None else _saved(entry, context)
     nominal = outer.placed(part)
     actual = nominal if saved is None or saved.pose is None else saved.pose
-    static = _is_static(part)
-    builder = _Builder(static, context)
-    builder.add(Spot(outer.inside(part), nominal, actual), saved)
+    spot = Spot(outer.inside(part), nominal, actual, static=_is_static(part))
+    builder = _Builder(context)
+    builder.add(spot, saved)
     if not builder.links:
-        # Only a static model may have none, for example if it only holds a plugin.
-        if not static:
+        # Only a static model may have none, for example if it only holds a plugin, and one that holds other models.
+        if not spot.static and not spot.scope.parts:
             raise complain(part.element, "has no <link>")
         context.note("ignored", part.element, "it has no <link>: nothing can touch it")
         builder.links.append(Link("link", actual, None, (), ()))
@@ -53,16 +54,16 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
     model = Model(
         name=name,
         pose=actual,
-        static=static,
+        static=spot.static,
         links=tuple(builder.links),
         joints=tuple(builder.joints),
         spans=tuple((one.start, one.end) for one in (part.at, *([saved.element] if saved else []))),
         line=part.at.line,
-        gravity=static or any(pulled),
+        gravity=spot.static or any(pulled),
         self_collide=any(builder.self_collide),
     )
-    if static:
-        return model
+    if len(still_links(model)) == len(model.links):
+        return _still(model)
     check_tree(builder.joints, part.element)
     # These settings differ between links, but are simulated for the model as a whole.
     if any(pulled) and not all(pulled):
@@ -73,8 +74,13 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
     if not is_ground(model):
         return model
     context.note("replaced", part.element, "static, since an infinite plane does not move")
+    return _still(model)
+
+
+def _still(model: Model) -> Model:
+    """`model`, static."""
     links = tuple(replace(link, inertia=None) for link in model.links)
-    return replace(model, static=True, links=links, joints=())
+    return replace(model, static=True, links=links, joints=(), gravity=True)
 
 
 class _Builder:
@@ -83,8 +89,8 @@ class _Builder:
     `elements` and `self_collide` have one entry per link, in the same order.
     """
 
-    def __init__(self, static: bool, context: Context) -> None:
-        self.static, self.context = static, context
+    def __init__(self, context: Context) -> None:
+        self.context = context
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.elements: list[Element] = []
@@ -107,7 +113,7 @@ class _Builder:
             self.self_collide.append(truth(element, "self_collide", collide))
         for part in scope.parts:
             self._add_part(part, spot, saved)
-        if not self.static:
+        if not spot.static:
             self.joints += read_joints(spot, self.poses, self.context)
         if saved is not None:
             known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
@@ -126,20 +132,20 @@ class _Builder:
         there = spot.actual @ local if saved is None else saved.links.get(own, spot.actual @ local)
         self.poses[name] = LinkPose(spot.nominal @ local, there)
         self.elements.append(element)
-        self.links.append(read_link(element, spot, self.context, there, local, moving=not self.static))
+        self.links.append(read_link(element, spot, self.context, there, local, moving=not spot.static))
 
     def _add_part(self, part: Part, spot: Spot, outer: Saved | None) -> None:
         local = spot.scope.placed(part)
         saved = None if outer is None else outer.models.get(part.name)
         there = spot.actual @ local if saved is None or saved.pose is None else saved.pose
         before = len(self.links)
-        prefix = f"{spot.prefix}{part.name}::"
-        self.add(Spot(spot.scope.inside(part), spot.nominal @ local, there, prefix, spot.scale), saved)
-        if _is_static(part) and not self.static:
+        prefix = spot.prefix if part.merged else f"{spot.prefix}{part.name}::"
+        static = spot.static or (_is_static(part) and not part.merged)
+        inner = spot.scope.inside(part)
+        self.add(Spot(inner, spot.nominal @ local, there, prefix, spot.scale, static), saved)
+        if static and not spot.static:
             # A static model nested in a moving one: its links are welded to the world.
             links = self.links[before:]
-            held = {link.name for link in links}
-            self.joints = [joint for joint in self.joints if joint.child not in held]
             self.joints += [Joint(f"{link.name} (static)", "fixed", WORLD, link.name, link.pose) for link in links]
 
 
@@ -158,21 +164,21 @@ def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
         context.note("replaced", saved.element, f"its sizes by those with <scale> {scale}")
 
 
-def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
+def state_entries(world: Element) -> dict[str, list[Element]]:
     """The entries of models in the world's `<state>`, by name, in the file's order. Raises UserError."""
     states = world.findall("state")
     if len(states) > 1:
         raise complain(states[1], "a second <state>; a world may have only one")
-    saved: dict[str, list[Saved]] = {}
+    entries: dict[str, list[Element]] = {}
     if not states:
-        return saved
+        return entries
     for tag in ("insertions", "deletions"):
         child = states[0].find(tag)
         if child is not None and len(child):
             raise complain(child, f"<{tag}> in <state> is not supported; save the world without it")
     for model in states[0].findall("model"):
-        saved.setdefault(name_of(model), []).append(_saved(model, context))
-    return saved
+        entries.setdefault(name_of(model), []).append(model)
+    return entries
 
 
 def _saved(model: Element, context: Context) -> Saved:

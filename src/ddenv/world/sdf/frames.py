@@ -6,6 +6,7 @@ import math
 from functools import cached_property
 from pathlib import Path
 
+from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.context import Context, version
@@ -16,6 +17,10 @@ from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 FARTHEST = 1e6
 OWN = ("", "__model__")
 WORLD = "world"
+
+
+class TooFar(UserError):
+    """A pose that is farther away than `FARTHEST`."""
 
 
 class Scope:
@@ -74,6 +79,8 @@ class Scope:
         """The frame that `name` is placed relative to, its pose in that, and the element that says so. Raises UserError."""
         thing = self.named.get(name)
         if thing is None:
+            if (merged := self._merged(name)) is not None:
+                return merged.name, self.inside(merged).pose(name, asker), asker
             first, _, rest = name.partition("::")
             if rest and isinstance(part := self.named.get(first), Part):
                 return first, self.inside(part).pose(rest, asker), asker
@@ -87,6 +94,11 @@ class Scope:
         local = HERE if element is None else pose_of(element)
         local = self._by_placement_frame(thing, local) if isinstance(thing, Part) else local
         return _named_in(element) or default, local, holder if element is None else element
+
+    def _merged(self, name: str) -> Part | None:
+        """The merged model that has something of this name, such as `link` or `inner::link`."""
+        first = name.partition("::")[0]
+        return next((part for part in self.parts if part.merged and first in self.inside(part).named), None)
 
     def place(self, holder: Element, default: str = "") -> Pose:
         """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it names one."""
@@ -122,6 +134,8 @@ class Scope:
             thing = self.named.get(name)
             first, _, rest = name.partition("::")
             if thing is None:
+                if (merged := self._merged(name)) is not None:
+                    return self.inside(merged).link(name, asker)
                 thing = self.named.get(first) if rest else None
                 link = self.inside(thing).link(rest, asker) if isinstance(thing, Part) else None
                 return link and f"{first}::{link}"
@@ -140,8 +154,11 @@ class Scope:
             return None if named in OWN else self.link(named, self.element)
         if first is not None:
             return name_of(first)
-        links = ((part.name, self.inside(part).canonical) for part in self.parts)
-        return next((f"{name}::{link}" for name, link in links if link is not None), None)
+        for part in self.parts:
+            link = self.inside(part).canonical
+            if link is not None:
+                return link if part.merged else f"{part.name}::{link}"
+        return None
 
     def references(self) -> set[str]:
         """The names that poses and frames directly inside this world refer to."""
@@ -164,7 +181,7 @@ def shown(names: list[str]) -> str:
 
 
 def pose_of(element: Element) -> Pose:
-    """The pose in a `<pose>`: roll, pitch, yaw (rad or degrees) or a quaternion. Raises UserError."""
+    """The pose in a `<pose>`: roll, pitch, yaw (rad or degrees) or a quaternion. Raises UserError, also TooFar."""
     if not text_of(element):
         return HERE
     form = (element.get("rotation_format") or "euler_rpy").strip()
@@ -182,7 +199,7 @@ def pose_of(element: Element) -> Pose:
         scale = math.pi / 180 if (element.get("degrees") or "").strip().lower() in ("1", "true") else 1.0
         pose = Pose.from_rpy(x, y, z, *(angle * scale for angle in angles)) if any(angles) else Pose((x, y, z))
     if max(abs(x), abs(y), abs(z)) > FARTHEST:
-        raise complain(element, f"is farther than {FARTHEST:g} m away")
+        raise TooFar(str(complain(element, f"is farther than {FARTHEST:g} m away")))
     return pose
 
 

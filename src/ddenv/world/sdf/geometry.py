@@ -21,6 +21,20 @@ from ddenv.world.write import primitive
 SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
+# The sizes of a shape whose element gives none, m: those of libsdformat, by the element and its child.
+DEFAULT_SIZES: dict[tuple[str, str], tuple[float, ...]] = {
+    ("box", "size"): (1.0, 1.0, 1.0),
+    ("capsule", "radius"): (0.5,),
+    ("capsule", "length"): (1.0,),
+    ("cone", "radius"): (0.5,),
+    ("cone", "length"): (1.0,),
+    ("cylinder", "radius"): (1.0,),
+    ("cylinder", "length"): (1.0,),
+    ("ellipsoid", "radii"): (1.0, 1.0, 1.0),
+    ("plane", "size"): (1.0, 1.0),
+    ("polyline", "height"): (1.0,),
+    ("sphere", "radius"): (1.0,),
+}
 RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 
@@ -45,7 +59,8 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
     """
     geometry = parent.find("geometry")
     if geometry is None or not len(geometry):
-        raise complain(parent, "has no <geometry>")
+        context.note("ignored", parent, "it has no shape in a <geometry>: nothing can touch it")
+        return None
     element = next((child for child in geometry if child.tag in SHAPES), geometry[0])
     for other in geometry:
         if other is not element and (other.tag, element.tag) != ("polyline", "polyline"):
@@ -65,22 +80,22 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
             context.note("ignored", element, why)
             return None
         case "plane":
-            size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", 2)
-            return Placed(Plane((size[0], size[1])), _turned(element.find("normal")))
+            length, width = _sizes(element, "size")
+            return Placed(Plane((length, width)), _turned(element.find("normal")))
     return Placed(_scaled(_primitive(element), scale, element))
 
 
 def _primitive(element: Element) -> Shape:
     match element.tag:
         case "box":
-            return Box(vector(_sizes(element, "size", 3)))
+            return Box(vector(_sizes(element, "size")))
         case "ellipsoid":
-            return Ellipsoid(vector(_sizes(element, "radii", 3)))
+            return Ellipsoid(vector(_sizes(element, "radii")))
         case "sphere":
-            return Sphere(*_sizes(element, "radius", 1))
+            return Sphere(*_sizes(element, "radius"))
         case "cylinder" | "capsule" | "cone" as tag:
             kinds: dict[str, Callable[[float, float], Shape]] = {"cylinder": Cylinder, "capsule": Capsule, "cone": cone}
-            return kinds[tag](*_sizes(element, "radius", 1), *_sizes(element, "length", 1))
+            return kinds[tag](*_sizes(element, "radius"), *_sizes(element, "length"))
     raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
 
 
@@ -180,12 +195,13 @@ def _times(vector: Vector, scale: Vector) -> Vector:
     return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
 
 
-def _sizes(parent: Element, tag: str, count: int) -> tuple[float, ...]:
-    """The `count` sizes in the child `tag`. Raises UserError."""
-    element = parent.find(tag)
+def _sizes(shape: Element, tag: str) -> tuple[float, ...]:
+    """The sizes in the child `tag` of a shape, m. Raises UserError."""
+    usual = DEFAULT_SIZES[shape.tag, tag]
+    element = shape.find(tag)
     if element is None:
-        raise complain(parent, f"has no <{tag}>")
-    values = numbers(element, count)
+        return usual
+    values = numbers(element, len(usual))
     if min(values) < SMALLEST or max(values) > LARGEST:
         raise complain(element, f"{RANGE}, found '{text_of(element)[:60]}'")
     return values
@@ -194,7 +210,7 @@ def _sizes(parent: Element, tag: str, count: int) -> tuple[float, ...]:
 def read_polyline(geometry: Element, context: Context) -> Mesh:
     """The convex hull of all `<polyline>`s of a `<geometry>`, extruded upwards from z = 0. Raises UserError."""
     elements = geometry.findall("polyline")
-    height = 1.0 if elements[0].find("height") is None else _sizes(elements[0], "height", 1)[0]
+    height = _sizes(elements[0], "height")[0]
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:

@@ -8,7 +8,7 @@ from urllib.parse import unquote
 
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
-from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
+from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.urdf import root_of
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
@@ -24,7 +24,8 @@ STAND_IN = "stand-in "
 class Part:
     """A model inside another model or a world: its `<model>` (`element`), and the `<include>` that names it or itself (`at`).
 
-    `static` is the include's own setting, None without one. `files` are the chain of including files, outermost first.
+    `static` is the include's own setting, None without one. `files` are the chain of including files, outermost first. The links
+    and joints of a `merged` one belong to the model around it.
     """
 
     element: Element
@@ -32,6 +33,7 @@ class Part:
     name: str
     files: tuple[Path, ...]
     static: bool | None = None
+    merged: bool = False
 
     @property
     def pose(self) -> Element | None:
@@ -54,11 +56,9 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     if include.find("placement_frame") is not None and include.find("pose") is None:
         raise complain(include, "a <placement_frame> needs a <pose>")
     note_unread(include, context)
-    if (include.get("merge") or "").strip().lower() in ("true", "1"):
-        if not context.ignores("include"):
-            raise refuse(include, "merge='true' is not supported")
-        context.note("ignored", include, "merge='true': left out by --ignore include")
-        return None
+    merged = (include.get("merge") or "").strip().lower() in ("true", "1")
+    if merged and (include.parent is None or include.parent.tag != "model"):
+        raise complain(include, "merge='true' puts the links of a model into the model around it; here is none")
     root = _root(include, uri, context)
     if root is None:
         return None
@@ -74,7 +74,10 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
         raise complain(include, f"{root.source} holds {found}; expected one")
     own = _last_of(uri) if root.source.name.startswith(STAND_IN) else name_of(models[0])
     static = truth(include, "static", False) if include.find("static") is not None else None
-    return Part(models[0], include, text_of(include.find("name")) or own, (*files, root.source), static)
+    name = text_of(include.find("name")) or own
+    # The name of its frame in libsdformat, which nothing else may have.
+    name = f"_merged__{name}__model__" if merged else name
+    return Part(models[0], include, name, (*files, root.source), static, merged)
 
 
 def _last_of(uri: str) -> str:

@@ -148,6 +148,8 @@ def _copies(part: Part, scope: Scope, text: bytes, folder: str, resources: Resou
         for inner in scope.inside(part).parts:
             yield from _copies(inner, scope.inside(part), text, folder, resources, moved)
         return
+    if part.merged:
+        return
     uri = text_of(part.at.find("uri"))
     try:
         source, copied = resources.sdf(uri, part.at.source.parent)

@@ -30,7 +30,8 @@ class LinkPose:
 class Spot:
     """The place of a model or nested model with the frames `scope`: its own frame in the world, as in `LinkPose`.
 
-    `prefix` begins the names of its links in the world, `scale` multiplies its sizes.
+    `prefix` begins the names of its links in the world, `scale` multiplies its sizes. It is `static` if it or a model around it
+    is: then its links are fixed to the world.
     """
 
     scope: Scope
@@ -38,6 +39,7 @@ class Spot:
     actual: Pose
     prefix: str = ""
     scale: Vector = ONE
+    static: bool = False
 
 
 def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> list[Joint]:
@@ -69,8 +71,6 @@ def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], 
     nominal = spot.nominal @ spot.scope.place(element, text_of(element.find("child")))
     moved = links[child].actual @ links[child].nominal.inverse()
     axis = element.find("axis")
-    if kind in ("revolute", "prismatic", "universal") and axis is None:
-        raise complain(element, f"a {kind} joint needs an <axis>")
     first = _axis(axis, spot, nominal)
     second = _second_axis(element, first, spot, nominal) if kind == "universal" else None
     limit, dynamics = (None, None) if axis is None else (axis.find("limit"), axis.find("dynamics"))

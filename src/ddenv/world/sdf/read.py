@@ -18,9 +18,9 @@ from ddenv.world.files.resources import Resources, search_folders
 from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
-from ddenv.world.sdf.assemble import Saved, assemble, read_state
+from ddenv.world.sdf.assemble import assemble, state_entries
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
-from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.frames import FARTHEST, Scope, TooFar
 from ddenv.world.sdf.inside import has_includes, opened, with_copies
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
@@ -92,7 +92,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
             raise complain(refused, message)
     note_unread(world, context)
     scope = Scope(world, (path,), context)
-    models = _models(scope, read_state(world, context), context)
+    models = _models(scope, state_entries(world), context)
     context.complain_of_missing()
     context.model = ""
     context.note_unused(root)
@@ -114,11 +114,13 @@ def _world(text: bytes, path: Path, context: Context) -> World:
 
 def _opened(world: World, root: Element, scope: Scope, context: Context) -> World:
     """`world` with the parts of its models as models; models from other files are first copied into its text."""
+    part_at = {part.at.start: part for part in scope.parts}
     parts = {
-        model.name: part
-        for model, part in zip(world.models, scope.parts, strict=True)
-        if has_includes(part) and model.static and model.name not in world.anchors and len(model.collisions) > 1
+        model.name: part_at[model.spans[0][0]]
+        for model in world.models
+        if model.static and model.name not in world.anchors and len(model.collisions) > 1
     }
+    parts = {name: part for name, part in parts.items() if has_includes(part)}
     reading = context.reading.model_copy(update={"inside": False})
 
     def solid(model: Model) -> list[Collision]:
@@ -140,7 +142,8 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
     return opened(world, root)
 
 
-def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
+def _models(scope: Scope, state: dict[str, list[Element]], context: Context) -> tuple[Model, ...]:
+    """The models of a world, but for those that are too far away to be simulated."""
     names = [part.name for part in scope.parts]
     counts, models = Counter(names), []
     for part, name in zip(scope.parts, unique_names(names, " #"), strict=True):
@@ -148,8 +151,13 @@ def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tu
             context.model = name
             context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
         entries = state.get(part.name)
-        models.append(assemble(part, name, scope, entries.pop(0) if entries else None, context))
+        entry = entries.pop(0) if entries else None
+        try:
+            models.append(assemble(part, name, scope, entry, context))
+        except TooFar:
+            # A world that was saved while it ran holds what had fallen out of it.
+            context.note("ignored", part.at, f"it is not simulated: it is more than {FARTHEST:g} m away")
     context.model = ""
-    for saved in chain(*state.values()):
-        context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
+    for entry in chain(*state.values()):
+        context.note("ignored", entry, f"the world has no model '{name_of(entry)}'")
     return tuple(models)
