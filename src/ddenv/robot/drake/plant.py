@@ -262,8 +262,11 @@ def _add_moving(
 ) -> Body:
     """Adds a model of the world, or (`wheels` is None) the robot."""
     instance = plant.AddModelInstance(instance_name)
-    bodies = [plant.AddRigidBody(link.name, instance, _inertia(model, link)) for link in model.links]
     still = {link.name for link in still_links(model)}
+    bodies = []
+    for link in model.links:
+        inertia = SpatialInertia.Zero() if link.name in still else _inertia(model, link)
+        bodies.append(plant.AddRigidBody(link.name, instance, inertia))
     geometry: list[GeometryId] = []
     boxes: list[Bounds | None] = []
     for link, body in zip(model.links, bodies, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from ddenv.world.model import Joint, Link, Model, is_ground, still_links
 from ddenv.world.pose import ONE, Pose, Vector, vector
+from ddenv.world.sdf.casters import without_ball_joints
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
 from ddenv.world.sdf.includes import Part
@@ -72,7 +73,7 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
     if any(builder.self_collide) and not all(builder.self_collide):
         context.note("replaced", part.element, "self-collision of some links by self-collision of all links")
     if not is_ground(model):
-        return model
+        return without_ball_joints(model, part.element, context)
     context.note("replaced", part.element, "static, since an infinite plane does not move")
     return _still(model)
 

@@ -20,6 +20,8 @@ from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, tex
 Color = tuple[float, float, float, float]
 # SDF's default for <mu>, also used by simulators.
 DEFAULT_MU = 1.0
+# Drake's own coefficients: where time is discrete it uses the dynamic one.
+DRAKE_MU = ("drake:mu_dynamic", "drake:mu_static")
 # The collide_bitmask of a collision that touches all others.
 EVERYTHING = 0xFFFF
 # Colours of the Gazebo materials that worlds use most.
@@ -158,20 +160,34 @@ def can_be_touched(collision: Element, context: Context) -> bool:
 
 
 def read_friction(collision: Element, context: Context) -> float:
-    """The Coulomb friction coefficient: the smaller of SDF's two, which are for two directions. Raises UserError."""
+    """The Coulomb friction coefficient: Drake's own, else the smaller of SDF's two, which are for two directions.
+
+    Raises UserError.
+    """
+    own = collision.find("drake:proximity_properties")
+    for tag in DRAKE_MU:
+        if own is not None and own.find(tag) is not None:
+            return _friction(own, tag)
     engine, names = collision.find("surface/friction/ode"), ("mu", "mu2")
     if engine is None:
         engine, names = collision.find("surface/friction/bullet"), ("friction", "friction2")
     if engine is None:
         return DEFAULT_MU
-    first, second = (number(engine, name, DEFAULT_MU) for name in names)
-    for name, mu in zip(names, (first, second), strict=True):
-        if mu < 0:
-            raise complain(next(engine.iter(name)), f"friction must not be negative, found {mu:g}")
+    first, second = (_friction(engine, name) for name in names)
     if first != second:
         why = f"friction of {first:g} and {second:g} in two directions by {min(first, second):g} in both"
         context.note("replaced", engine, why)
     return min(first, second)
+
+
+def _friction(engine: Element, name: str) -> float:
+    child = engine.find(name)
+    if child is None:
+        return DEFAULT_MU
+    mu = numbers(child, 1)[0]
+    if mu < 0:
+        raise complain(child, f"friction must not be negative, found {mu:g}")
+    return mu
 
 
 def read_color(visual: Element) -> Color | None:
