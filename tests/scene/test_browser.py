@@ -98,11 +98,13 @@ class Page:
         result = await self.do("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         return result["result"].get("value")
 
+    async def screenshot(self) -> bytes:
+        """The picture, as PNG."""
+        return base64.b64decode((await self.do("Page.captureScreenshot", format="png"))["data"])
+
     async def picture(self) -> np.ndarray:
         """What the window shows, height x width x (red, green, blue)."""
-        screenshot = await self.do("Page.captureScreenshot", format="png")
-        image = Image.open(io.BytesIO(base64.b64decode(screenshot["data"])))
-        return np.asarray(image.convert("RGB"))
+        return np.asarray(Image.open(io.BytesIO(await self.screenshot())).convert("RGB"))
 
 
 async def shows(page: Page, expression: str) -> None:

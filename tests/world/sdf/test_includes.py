@@ -62,6 +62,59 @@ def test_a_static_model_in_one_that_moves_hangs_on_the_world(read):
     assert (joint.kind, joint.parent, joint.child) == ("fixed", "world", "in::l")
 
 
+@pytest.mark.parametrize(
+    "inside",
+    [
+        f"<model name='in'><static>1</static><link name='l'>{BOX}</link></model>",
+        f"<model name='in'><static>1</static><model name='inner'><link name='l'>{BOX}</link></model></model>",
+        f"<link name='l'>{BOX}</link><joint name='j' type='fixed'><parent>world</parent><child>l</child></joint>",
+    ],
+)
+def test_a_model_that_is_fixed_to_the_world_is_static(read, inside):
+    world = read(f"<model name='m'><pose>0 0 -4 0 0 0</pose>{inside}</model>")
+    (model,) = world.models
+    assert (model.static, model.joints, model.links[0].inertia) == (True, (), None)
+    assert not [note for note in world.notes if "inertial" in note.why and "joint" not in inside]
+
+
+def test_the_parts_of_a_static_model_in_another_one_can_be_removed(read):
+    boxes = "".join(BOX.replace("'c'", f"'{name}'") for name in "ab")
+    walls = f"<model name='walls'><static>1</static><link name='l'>{boxes}</link></model>"
+    assert read(f"<model name='house'>{walls}</model>", inside=True).elements() == ("house/a", "house/b")
+
+
+def test_the_links_of_a_merged_model_are_those_of_the_model_around_it(read, table):
+    inner = f"<frame name='tip'><pose>0 0 2 0 0 0</pose></frame><link name='a'>{BOX}</link><link name='b'>{BOX}</link>"
+    (table / "table" / "model.sdf").write_text(
+        f"<sdf version='1.9'><model name='table'><static>1</static>{inner}</model></sdf>"
+    )
+    merged = "<include merge='true'><uri>model://table</uri><pose>0 1 0 0 0 0</pose></include>"
+    own = f"<link name='c'><pose relative_to='tip'>1 0 0 0 0 0</pose>{BOX}</link>"
+    joint = "<joint name='k' type='fixed'><parent>b</parent><child>c</child></joint>"
+    world = read(f"<model name='m'><pose>5 0 0 0 0 0</pose>{merged}{own}{joint}</model>", model_path=(table,))
+    (model,) = world.models
+    assert {link.name: link.pose.position for link in model.links} == {"a": (5, 1, 0), "b": (5, 1, 0), "c": (6, 1, 2)}
+    assert [(one.parent, one.child) for one in model.joints] == [("b", "c")]
+    assert not model.static
+
+
+@pytest.mark.parametrize(
+    "fallen",
+    [
+        f"<model name='fallen'><pose>9 -10 -7.6e8 0 0 0</pose><link name='l'>{BOX}</link></model>",
+        f"<model name='fallen'><link name='l'><pose>0 0 -1e308 0 0 0</pose>{BOX}</link></model>",
+        f"<model name='fallen'><link name='l'>{BOX}</link></model>"
+        "<state world_name='w'><model name='fallen'><pose>0 0 -9e6 0 0 0</pose></model></state>",
+    ],
+)
+def test_a_model_that_has_fallen_far_is_not_simulated(read, fallen):
+    world = read(f"<model name='m'><static>1</static><link name='l'>{BOX}</link></model>{fallen}")
+    assert [model.name for model in world.models] == ["m"]
+    assert ("<model>", "it is not simulated: it is more than 1e+06 m away") in [
+        (note.what, note.why) for note in world.notes
+    ]
+
+
 def test_a_model_that_is_nowhere_is_refused_with_the_remedies(read):
     with pytest.raises(UserError, match="/world/include: 'model://table' was not found") as caught:
         read(included())

@@ -35,6 +35,23 @@ def test_kinds(read, kind):
     assert one.pose.position == (0, 0, 1)
 
 
+def test_a_joint_without_an_axis_turns_about_its_own_z(read):
+    (one,) = joints_of(read, joint("revolute", ""))
+    assert one.axis == (0, 0, 1)
+
+
+@pytest.mark.parametrize(("offset", "kind", "mu"), [(0.0, "fixed", 0.0), (0.01, "ball", 1.0)])
+def test_a_caster_ball_slides_in_place_of_rolling(read, offset, kind, mu):
+    ball = (
+        f"<collision name='s'><pose>{offset} 0 0 0 0 0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>"
+    )
+    links = LINKS.replace("<link name='b'>", f"<link name='b'>{ball}</collision>")
+    world = read(f"<model name='m'>{links}{joint('ball')}</model>")
+    (model,) = world.models
+    assert (model.joints[0].kind, model.collisions[0].mu) == (kind, mu)
+    assert any("caster ball" in note.why for note in world.notes) == (kind == "fixed")
+
+
 def test_a_universal_joint_has_two_axes_at_right_angles(read):
     (one,) = joints_of(read, joint("universal", "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 3 0</xyz></axis2>"))
     assert (one.axis, one.axis2) == ((1, 0, 0), (0, 1, 0))

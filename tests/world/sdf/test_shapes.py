@@ -1,5 +1,8 @@
 """Shapes, friction and colours."""
 
+from pathlib import Path
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,6 +11,7 @@ from ddenv.errors import UserError
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Sphere
 from ddenv.world.pose import Pose
+from ddenv.world.sdf.geometry import DEFAULT_SIZES
 
 
 def model(geometry, more="", tag="collision"):
@@ -32,6 +36,26 @@ SHAPES = {
 @pytest.mark.parametrize(("geometry", "shape"), SHAPES.items())
 def test_primitives(read, geometry, shape):
     assert shape_of(read(model(geometry))) == shape
+
+
+SDFORMAT = Path("/usr/share/sdformat12/1.9")
+
+
+@pytest.mark.skipif(not SDFORMAT.is_dir(), reason="libsdformat's descriptions are not on this machine")
+@pytest.mark.parametrize(("shape", "child"), DEFAULT_SIZES)
+def test_sizes_that_a_file_leaves_out_are_those_of_libsdformat(shape, child):
+    file = SDFORMAT / f"{shape}_shape.sdf"
+    if not file.exists():
+        pytest.skip(f"this libsdformat has no {shape}")
+    described = ElementTree.parse(file).find(f"element[@name='{child}']")
+    assert DEFAULT_SIZES[shape, child] == tuple(map(float, described.get("default").split()))
+
+
+def test_a_shape_without_sizes_has_the_usual_ones(read):
+    assert shape_of(read(model("<capsule><length>3</length></capsule>"))) == Capsule(0.5, 3)
+    world = read(model(""))
+    assert world.models[0].collisions == ()
+    assert world.notes[0].why == "it has no shape in its <geometry>"
 
 
 @pytest.mark.parametrize("normal", ["0 0 2", "0 1 0", "1 -2 0.5", "0 0 -1"])

@@ -59,7 +59,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
     """
     geometry = parent.find("geometry")
     if geometry is None or not len(geometry):
-        context.note("ignored", parent, "it has no shape in a <geometry>: nothing can touch it")
+        context.note("ignored", parent, "it has no shape in its <geometry>")
         return None
     element = next((child for child in geometry if child.tag in SHAPES), geometry[0])
     for other in geometry:

@@ -8,7 +8,7 @@ from urllib.parse import unquote
 
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
-from ddenv.world.sdf.context import Context, note_unread, sdf_root
+from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.urdf import root_of
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
@@ -58,7 +58,10 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     note_unread(include, context)
     merged = (include.get("merge") or "").strip().lower() in ("true", "1")
     if merged and (include.parent is None or include.parent.tag != "model"):
-        raise complain(include, "merge='true' puts the links of a model into the model around it; here is none")
+        if not context.ignores("include"):
+            raise refuse(include, "merge='true' puts the links of a model into the model around it; here is none")
+        context.note("ignored", include, "merge='true' outside of a model: left out by --ignore include")
+        return None
     root = _root(include, uri, context)
     if root is None:
         return None
