@@ -81,6 +81,23 @@ def test_a_certificate_that_refutes_what_early_tests_accepted_turns_early_stop_o
     assert NEWS["early_stop_ended"](state, state) == f"  {why_off(state)}"
 
 
+def test_early_tests_without_f_accept_nothing_that_a_certificate_could_refute(tmp_path):
+    """Any two of three suffice with the seeds of the search. Some tests end early there, and show no f."""
+    needed = {"wall", "beam", "post"}
+
+    def oracle(keep, seed):
+        return "similar" if needed <= keep or ("wall" in keep and seed < 5_000) else "pass"
+
+    def cut(keep, seed):
+        return "other" if needed - {"post"} <= keep and seed % 8 == 3 else ""
+
+    state = drive(run_of(tmp_path), FakePool(oracle, 1, cut=cut))
+    assert state.certificates[0].claims[0].verdict == "lost"
+    accepted = {node.id for node in state.nodes if node.how == "reduced"}
+    assert any(test.cut and test.environment in accepted for test in state.tests)
+    assert state.early_stop_ended is None
+
+
 @pytest.fixture
 def recorded(tmp_path):
     """A run of the small world, and a test of it that ended early."""

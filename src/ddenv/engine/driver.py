@@ -455,14 +455,14 @@ class Driver:
         self._end_early_stop_if_refuted()
 
     def _end_early_stop_if_refuted(self) -> None:
-        """Ends early stop where what is left is lost, and tests that ended early had accepted it."""
+        """Ends early stop where what is left is lost, and f in tests that ended early had accepted it."""
         journal = self._journal
         certificate = self._certificate
         if certificate.claims[0].verdict != "lost" or not journal.stops_early:
             return
         state = journal.state
         accepted = (test for node in self._nodes(state.node) for test in state.tests_of(node.runs))
-        if any(test.cut for test in accepted):
+        if any(test.cut and test.outcome == "similar" for test in accepted):
             journal.record(events.EarlyStopEnded(certificate=certificate.number))
 
     def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
