@@ -35,6 +35,7 @@ from ddenv.world.placement import (
     drop,
     hull,
     inside,
+    note_floor,
     note_inside,
     note_unseen,
     notes_on_start,
@@ -237,6 +238,25 @@ def test_a_goal_inside_a_post_is_noted():
     start = Spawn(x=0, y=0, z=0.45)
     assert [about for about, _ in notes_on_start(WALL, HUSKY, start, (0.0, -4.0))] == ["goal"]
     assert list(notes_on_start(WALL, HUSKY, start, (0.0, -3.0))) == []
+
+
+@pytest.mark.parametrize(
+    ("width", "top", "ground", "removable", "offered"),
+    [
+        (12, 0.0, "", {"floor", "crate"}, ["floor"]),
+        (12, 0.0, "", {"crate"}, []),
+        (2, 0.0, "", {"floor"}, []),
+        (12, 1.0, "", {"floor"}, []),
+        (12, 0.0, GROUND, {"floor"}, []),
+    ],
+    ids=["a floor", "protected", "too small", "a table", "above ground"],
+)
+def test_a_floor_that_carries_everything_is_offered_to_stay(width, top, ground, removable, offered):
+    floor = box_model("floor", f"0 0 {top - 0.05} 0 0 0", f"{width} {width} 0.1", None)
+    text = f'<sdf version="1.9"><world name="w">{ground}{floor}{box("crate", 3)}</world></sdf>'
+    notes = list(note_floor(parse_world(text.encode(), DATA), HUSKY, Spawn(x=0, y=0, z=0.2), removable))
+    assert [about for about, _ in notes] == offered
+    assert all("--protect 'floor'" in words for _, words in notes)
 
 
 def seen_as(*visuals):

@@ -34,6 +34,7 @@ LONGEST_URI = 80
     is_flag=True,
     help="Reduce failing runs of the baseline themselves, each repeated with its seed, as --accept-rate exact does.",
 )
+@click.option("--protect", multiple=True, metavar="MODEL", help="A model that always stays; may be repeated.")
 @options.jobs_option()
 @click.option("--name", help="Name of the run.")
 @click.option(

@@ -22,7 +22,7 @@ from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
 from ddenv.text import between, count, duration
 from ddenv.world.model import Model, World
-from ddenv.world.placement import notes_on_start
+from ddenv.world.placement import note_floor, notes_on_start
 from ddenv.world.scenario import Reduction, Scenario
 
 # What a run of the whole world may take, s.
@@ -95,6 +95,8 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
     if journal.state.baseline is None:
         spawn, goal, epsilon = scenario.robot.spawn, scenario.goal, scenario.failure.epsilon
         for about, words in notes_on_start(world, robot, spawn, (goal.x, goal.y)):
+            note(journal, about, words)
+        for about, words in note_floor(world, robot, spawn, journal.state.elements):
             note(journal, about, words)
         way = math.hypot(goal.x - spawn.x, goal.y - spawn.y)
         if epsilon > way:

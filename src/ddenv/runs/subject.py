@@ -171,10 +171,12 @@ def with_options(
     goal: Sequence[float] | None = None,
     world: Path | None = None,
     reading: Reading | None = None,
+    protect: Sequence[str] = (),
     **values: Value,
 ) -> Scenario:
     """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
 
+    `protect` are more models that always stay.
     `spawn` is x, y, z m and yaw rad (0 if left out), `goal` x, y m. `values` are settings by name; 0 takes back a limit.
     """
     given = {name: value for name, value in values.items() if value is not None}
@@ -190,6 +192,7 @@ def with_options(
         chosen["goal"].update(zip(("x", "y"), goal, strict=True))
     if world is not None:
         chosen["world"] = str(world.resolve())
+    chosen["protected"] += protect
     if reading is not None:
         chosen["reading"] = reading.model_dump(mode="json")
     named = {SETTINGS[name].key: SETTINGS[name].option for name in given if SETTINGS[name].option}

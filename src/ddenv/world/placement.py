@@ -12,7 +12,7 @@ import numpy as np
 from ddenv.errors import UserError
 from ddenv.text import count, first_of
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
-from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World
+from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World, is_ground
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Spawn
 
@@ -133,6 +133,28 @@ def notes_on_start(
     if blocker is not None:
         yield "goal", f"at the height of the start, the goal lies inside {blocker}; move the goal"
     yield from note_inside(world)
+
+
+def note_floor(world: World, robot: Model, spawn: Spawn, removable: Collection[str]) -> Iterator[tuple[str, str]]:
+    """That everything stands on one of the `removable` models, so that a test without it only shows that the robot falls."""
+    if any(is_ground(model) for model in world.models):
+        return
+    standing = bounds(robot.collisions, spawn_pose(spawn) @ robot.pose.inverse())
+    boxes = {model.name: model_bounds(model) for model in world.models}
+    for model in world.models:
+        others = [box for name, box in boxes.items() if name != model.name and box is not None]
+        above = stacked([*others, standing])
+        if model.static and model.name in removable and any(_carries(one, above) for one in model.collisions):
+            why = f"everything stands on '{model.name}': without it the robot falls"
+            yield "floor", f"{why}; --protect '{model.name}' saves the tests without it"
+
+
+def _carries(collision: Collision, boxes: Bounds) -> bool:
+    """Whether the middles of all boxes lie above a shape."""
+    low, high = shape_bounds(collision.shape, collision.pose)
+    middles = (boxes[0] + boxes[1]) / 2
+    within = (low[:2] <= middles[:, :2]) & (middles[:, :2] <= high[:2])
+    return bool(within.all() and (middles[:, 2] >= high[2]).all())
 
 
 def note_inside(world: World) -> Iterator[tuple[str, str]]:
