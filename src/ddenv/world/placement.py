@@ -137,9 +137,9 @@ def notes_on_start(
 
 def note_floor(world: World, robot: Model, spawn: Spawn, removable: Collection[str]) -> Iterator[tuple[str, str]]:
     """That everything stands on one of the `removable` models, so that a test without it only shows that the robot falls."""
-    if any(is_ground(model) for model in world.models):
-        return
     standing = bounds(robot.collisions, spawn_pose(spawn) @ robot.pose.inverse())
+    if standing is None or any(is_ground(model) for model in world.models):
+        return
     boxes = {model.name: model_bounds(model) for model in world.models}
     for model in world.models:
         others = [box for name, box in boxes.items() if name != model.name and box is not None]
