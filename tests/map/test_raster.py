@@ -182,9 +182,10 @@ def test_huge_models_do_not_widen_the_map(shapes, points):
     low, high = np.array([math.inf] * 2), np.array([-math.inf] * 2)
     for point in points:
         low, high = np.minimum(low, point), np.maximum(high, point)
-    for each in sorted(prints, key=lambda each: each.area):
+    for number, each in enumerate(sorted(prints, key=lambda each: each.area)):
         spread = np.maximum(high - low, 4.0)
-        if np.isfinite(low).all() and each.area > 4 * spread[0] * spread[1]:
+        # The smallest one is never huge.
+        if number and each.area > 4 * spread[0] * spread[1]:
             break
         low, high = np.minimum(low, each.low), np.maximum(high, each.high)
     found = extent(prints, points)
@@ -192,6 +193,12 @@ def test_huge_models_do_not_widen_the_map(shapes, points):
         low, high = np.array([-5.0, -5.0]), np.array([5.0, 5.0])
     assert (found[0] == low).all()
     assert (found[1] == high).all()
+
+
+def test_a_building_around_a_short_way_is_seen_whole():
+    wall = np.array([[-9.0, -5.0], [9.0, -5.0], [9.0, 5.0], [-9.0, 5.0]])
+    low, high = extent([Footprint("house", (wall,), (-9.0, -5.0), (9.0, 5.0))], [(0.0, 0.0), (1.0, 0.0)])
+    assert (low.tolist(), high.tolist()) == ([-9.0, -5.0], [9.0, 5.0])
 
 
 def test_many_large_models_on_top_of_each_other_are_drawn_in_parts(monkeypatch):

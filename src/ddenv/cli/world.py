@@ -230,7 +230,7 @@ def _totals(world: World) -> str:
 
 @world_command.command()
 @world_argument
-@click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
+@click.option("--spawn", type=Numbers("x,y,z,yaw", 2, 4), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
 @click.option("--took-part", is_flag=True, help="FILE is a run: show what may have affected runs of the whole world.")
@@ -256,7 +256,8 @@ def show(
         print("\n".join([_map(world, dim=dim), *below]))
         return 0
     world, _ = _read(file, reading)
-    start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
+    # As for 'ddenv run', the third number is the height.
+    start = None if spawn is None else (spawn[0], spawn[1], spawn[3] if len(spawn) > 3 else 0.0)
     if svg is not None:
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
         say_written([svg])

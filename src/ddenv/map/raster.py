@@ -93,7 +93,8 @@ def fit(
 def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of all `points` and of the models except huge ones, m; 10 m around zero for nothing.
 
-    A model is huge if it is several times larger than the area that the points and the smaller models span.
+    A model is huge if it is several times larger than the area that the smaller models, and the points among them, span. The
+    smallest model is shown whole, however short the way between the points is: it may be a building.
     """
     corners = np.array([point for point in points if len(point)], dtype=float).reshape(-1, 2)
     boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(-1, 5)
@@ -104,8 +105,8 @@ def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -
     highs = np.maximum.accumulate(np.vstack([most, boxes[:, 2:4]]))
     with np.errstate(invalid="ignore"):
         spread = np.maximum(highs - lows, 4.0)[:-1]
-    huge = np.flatnonzero(np.isfinite(lows[:-1]).all(axis=1) & (boxes[:, 4] > 4 * spread[:, 0] * spread[:, 1]))
-    last = huge[0] if len(huge) else -1
+    huge = np.flatnonzero(boxes[1:, 4] > 4 * (spread[:, 0] * spread[:, 1])[1:])
+    last = huge[0] + 1 if len(huge) else -1
     low, high = lows[last], highs[last]
     if not np.isfinite(low).all():
         return np.array([-5.0, -5.0]), np.array([5.0, 5.0])
