@@ -33,8 +33,6 @@ def read_dae(data: bytes) -> list[Part]:
         root = xml_root(data)
     except Unusable as error:
         raise ValueError(str(error)) from None
-    for element in root.iter():
-        element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":
         raise ValueError(f"its root is <{root.tag[:60]}>, not <COLLADA>")
     known = {id: element for element in root.iter() if (id := element.get("id"))}

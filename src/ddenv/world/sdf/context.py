@@ -13,6 +13,7 @@ from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
+from ddenv.world.tinyxml import strict_fault
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
 # By parent: the children that need no note, since they are read or do not affect how a robot drives.
@@ -96,6 +97,15 @@ class Context:
         """Notes that `element` was replaced or ignored."""
         self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
 
+    def note_tolerance(self, root: Element, text: bytes) -> None:
+        """Notes what is no strict XML in `text`, the content of the file of `root`."""
+        fault = strict_fault(text)
+        if fault is None:
+            return
+        file = "/".join(root.source.parts[-2:])
+        why = f"in {file}, line {fault.line}, column {fault.column}: {fault}; the file was read as Gazebo reads it"
+        self.notes.append(Note("ignored", self.model, place(root), "a fault of XML", why))
+
     def note_unused(self, root: Element) -> None:
         """Notes the stand-ins that nothing asked for: probably typing errors."""
         # `auto` asks for nothing as long as nothing is missing.
@@ -130,7 +140,7 @@ class Context:
 
 def sdf_root(text: bytes, path: Path) -> Element:
     """The `<sdf>` element of a file of a supported version. Raises UserError."""
-    root = parse(text, path)
+    root = parse(text, path, root="sdf")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
     given = (root.get("version") or "").strip()
@@ -164,8 +174,7 @@ def note_unread(element: Element, context: Context) -> None:
                 context.note("ignored", child, f"only the first <{child.tag}> is used")
             once.add(child.tag)
         if child.tag not in quiet:
-            extension = "}" in child.tag or ":" in child.tag
-            unknown = f"an unknown {'extension' if extension else 'element'} of SDF"
+            unknown = f"an unknown {'extension' if ':' in child.tag else 'element'} of SDF"
             context.note("ignored", child, REASONS.get(child.tag, unknown))
         elif len(child):
             if child.tag in INSIDE:
