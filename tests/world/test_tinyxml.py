@@ -78,7 +78,22 @@ def parents(element):
 
 NAMES = st.sampled_from(["a", "b", "gz:c", "d.e-f_1", "Бочка", "sdf"])
 WORDS = st.sampled_from(
-    ["", " ", "x", "1 2\n3", "\t&amp;\r\n", "&lt;&#65;&#x42;", "&#10;", "é€😀", "]] >", "'", "a\rb", ">", "&#13;", "&apos;"]
+    [
+        "",
+        " ",
+        "x",
+        "1 2\n3",
+        "\t&amp;\r\n",
+        "&lt;&#65;&#x42;",
+        "&#10;",
+        "é€😀",
+        "]] >",
+        "'",
+        "a\rb",
+        ">",
+        "&#13;",
+        "&apos;",
+    ]
 )
 ATTRIBUTES = st.dictionaries(NAMES, st.tuples(st.sampled_from("'\""), WORDS), max_size=3)
 SPACES = st.sampled_from([" ", "\n", "\t ", "\r\n"])
@@ -90,7 +105,10 @@ def elements(draw, depth=0):
     """The text of an element that strict XML allows."""
     name, space = draw(NAMES), draw(SPACES)
     given = draw(ATTRIBUTES)
-    inner = "".join(f"{space}{key}{draw(st.sampled_from(['=', ' = ']))}{q}{words.replace(q, '')}{q}" for key, (q, words) in given.items())
+    equals = draw(st.sampled_from(["=", " = "]))
+    inner = "".join(
+        f"{space}{key}{equals}{quote}{words.replace(quote, '')}{quote}" for key, (quote, words) in given.items()
+    )
     count = draw(st.integers(0, 3)) if depth < 3 else 0
     inside = "".join(draw(WORDS) + draw(BESIDE) + draw(elements(depth + 1)) + draw(WORDS) for _ in range(count))
     inside = inside or draw(WORDS) + draw(BESIDE) + draw(WORDS)
@@ -99,7 +117,9 @@ def elements(draw, depth=0):
     return f"<{name}{inner}{draw(st.sampled_from(['', ' ']))}>{inside}</{name}{draw(st.sampled_from(['', ' ']))}>"
 
 
-BEFORE = st.sampled_from(["", "<?xml version='1.0'?>", "<?xml version='1.0' encoding='utf-8'?>\n<!-- c -->", "\n", "<!---->"])
+BEFORE = st.sampled_from(
+    ["", "<?xml version='1.0'?>", "<?xml version='1.0' encoding='utf-8'?>\n<!-- c -->", "\n", "<!---->"]
+)
 
 
 @given(text=elements(), before=BEFORE, after=st.sampled_from(["", "\n", "<!-- end -->", "<?x?>\n"]))
@@ -108,7 +128,9 @@ def test_what_a_strict_parser_reads_is_read_alike(text, before, after):
     check_as_expat(document)
 
 
-@pytest.mark.parametrize("path", sorted(DATA.rglob("*.world")) + sorted(DATA.rglob("*.sdf")), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted(DATA.rglob("*.world")) + sorted(DATA.rglob("*.sdf")), ids=lambda path: path.name
+)
 def test_our_own_files_are_read_as_a_strict_parser_reads_them(path):
     assert strict_fault(path.read_bytes()) is None
     check_as_expat(path.read_bytes())
@@ -214,9 +236,20 @@ def test_time_grows_with_the_size_and_not_with_its_square(text):
 
 
 PIECES = st.sampled_from(
-    [b"<", b">", b"/", b"a", b"b", b" ", b"=", b"'", b'"', b"&", b"#", b"x", b";", b"1", b"!", b"-", b"--", b"[CDATA[", b"]]>"]
-    + [b"?", b"?>", b"<!--", b"-->", b"\n", b"\r", b"\0", b"\xff", "é".encode(), b":", b"<a>", b"</a>", b"<a b='1'/>", b"&amp;"]
-    + [b"<?xml version='1.0' encoding='", b"utf-16", b"cp1252", b"zip", b"'?>", b"<!DOCTYPE ", b"\xef\xbb\xbf", b"\x1b"]
+    [
+        *b"< > / a b = ' \" & # x ; 1 ! - -- [CDATA[ ]]> ? ?> <!-- --> : <a> </a> &amp; utf-16 cp1252 zip '?> \xff \xc3\xa9".split(),
+        *(
+            b" ",
+            b"\n",
+            b"\r",
+            b"\0",
+            b"\x1b",
+            b"<a b='1'/>",
+            b"<?xml version='1.0' encoding='",
+            b"<!DOCTYPE ",
+            b"\xef\xbb\xbf",
+        ),
+    ]
 )
 
 

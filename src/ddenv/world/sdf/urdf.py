@@ -30,7 +30,9 @@ def to_sdf(robot: Element, context: Context) -> Element:
     prefixes = {"xacro"}
     for each in robot.iter():
         prefixes |= {name.removeprefix("xmlns:") for name, value in each.attrib.items() if value.endswith("xacro")}
-        if each.tag.rpartition(":")[0] in prefixes or any("${" in text or "$(" in text for text in each.attrib.values()):
+        if each.tag.rpartition(":")[0] in prefixes or any(
+            "${" in text or "$(" in text for text in each.attrib.values()
+        ):
             raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
     # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
