@@ -52,6 +52,23 @@ def test_of_a_broken_model_config_nothing_but_a_note_is_left(read, table):
     assert read(included(uri="model://table/model.sdf"), model_path=(table,)).notes == ()
 
 
+def test_a_mesh_that_was_found_is_called_unreadable_and_no_folder_is_asked_for(read, tmp_path):
+    (tmp_path / "broken.dae").write_text("<COLLADA/>")
+    meshes = "".join(
+        f"<collision name='{uri}'><geometry><mesh><uri>{uri}</uri></mesh></geometry></collision>"
+        for uri in ("broken.dae", "gone.dae")
+    )
+    with pytest.raises(UserError) as refused:
+        read(f"<model name='m'><link name='l'>{meshes}</link></model>")
+    said = str(refused.value)
+    assert "'broken.dae' is unreadable: is not a valid DAE file: has no scene; give a shape in m" in said
+    assert "--model-path" not in said
+    assert said.endswith("; also missing: 'gone.dae'")
+    world = read(f"<model name='m'><static>1</static><link name='l'>{meshes}</link></model>", ignore=("mesh",))
+    assert any("'broken.dae' is unreadable (" in note.why for note in world.notes)
+    assert any("'gone.dae' is not available (" in note.why for note in world.notes)
+
+
 @pytest.mark.parametrize(("of_model", "of_include"), [(" placement_frame='foot'", ""), ("", "foot")])
 def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table, of_model, of_include):
     frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"

@@ -99,7 +99,7 @@ class _Document:
         return weights[element]
 
     def placed(self, node: Element, outer: np.ndarray, name: str) -> Iterator[Part]:
-        """Everything that `node` places. `outer` (4, 4) is its parent's transform into m; a node without a name takes its parent's."""
+        """Everything that `node` places; `outer` (4, 4) is its parent's transform into m, `name` its parent's name."""
         name = node.get("name") or name
         transform = outer
         for child in node:

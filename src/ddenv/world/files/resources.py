@@ -22,6 +22,8 @@ from ddenv.world.model import Mesh
 from ddenv.world.tinyxml import Element
 
 SDF_LIMIT = 50_000_000  # bytes of a file
+# Of the parts of mesh files that are kept in case that they are used again, bytes.
+MOST_KEPT = 200_000_000
 
 
 class Resources:
@@ -38,8 +40,8 @@ class Resources:
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._failed: dict[str, Missing | Unusable] = {}
-        # A collision and its visual mostly use the same file, one after the other.
-        self._last: tuple[Path, list[Part]] | None = None
+        # Collisions and visuals use the same files, and different parts of them; the longest known first.
+        self._parts_of: dict[Path, list[Part]] = {}
         # All requests so far: the URI, and its base.
         self.asked: dict[tuple[str, Path], None] = {}
 
@@ -93,9 +95,17 @@ class Resources:
         return self.taken[key]
 
     def _parts(self, path: Path) -> list[Part]:
-        if self._last is None or self._last[0] != path:
-            self._last = path, read_parts(path)
-        return self._last[1]
+        if path not in self._parts_of:
+            self._parts_of[path] = read_parts(path)
+        found = self._parts_of[path]
+        while len(self._parts_of) > 1 and sum(map(_size, self._parts_of.values())) > MOST_KEPT:
+            del self._parts_of[next(iter(self._parts_of))]
+        return found
+
+
+def _size(parts: Sequence[Part]) -> int:
+    """The bytes of all `parts`."""
+    return sum(part.vertices.nbytes + part.faces.nbytes for part in parts)
 
 
 def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:

@@ -61,10 +61,10 @@ def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
     if not parts:
         raise ValueError("has no triangles")
     check_count(sum(len(part.faces) for part in parts))
-    from trimesh.util import append_faces
-
-    vertices, faces = append_faces([part.vertices for part in parts], [part.faces for part in parts])
-    return vertices, faces
+    counts = [len(part.vertices) for part in parts]
+    starts = np.cumsum(counts) - counts
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]
+    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
 
 
 def check_count(faces: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -77,7 +78,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `files` the parsed files.
+    lists, `unreadable` those of these that were found, `files` the parsed files.
     """
 
     resources: Resources
@@ -88,6 +89,7 @@ class Context:
     used: set[str] = field(default_factory=set)
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
+    unreadable: set[str] = field(default_factory=set)
     files: dict[Path, Element] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -116,10 +118,10 @@ class Context:
         """Raises MissingFiles with the first error, and the names of the other files."""
         if not self.missing:
             return
-        (_, first), *others = self.missing.items()
-        more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-        also = f"; also missing: {', '.join(repr(uri[:100]) for uri, _ in others[:5])}{more}" if others else ""
-        raise MissingFiles(f"{first}{also}", list(self.missing))
+        first, *others = self.missing
+        absent = _also("missing", [uri for uri in others if uri not in self.unreadable])
+        broken = _also("unreadable", [uri for uri in others if uri in self.unreadable])
+        raise MissingFiles(f"{self.missing[first]}{absent}{broken}", list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
@@ -136,6 +138,12 @@ class Context:
         """Whether the user wants a guessed shape for `uri`, which is missing."""
         key = matching(self.stand_ins, uri)
         return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
+
+
+def _also(what: str, uris: Sequence[str]) -> str:
+    """The end of a sentence that names other files."""
+    more = f" and {len(uris) - 5} more" if len(uris) > 5 else ""
+    return f"; also {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
 
 
 def sdf_root(text: bytes, path: Path) -> Element:
