@@ -23,9 +23,9 @@ READING = Reading(model_path=(DATA / "models",))
 
 # What is said of a file as a whole: there is no element to point at.
 OF_THE_FILE = (
-    r":\d+: not well-formed XML: ",
-    r":\d+: DOCTYPE is not allowed",
-    r":\d+: elements are nested more than ",
+    r":\d+:\d+: not well-formed XML: ",
+    r":\d+:\d+: DOCTYPE is not allowed",
+    r":\d+:\d+: elements are nested more than ",
     r": the file is empty",
     r": is UTF-16, ",
     r": cannot be decoded: ",

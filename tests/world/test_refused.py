@@ -35,20 +35,16 @@ def with_dtd(inside: str, entities: str) -> bytes:
 # The first words of each row of the guide's table, what is said, and of which files. These have no element to point at.
 OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
     "an empty file, a folder": {": the file is empty; expected an SDF file": [b"", b" \n\t\n"]},
-    "XML that is not well-formed": {
-        ":2: not well-formed XML": [b"<sdf>\n<world"],
-        ":1: not well-formed XML": [
+    "XML that TinyXML2": {
+        ":2:1: not well-formed XML: the tag <world is not closed": [b"<sdf>\n<world"],
+        r":1:\d+: not well-formed XML": [
             b"a world, please",
             # Cut in a tag, in an attribute, before the end.
             *(world(MODEL)[:end] for end in (60, 38, -6)),
-            world(MODEL) * 2,
             world(MODEL) + b"more",
             b"<sdf version='1.9'><world name='w'><a><b></a></b></world></sdf>",
             b"<sdf version='1.9' version='1.9'/>",
             b"<sdf version=1.9/>",
-            model(LINK, "a & b"),
-            model("<pose>&nbsp;</pose>" + LINK),
-            in_encoding("utf-16"),
             # Bytes that are no UTF-8; a lone surrogate; control characters.
             *(model(LINK).replace(b"'m'", name) for name in (b"'\xff\xfe'", b"'\xed\xa0\x80'")),
             *(model(LINK, name) for name in ("&#xD800;", "&#0;", "\x01", "\x1b[31m")),
@@ -62,7 +58,7 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
         ": cannot be decoded: .*; save it as UTF-8": [in_encoding(name) for name in ("klingon", "zip", "shift_jis")],
     },
     "a DOCTYPE, and": {
-        r":1: DOCTYPE is not allowed \(its entities can read other files and exhaust memory\); remove it": [
+        r":1:1: DOCTYPE is not allowed \(its entities can read other files and exhaust memory\); remove it": [
             with_dtd(MODEL, f"[<!ENTITY l0 'ha'>{LAUGHS}]") + b"&l9;",
             with_dtd("&a;" * 1000, f"[<!ENTITY a '{'a' * 10000}'>]"),
             *(
@@ -74,7 +70,7 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
         ]
     },
     "elements nested more than 100": {
-        ":1: elements are nested more than 100 deep": [world("<a>" * 101 + "</a>" * 101)]
+        r":1:\d+: elements are nested more than 100 deep": [world("<a>" * 101 + "</a>" * 101)]
     },
     "a root that is not `<sdf>`": {
         ":1: /html: expected <sdf> as the outermost element": [b"<html><body><p>404</p></body></html>"],

@@ -7,9 +7,9 @@ import stat
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError
 
 from ddenv.errors import UserError
+from ddenv.world.tinyxml import Element, NotXml, parse_xml
 
 MAX_BYTES = 100_000_000  # of a file that the user names
 # How the names of worlds end: SDF, and Drake's model directives.
@@ -67,19 +67,12 @@ def read(path: Path, limit: int) -> bytes:
 
 
 def xml_root(data: bytes) -> Element:
-    """The root element of `data`. Raises Unusable for anything but plain, safe XML."""
-    from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import fromstring
-
+    """The root element of `data`. Raises Unusable."""
     try:
-        root: Element = fromstring(data, forbid_dtd=True)
-    except ParseError as error:
-        raise Unusable(f"line {error.position[0]}: not well-formed XML") from None
-    except DefusedXmlException:
-        raise Unusable("DOCTYPE is not allowed (its entities can read other files and exhaust memory)") from None
-    except (LookupError, ValueError):
-        raise Unusable("cannot be decoded; save it as UTF-8") from None
-    return root
+        return parse_xml(data, Path())
+    except NotXml as error:
+        where = f"line {error.line}, column {error.column}: " if error.line else ""
+        raise Unusable(f"{where}{error}") from None
 
 
 def size_of(path: Path) -> int:

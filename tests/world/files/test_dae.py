@@ -64,6 +64,38 @@ def test_strip_keeps_its_side(tmp_path):
     assert (solid(mesh).face_normals[:, 2] == 1).all()
 
 
+@pytest.mark.parametrize("ids", ["s = k", "g = k", "v = g", "s = k = g = v = p", "k = <STL_BINARY>"])
+def test_elements_of_different_kinds_may_share_an_id(tmp_path, ids):
+    *others, last = ids.split(" = ")
+    text = dae(nodes="<node id='k' name='tip'><instance_geometry url='#g'/></node>")
+    for other in others:
+        for mark in ("id={}", "url={}", "source={}"):
+            for quote in "'\"":
+                name, new = (mark.format(f"{quote}{sign}{{}}{quote}") for sign in ("" if "id" in mark else "#",) * 2)
+                text = text.replace(name.format(other), new.format(last))
+    mesh = mesh_of(tmp_path / "a.dae", text)
+    assert bounds(mesh) == [[0, 0, 0], [1, 2, 3]]
+    assert solid(mesh).volume == pytest.approx(1)
+
+
+def test_of_two_elements_of_one_kind_and_id_the_first_counts(tmp_path):
+    first = dae()
+    start, end = first.index("<geometry"), first.index("</library_geometries>")
+    again = first[start:end].replace("1 0 0 0 2 0", "9 0 0 0 9 0")
+    assert bounds(mesh_of(tmp_path / "a.dae", first[:end] + again + first[end:])) == [[0, 0, 0], [1, 2, 3]]
+
+
+def test_primitives_share_positions_but_keep_only_their_own(tmp_path):
+    one = "<triangles><input semantic='VERTEX' source='#v' offset='0'/><p>{}</p></triangles>"
+    mesh_of(tmp_path / "a.dae", dae(shapes=one.format("0 1 2") + one.format("3 2 1") + one.format("")))
+    parts = read_parts(tmp_path / "a.dae")
+    assert [part.vertices.tolist() for part in parts] == [
+        [[0, 0, 0], [1, 0, 0], [0, 2, 0]],
+        [[1, 0, 0], [0, 2, 0], [0, 0, 3]],
+    ]
+    assert [part.faces.tolist() for part in parts] == [[[0, 1, 2]], [[2, 1, 0]]]
+
+
 BOMB = "<!DOCTYPE x [<!ENTITY a 'aaaa'><!ENTITY b '&a;&a;&a;'>]>"
 OUTSIDE = "<!DOCTYPE x [<!ENTITY a SYSTEM 'file:///etc/passwd'>]>"
 CHAIN = "".join(f"<node id='n{i}'>" + f"<instance_node url='#n{i + 1}'/>" * 10 + "</node>" for i in range(20))
@@ -81,8 +113,8 @@ HOSTILE_DAE = {
     "deep": ("<COLLADA>" + "<a>" * 100_000 + "</a>" * 100_000 + "</COLLADA>", "has no scene|nested"),
     "vcount": (triangles("<vcount>2000000000</vcount><p>0 1 2</p>", tag="polylist"), "<vcount> does not match"),
     "offset": (triangles("<p>0</p>", 2_000_000_000), "not a valid DAE"),
-    "indices": (triangles("<p>0 1 9</p>"), "go beyond the limits"),
-    "negative": (triangles("<p>0 1 -1</p>"), "negative index"),
+    "indices": (triangles("<p>0 1 9</p>"), "a face refers to a vertex that does not exist"),
+    "negative": (triangles("<p>0 1 -1</p>"), "a face refers to a vertex that does not exist"),
     "gaps": (dae().replace('count="4" stride="3"', 'count="4" stride="4"'), "stored with gaps"),
     "nan": (dae(positions="nan 0 0 1 0 0 0 2 0 0 0 3"), "not finite"),
     "far": (dae(positions="2e6 0 0 1 0 0 0 2 0 0 0 3"), "farther than 1000000 m"),

@@ -263,8 +263,13 @@ def test_model_file(tmp_path):
     ],
 )
 def test_bad_model_config(tmp_path, text):
-    put(tmp_path / "model.sdf")
     put(tmp_path / "model.config", text)
+    with pytest.raises(Unusable, match=r"model\.config"):
+        model_file(tmp_path)
+    put(tmp_path / "model.sdf")
+    if "../.." not in text:
+        assert model_file(tmp_path).name == "model.sdf"
+        return
     with pytest.raises(Unusable, match=r"model\.config"):
         model_file(tmp_path)
 

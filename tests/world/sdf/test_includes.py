@@ -3,7 +3,9 @@
 import pytest
 
 from ddenv.errors import UserError
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import Cylinder
+from ddenv.world.sdf.read import parse_world
 from tests.world.sdf.conftest import BOX, world_text
 
 TOP = f"<pose>0 0 5 0 0 0</pose><static>1</static><link name='top'>{BOX}</link>"
@@ -32,6 +34,39 @@ def test_a_model_is_found_in_the_model_path(read, table):
     assert (first.name, first.pose.position, first.static) == ("table", (0, 0, 5), True)
     assert (second.name, second.pose.position, second.static) == ("desk", (1, 2, 3), False)
     assert second.links[0].inertia is not None
+
+
+def test_of_a_broken_model_config_nothing_but_a_note_is_left(read, table):
+    config = table / "table" / "model.config"
+    config.write_text("<model><author>Us & co</author><sdf version='1.7'>other.sdf</sdf></model>")
+    (table / "table" / "other.sdf").write_text(TABLE.replace("'table'", "'other'"))
+    assert read(included(), model_path=(table,)).models[0].name == "other"
+    config.write_text("<model><sdf version='1.7'>other.sdf</model>")
+    world = read(included() + included("<name>desk</name>"), model_path=(table,))
+    assert [model.name for model in world.models] == ["table", "desk"]
+    (note,) = (note for note in world.notes if "model.config" in note.why)
+    assert "line 1, column 36: not well-formed XML: </model> closes <sdf> of line 1; model.sdf is taken" in note.why
+    # What a run file stores says it, too.
+    again = parse_world(world.text, world.path, resources=Resources(world.resources))
+    assert again.notes == world.notes
+    assert read(included(uri="model://table/model.sdf"), model_path=(table,)).notes == ()
+
+
+def test_a_mesh_that_was_found_is_called_unreadable_and_no_folder_is_asked_for(read, tmp_path):
+    (tmp_path / "broken.dae").write_text("<COLLADA/>")
+    meshes = "".join(
+        f"<collision name='{uri}'><geometry><mesh><uri>{uri}</uri></mesh></geometry></collision>"
+        for uri in ("broken.dae", "gone.dae")
+    )
+    with pytest.raises(UserError) as refused:
+        read(f"<model name='m'><link name='l'>{meshes}</link></model>")
+    said = str(refused.value)
+    assert "'broken.dae' is unreadable: is not a valid DAE file: has no scene; give a shape in m" in said
+    assert "--model-path" not in said
+    assert said.endswith("; also missing: 'gone.dae'")
+    world = read(f"<model name='m'><static>1</static><link name='l'>{meshes}</link></model>", ignore=("mesh",))
+    assert any("'broken.dae' is unreadable (" in note.why for note in world.notes)
+    assert any("'gone.dae' is not available (" in note.why for note in world.notes)
 
 
 @pytest.mark.parametrize(("of_model", "of_include"), [(" placement_frame='foot'", ""), ("", "foot")])

@@ -3,9 +3,8 @@
 Coordinates are as in Gazebo: the axes of the file whatever it says about "up", `<unit>` of a .dae applied, all instances of
 a scene placed and joined. Only the mesh file itself is opened, and the buffers of a .gltf.
 
-Limitations, mostly of trimesh: a .dae is read in 32-bit precision, and refused if it has no scene, if its positions have gaps
-or unnamed axes, or if texture or normal indices are missing. A .gltf is refused if it has no scene, or if it has triangle
-fans or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
+Limitations: a .dae is refused if it has no scene, or if its positions have gaps. A .gltf is refused if it has no scene, or if
+it has triangle fans or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
 """
 
 from __future__ import annotations

@@ -15,12 +15,15 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ddenv.world.access import Missing, Unusable, is_folder, read, reason, without_tilde, xml_root
+from ddenv.world.access import Missing, Unusable, is_file, is_folder, read, reason, without_tilde, xml_root
 from ddenv.world.files.meshes import build, read_parts, unpack
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
+from ddenv.world.tinyxml import Element
 
 SDF_LIMIT = 50_000_000  # bytes of a file
+# Of the parts of mesh files that are kept in case that they are used again, bytes.
+MOST_KEPT = 200_000_000
 
 
 class Resources:
@@ -37,8 +40,8 @@ class Resources:
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._failed: dict[str, Missing | Unusable] = {}
-        # A collision and its visual mostly use the same file, one after the other.
-        self._last: tuple[Path, list[Part]] | None = None
+        # Collisions and visuals use the same files, and different parts of them; the longest known first.
+        self._parts_of: dict[Path, list[Part]] = {}
         # All requests so far: the URI, and its base.
         self.asked: dict[tuple[str, Path], None] = {}
 
@@ -63,6 +66,13 @@ class Resources:
             self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
         return self._meshes[key]
 
+    def config_fault(self, folder: Path) -> str:
+        """Why the model.config in the folder of a model cannot be read, so that its model.sdf is taken; empty if it can."""
+        key = json.dumps(["config", str(folder)])
+        if key not in self.taken and self._folders is not None and (fault := _config_fault(folder)):
+            self.taken[key] = fault.encode()
+        return self.taken.get(key, b"").decode("utf-8", "replace")
+
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
         """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
         for key, content in list(self.taken.items()):
@@ -85,9 +95,17 @@ class Resources:
         return self.taken[key]
 
     def _parts(self, path: Path) -> list[Part]:
-        if self._last is None or self._last[0] != path:
-            self._last = path, read_parts(path)
-        return self._last[1]
+        if path not in self._parts_of:
+            self._parts_of[path] = read_parts(path)
+        found = self._parts_of[path]
+        while len(self._parts_of) > 1 and sum(map(_size, self._parts_of.values())) > MOST_KEPT:
+            del self._parts_of[next(iter(self._parts_of))]
+        return found
+
+
+def _size(parts: Sequence[Part]) -> int:
+    """The bytes of all `parts`."""
+    return sum(part.vertices.nbytes + part.faces.nbytes for part in parts)
 
 
 def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
@@ -319,23 +337,52 @@ def _listed(folders: Sequence[Path]) -> str:
 def model_file(folder: Path) -> Path:
     """The SDF file of a model's folder: the newest supported one in its model.config, or else model.sdf.
 
-    Raises Unusable for an invalid model.config, and Missing if there is no SDF file.
+    Raises Unusable if a model.config cannot be read and there is no model.sdf, or if it names a file outside of the folder;
+    Missing if there is no SDF file.
     """
     try:
-        text = read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT)
+        config = _model_config(folder)
+    except Unusable as error:
+        if not is_file(folder / "model.sdf"):
+            raise Unusable(f"model.config: {error}") from None
+        config = None
     except Missing:
         return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
-    name = ""
-    try:
-        newest = (-1, -1)
-        for element in xml_root(text).findall("sdf"):
-            # As numbers, since 1.12 is newer than 1.9.
-            match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", element.get("version", ""))
-            version = (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
-            if newest < version <= NEWEST_SDF and (own := (element.text or "").strip()):
-                newest, name = version, _inside(own)
-    except Unusable as error:
-        raise Unusable(f"model.config: {error}") from None
+    name = "model.sdf" if config is None else _newest_file(config)
     if not name:
         return _first([folder / "model.sdf"], "model.config names no file for SDF 1.12 or older")
     return _first([folder / name], f"model.config names '{name[:60]}', which does not exist")
+
+
+def _model_config(folder: Path) -> Element:
+    """The root of the model.config in `folder`. Raises Unusable if it cannot be read, and Missing if there is none."""
+    return xml_root(read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT))
+
+
+def _config_fault(folder: Path) -> str:
+    """Why the model.config in `folder` cannot be read; empty if it can, or if there is none."""
+    try:
+        _model_config(folder)
+    except Unusable as error:
+        return str(error)
+    except Missing:
+        return ""
+    return ""
+
+
+def _newest_file(config: Element) -> str:
+    """The file for the newest supported SDF version that a model.config names; empty if there is none. Raises Unusable."""
+    name = ""
+    newest = (-1, -1)
+    for element in config.findall("sdf"):
+        # As numbers, since 1.12 is newer than 1.9.
+        match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", element.get("version", ""))
+        version = (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
+        own = (element.text or "").strip()
+        if own and newest < version <= NEWEST_SDF:
+            newest = version
+            name = own
+    try:
+        return _inside(name) if name else ""
+    except Unusable as error:
+        raise Unusable(f"model.config: {error}") from None

@@ -30,10 +30,10 @@ class Part:
 def parts_of(meshes: Iterable[tuple[tuple[str, ...], Any]]) -> list[Part]:
     """The parts among pairs of names and what trimesh loaded; point clouds and empty meshes are dropped. Raises ValueError."""
     found = [(names, mesh) for names, mesh in meshes if len(getattr(mesh, "faces", ()))]
-    return [_part(names, mesh.vertices.view(np.ndarray), mesh.faces) for names, mesh in found]
+    return [used_part(names, mesh.vertices.view(np.ndarray), mesh.faces) for names, mesh in found]
 
 
-def _part(names: tuple[str, ...], vertices: np.ndarray, faces: np.ndarray) -> Part:
+def used_part(names: tuple[str, ...], vertices: np.ndarray, faces: np.ndarray) -> Part:
     """A part with only the vertices that its faces use, since many parts may share one long list. Raises ValueError."""
     used, places = np.unique(faces, return_inverse=True)
     # trimesh does not check this, and numpy counts negative numbers from the end.
@@ -61,10 +61,10 @@ def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
     if not parts:
         raise ValueError("has no triangles")
     check_count(sum(len(part.faces) for part in parts))
-    from trimesh.util import append_faces
-
-    vertices, faces = append_faces([part.vertices for part in parts], [part.faces for part in parts])
-    return vertices, faces
+    counts = [len(part.vertices) for part in parts]
+    starts = np.cumsum(counts) - counts
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]
+    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
 
 
 def check_count(faces: int) -> None:
@@ -102,7 +102,7 @@ def read_obj(data: bytes) -> list[Part]:
         elif word == "g":
             group = " ".join(rest)
     points = np.array(vertices, dtype=float) if objects else np.zeros((0, 3))
-    return [_part(names, points, np.array(faces)) for names, faces in objects.items()]
+    return [used_part(names, points, np.array(faces)) for names, faces in objects.items()]
 
 
 def read_stl(data: bytes) -> list[Part]:

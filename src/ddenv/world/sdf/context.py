@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -13,6 +14,7 @@ from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
+from ddenv.world.tinyxml import strict_fault
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
 # By parent: the children that need no note, since they are read or do not affect how a robot drives.
@@ -76,7 +78,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `files` the parsed files.
+    lists, `unreadable` those of these that were found, `files` the parsed files.
     """
 
     resources: Resources
@@ -87,6 +89,7 @@ class Context:
     used: set[str] = field(default_factory=set)
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
+    unreadable: set[str] = field(default_factory=set)
     files: dict[Path, Element] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -95,6 +98,15 @@ class Context:
     def note(self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = "") -> None:
         """Notes that `element` was replaced or ignored."""
         self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
+
+    def note_tolerance(self, root: Element, text: bytes) -> None:
+        """Notes what is no strict XML in `text`, the content of the file of `root`."""
+        fault = strict_fault(text)
+        if fault is None:
+            return
+        file = "/".join(root.source.parts[-2:])
+        why = f"in {file}, line {fault.line}, column {fault.column}: {fault}; the file was read as Gazebo reads it"
+        self.notes.append(Note("ignored", self.model, place(root), "a fault of XML", why))
 
     def note_unused(self, root: Element) -> None:
         """Notes the stand-ins that nothing asked for: probably typing errors."""
@@ -106,10 +118,10 @@ class Context:
         """Raises MissingFiles with the first error, and the names of the other files."""
         if not self.missing:
             return
-        (_, first), *others = self.missing.items()
-        more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-        also = f"; also missing: {', '.join(repr(uri[:100]) for uri, _ in others[:5])}{more}" if others else ""
-        raise MissingFiles(f"{first}{also}", list(self.missing))
+        first, *others = self.missing
+        absent = _also("missing", [uri for uri in others if uri not in self.unreadable])
+        broken = _also("unreadable", [uri for uri in others if uri in self.unreadable])
+        raise MissingFiles(f"{self.missing[first]}{absent}{broken}", list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
@@ -128,9 +140,15 @@ class Context:
         return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
 
 
+def _also(what: str, uris: Sequence[str]) -> str:
+    """The end of a sentence that names other files."""
+    more = f" and {len(uris) - 5} more" if len(uris) > 5 else ""
+    return f"; also {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
+
+
 def sdf_root(text: bytes, path: Path) -> Element:
     """The `<sdf>` element of a file of a supported version. Raises UserError."""
-    root = parse(text, path)
+    root = parse(text, path, root="sdf")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
     given = (root.get("version") or "").strip()
@@ -164,8 +182,7 @@ def note_unread(element: Element, context: Context) -> None:
                 context.note("ignored", child, f"only the first <{child.tag}> is used")
             once.add(child.tag)
         if child.tag not in quiet:
-            extension = "}" in child.tag or ":" in child.tag
-            unknown = f"an unknown {'extension' if extension else 'element'} of SDF"
+            unknown = f"an unknown {'extension' if ':' in child.tag else 'element'} of SDF"
             context.note("ignored", child, REASONS.get(child.tag, unknown))
         elif len(child):
             if child.tag in INSIDE:

@@ -40,7 +40,7 @@ RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 @dataclass(frozen=True)
 class Lost:
-    """A mesh that is not available, and the reason; `word` is what the user wants in its place, a word of `StandIn`.
+    """A mesh that was not found, or is `unreadable`, and the reason; `word` is what the user wants in its place, as in `StandIn`.
 
     `scale` is its own, times that of its model.
     """
@@ -50,6 +50,12 @@ class Lost:
     reason: str
     word: str = ""
     scale: Vector = ONE
+    unreadable: bool = False
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with it, to follow its name."""
+        return "is unreadable" if self.unreadable else "is not available"
 
 
 def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed | Lost | None:
@@ -134,7 +140,7 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
     except (Missing, Unusable) as error:
         word = AUTO if context.may_guess(uri) else ""
-        return Lost(element, uri, str(error), word, _times(own, scale))
+        return Lost(element, uri, str(error), word, _times(own, scale), unreadable=isinstance(error, Unusable))
     if convex:
         context.note(
             "replaced", element, f"'{uri}' by its convex hull; contact at the edges of hulls that are no boxes is rough"
@@ -155,8 +161,10 @@ def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
     package = "/".join(lost.uri.split("/")[:3]) if lost.uri.startswith(("model://", "package://")) else lost.uri
     others = ", ".join(f"{kind}:{sizes}" for kind, sizes in SIZES.items() if kind != "cylinder")
     also = "".join(f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
+    # Another folder would not help if the file is there.
+    folder = "" if lost.unreadable else "its folder with --model-path, "
     return (
-        f"mesh '{lost.uri[:200]}' is not available: {lost.reason}; give its folder with --model-path, a shape in m with "
+        f"mesh '{lost.uri[:200]}' {lost.problem}: {lost.reason}; give {folder}a shape in m with "
         f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, "
         "have one guessed with --stand-in auto, or leave it out with --ignore mesh"
     )

@@ -104,10 +104,7 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         note(f"the stand-in {given[0]}")
         return _stand_in_root(include, *given)
     try:
-        path, text = context.resources.sdf(uri, include.source.parent)
-        if path not in context.files:
-            context.files[path] = root_of(text, path, context)
-        root = context.files[path]
+        root = _file_root(include, uri, context)
         if root.source.parent == FOLDER and root.find("model") is not None:
             note("the one built into ddenv, which is like Gazebo's")
         return root
@@ -128,6 +125,18 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         why = f"'{uri[:200]}' was not found ({missing}); {remedies}"
         context.missing.setdefault(uri, complain(include, why))
         return None
+
+
+def _file_root(include: Element, uri: str, context: Context) -> Element:
+    """The root of the file that `uri` names. Raises Missing and Unusable."""
+    path, text = context.resources.sdf(uri, include.source.parent)
+    if path in context.files:
+        return context.files[path]
+    names_folder = not uri.rstrip("/").endswith(path.name)
+    if names_folder and (fault := context.resources.config_fault(path.parent)):
+        context.note("ignored", include, f"model.config of '{uri[:200]}', {fault}; {path.name} is taken")
+    root = context.files[path] = root_of(text, path, context)
+    return root
 
 
 def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:

@@ -118,10 +118,12 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
             return _guessed(lost, item, link, context)
         raise complain(lost.element, f"its link has no {kind} shape that could replace '{lost.uri[:200]}'")
     if context.ignores("mesh"):
-        why = f"'{lost.uri}' is not available ({lost.reason}): nothing collides with it"
+        why = f"'{lost.uri}' {lost.problem} ({lost.reason}): nothing collides with it"
         context.note("ignored", lost.element, why)
         return None
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
+    if lost.unreadable:
+        context.unreadable.add(lost.uri)
     context.missing.setdefault(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
     return None
 

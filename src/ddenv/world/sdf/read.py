@@ -81,6 +81,7 @@ def disk_of(path: Path, reading: Reading) -> Resources:
 
 def _world(text: bytes, path: Path, context: Context) -> World:
     root = sdf_root(text, path)
+    context.note_tolerance(root, text)
     worlds = root.findall("world")
     if len(worlds) != 1:
         found = "no <world>" if not worlds else f"{len(worlds)} <world> elements"

@@ -27,8 +27,12 @@ ROOT = "robot"
 
 def to_sdf(robot: Element, context: Context) -> Element:
     """The `<sdf>` for a URDF `<robot>`, its root link first. Raises UserError."""
+    prefixes = {"xacro"}
     for each in robot.iter():
-        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
+        prefixes |= {name.removeprefix("xmlns:") for name, value in each.attrib.items() if value.endswith("xacro")}
+        if each.tag.rpartition(":")[0] in prefixes or any(
+            "${" in text or "$(" in text for text in each.attrib.values()
+        ):
             raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
     # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
@@ -56,7 +60,9 @@ def to_sdf(robot: Element, context: Context) -> Element:
 def root_of(text: bytes, path: Path, context: Context) -> Element:
     """The `<sdf>` of an SDF or URDF file. Raises UserError."""
     robot = parse(text, path) if f"<{ROOT}".encode() in text else None
-    return sdf_root(text, path) if robot is None or robot.tag != ROOT else to_sdf(robot, context)
+    root = sdf_root(text, path) if robot is None or robot.tag != ROOT else to_sdf(robot, context)
+    context.note_tolerance(root, text)
+    return root
 
 
 def is_urdf(element: Element) -> bool:

@@ -4,96 +4,27 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
-from xml.etree import ElementTree
-
-from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import DefusedXMLParser
 
 from ddenv.errors import UserError
+from ddenv.world.tinyxml import Element as Element
+from ddenv.world.tinyxml import NotXml, parse_xml
 
-# Maximum nesting depth, far above that of real worlds: the reader recurses once for each level.
-DEEPEST = 100
 # (start, end, text): the bytes from start to end are replaced.
 Edit = tuple[int, int, bytes]
 _TAG_END = re.compile(rb"""(?:[^'">]|"[^"]*"|'[^']*')*>""")
 
 
-class Element(ElementTree.Element):
-    """An XML element with its file (`source`), its first `line`, its byte range (`start`, `end`) there, and its `parent`."""
-
-    __slots__ = ("end", "line", "parent", "source", "start")
-
-    source: Path
-    line: int
-    start: int
-    end: int
-    parent: Element | None
-
-    # All elements below an Element are Elements.
-    if TYPE_CHECKING:
-
-        def find(self, path: str, namespaces: dict[str, str] | None = None) -> Element | None: ...
-        def findall(self, path: str, namespaces: dict[str, str] | None = None) -> list[Element]: ...  # type: ignore[override]  # narrower
-        def iter(self, tag: str | None = None) -> Iterator[Element]: ...  # type: ignore[override]  # narrower
-        def __iter__(self) -> Iterator[Element]: ...
-        def __getitem__(self, index: int) -> Element: ...  # type: ignore[override]  # no slices
-
-
-class _Builder(ElementTree.TreeBuilder):
-    """Builds `Element`s; their positions come from the parser `expat`."""
-
-    def __init__(self, text: bytes, source: Path) -> None:
-        super().__init__(element_factory=Element)
-        self.text = text
-        self.source = source
-        self.open: list[Element] = []
-        self.expat: Any = None
-
-    def start(self, tag: str, attributes: dict[str, str]) -> Element:
-        element = cast(Element, super().start(tag, attributes))
-        element.source = self.source
-        element.line = self.expat.CurrentLineNumber
-        element.start = self.expat.CurrentByteIndex
-        element.parent = self.open[-1] if self.open else None
-        self.open.append(element)
-        if len(self.open) > DEEPEST:
-            raise UserError(f"{self.source}:{element.line}: elements are nested more than {DEEPEST} deep")
-        return element
-
-    def end(self, tag: str) -> Element:
-        element = self.open.pop()
-        # Where expat puts the end of `<a/>` depends on its version, so the tag itself decides.
-        found = _TAG_END.match(self.text, element.start)
-        if found and not found.group().endswith(b"/>"):
-            found = _TAG_END.match(self.text, self.expat.CurrentByteIndex)
-        element.end = found.end() if found else len(self.text)
-        return cast(Element, super().end(tag))
-
-
-def parse(text: bytes, path: Path) -> Element:
-    """The root element of `text`. Raises UserError with file and line for anything but plain, safe XML."""
+def parse(text: bytes, path: Path, root: str = "") -> Element:
+    """The element called `root` of `text`, or else its first one. Raises UserError with file, line and column."""
     if not text.strip():
         raise UserError(f"{path}: the file is empty; expected an SDF file")
-    if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
-        raise UserError(f"{path}: is UTF-16, UTF-32 or not text; save it as UTF-8")
-    builder = _Builder(text, path)
-    parser = DefusedXMLParser(target=builder, forbid_dtd=True, forbid_entities=True, forbid_external=True)
-    builder.expat = parser.parser
     try:
-        parser.feed(text)
-        return cast(Element, parser.close())
-    except ElementTree.ParseError as error:
-        reason = str(error).split(":")[0]
-        raise UserError(f"{path}:{error.position[0]}: not well-formed XML: {reason}") from None
-    except DefusedXmlException:
-        line = builder.expat.CurrentLineNumber
-        why = "its entities can read other files and exhaust memory"
-        raise UserError(f"{path}:{line}: DOCTYPE is not allowed ({why}); remove it") from None
-    except (LookupError, ValueError) as error:
-        raise UserError(f"{path}: cannot be decoded: {error}; save it as UTF-8") from None
+        return parse_xml(text, path, root)
+    except NotXml as error:
+        where = f"{path}:{error.line}:{error.column}" if error.line else str(path)
+        raise UserError(f"{where}: {error}") from None
 
 
 def tag_end(text: bytes, element: Element) -> int:
