@@ -168,3 +168,29 @@ def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, command)
     assert checked.stdout.splitlines()[-1].startswith("falls starts 0.80 m inside leans")
     refused = command("world", "settle", path, "-o", path)
     assert refused.returncode == 2 and "is the world itself; choose another file" in refused.stderr
+
+
+def test_it_is_said_where_each_file_was_found_and_how_to_get_those_that_were_not(tmp_path, monkeypatch):
+    def include(uri):
+        return f"<include><uri>{uri}</uri></include>"
+
+    for folder in ("worlds", "models/crate", "gz/barrel"):
+        (tmp_path / folder).mkdir(parents=True)
+    for name in ("models/crate", "gz/barrel"):
+        (tmp_path / name / "model.sdf").write_text(f"<sdf version='1.6'>{box(name[-3:])}</sdf>")
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", str(tmp_path / "gz"))
+    tree = "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Oak%20tree"
+    text = f"""<sdf version='1.6'><world name='w'>{include("model://crate")}{include("model://barrel")}
+    <model name='tree'><static>1</static><link name='l'><visual name='v'><geometry>
+    <mesh><uri>{tree}/2/files/meshes/a.dae</uri></mesh></geometry></visual></link></model></world></sdf>"""
+    world = parse_world(text.encode(), tmp_path / "worlds" / "w.sdf")
+    told = lines(world)
+    assert f"   1 in models beside worlds, {tmp_path / 'models'}: model://crate" in told
+    assert f"   1 in GZ_SIM_RESOURCE_PATH, {tmp_path / 'gz'}: model://barrel" in told
+    assert f"--fetch downloads this model from Fuel, as does gz fuel download -u {tree}/2" in "\n".join(told)
+    assert report(world)["files"][1] == {
+        "uri": "model://barrel",
+        "path": str(tmp_path / "gz" / "barrel" / "model.sdf"),
+        "from": "GZ_SIM_RESOURCE_PATH",
+    }
+    assert report(world)["absent"] == [f"{tree}/2/files/meshes/a.dae"]

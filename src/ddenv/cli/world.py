@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # A line names so many models.
 MOST_NAMES = 5
-LONGEST_NAME = 34
+LONGEST_NAME, LONGEST_URI = 34, 80
 HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes")
 TO_THE_RIGHT = ("links", "yaw")
 # The columns that are left out first where not all fit; the width where all do.
@@ -111,6 +111,8 @@ def world_report(world: World) -> dict[str, Any]:
         "notes": _notes(world, ""),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
+        "files": [{"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found],
+        "absent": list(world.absent),
     }
 
 
@@ -166,9 +168,29 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
         "",
         *_table(world, by_model, columns),
         *below,
+        *_files(world, columns),
         "",
         *(line for words in (_totals(world), *wrong) for line in wrapped(words, columns)),
     ]
+
+
+def _files(world: World, columns: int | None) -> list[str]:
+    """Where the world's other files were found, and which were not."""
+    from ddenv.world.files.resources import how_to_fetch
+
+    found: dict[str, dict[str, None]] = {}
+    for file in world.found:
+        named = f"{file.source}, {file.root}" if file.source else str(file.root)
+        found.setdefault(named, {})[file.uri] = None
+    lines = [f"{len(uris)} in {where}: {_named(uris)}" for where, uris in found.items()]
+    if world.absent:
+        lines.append(f"{len(world.absent)} not found: {_named(world.absent)}{how_to_fetch(world.absent)}")
+    titled = ["", "files"] if lines else []
+    return [*titled, *(line for each in lines for line in wrapped(printable(each), columns, "   "))]
+
+
+def _named(uris: Iterable[str]) -> str:
+    return first_of([shortened(uri, LONGEST_URI) for uri in uris], MOST_NAMES)
 
 
 def _text(note: Note) -> str:

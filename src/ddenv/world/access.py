@@ -114,6 +114,15 @@ def is_folder(path: Path) -> bool:
         return False
 
 
+def folders_of(folder: Path) -> list[str]:
+    """The sorted names of the folders in `folder`; none if it is not accessible."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries if entry.is_dir())
+    except (OSError, ValueError):
+        return []
+
+
 def is_file(path: Path) -> bool:
     """Whether `path` is an accessible file. Any text is taken for a path: one that is too long, or holds a NUL byte, is none."""
     try:

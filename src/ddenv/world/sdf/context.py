@@ -8,7 +8,7 @@ from typing import Literal
 
 from ddenv.errors import UserError
 from ddenv.world.access import MissingFiles
-from ddenv.world.files.resources import Resources
+from ddenv.world.files.resources import Resources, how_to_fetch
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
@@ -109,7 +109,7 @@ class Context:
         (_, first), *others = self.missing.items()
         more = f" and {len(others) - 5} more" if len(others) > 5 else ""
         also = f"; also missing: {', '.join(repr(uri[:100]) for uri, _ in others[:5])}{more}" if others else ""
-        raise MissingFiles(f"{first}{also}", list(self.missing))
+        raise MissingFiles(f"{first}{also}{how_to_fetch(self.missing)}", list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore

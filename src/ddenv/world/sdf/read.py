@@ -14,7 +14,8 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import is_directives, read_bytes
-from ddenv.world.files.resources import Resources, search_folders
+from ddenv.world.files.resources import Resources
+from ddenv.world.files.roots import search_roots
 from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
@@ -76,7 +77,7 @@ def disk_of(path: Path, reading: Reading) -> Resources:
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return Resources({}, search_folders(reading.model_path, path.parent))
+    return Resources({}, search_roots(reading.model_path, path.parent))
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:
@@ -108,6 +109,8 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         notes=tuple(context.notes),
         anchors=frozenset(model.name for model in models if model.name in anchors),
         resources=context.resources.taken,
+        found=tuple(context.resources.found.values()),
+        absent=context.resources.absent(),
     )
     return _opened(whole, root, scope, context) if context.reading.inside else whole
 
