@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Numbers, reading_options, remembered_option, scenarios, together
+from ddenv.cli.options import Numbers, fetch_option, reading_options, remembered_option, scenarios, together
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
-from ddenv.runs.folder import find_run, named_file
+from ddenv.runs.folder import find_run
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_directives
 
 if TYPE_CHECKING:
+    from ddenv.runs.subject import Fetch
     from ddenv.world.model import Model, Note, World
     from ddenv.world.scenario import Reading
 
@@ -36,6 +37,7 @@ SPARE, WIDEST = ("links", "shapes", "yaw"), 10_000
 world_argument = together(
     click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
     reading_options,
+    fetch_option,
     remembered_option,
 )
 
@@ -47,16 +49,15 @@ def world_command() -> None:
 
 def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
-    from ddenv.runs.subject import reading_of, with_remembered
-    from ddenv.world.load import load_scenario
-    from ddenv.world.scenario import PLAIN
+    from ddenv.runs.subject import reading_of, with_remembered, world_of
     from ddenv.world.sdf.read import read_world
 
-    kind, path = named_file(str(file)) or ("world", file)
-    scenario = load_scenario(path) if kind == "scenario" else None
-    file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
+    file, own = world_of(file)
+    fetch: Fetch | None = options.pop("fetch")
     reads_remembered = options.pop("remembered")
     read_as = reading_of(own, **options)
+    if fetch is not None:
+        fetch(file, read_as)
     if reads_remembered:
         read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as

@@ -14,7 +14,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runs.folder import named
+from ddenv.runs.folder import named, named_file
 from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
@@ -31,6 +31,8 @@ from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_world
 from ddenv.world.sdf.standin import parse_option
 
 Announce = Callable[[str], None]
+# Downloads what a world lacks, which is read in this way.
+Fetch = Callable[[Path, Reading], None]
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
@@ -65,7 +67,7 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
         return Subject(scenario, *load_parts(scenario))
     if has_options(given):
         raise UserError(
-            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
+            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore, --inside and --fetch are only for scenarios; "
             "a run keeps its own"
         )
     with RunFile(path) as file:
@@ -87,6 +89,7 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     """
     others = dict(given)
     reads_remembered = others.pop("remembered", False)
+    fetch: Fetch | None = others.pop("fetch", None)
     reading = {option: others.pop(option) for option in READING if option in others}
     spawn, goal = given["spawn"], given["goal"]
     if not is_world(Path(name)):
@@ -102,9 +105,20 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
+    if fetch is not None:
+        fetch(scenario.world, read_as)
     if not reads_remembered:
         return scenario
     return scenario.model_copy(update={"reading": with_remembered(scenario.world, read_as, announce)})
+
+
+def world_of(path: Path) -> tuple[Path, Reading]:
+    """The world that a file is, or that a scenario's file or name stands for; and how the scenario reads it. Raises UserError."""
+    kind, path = named_file(str(path)) or ("world", path)
+    if kind == "world":
+        return path, PLAIN
+    scenario = load_scenario(path)
+    return scenario.world, scenario.reading
 
 
 def reading_of(

@@ -37,12 +37,17 @@ class FuelModel:
     def url(self) -> str:
         """Its address, as `gz fuel download -u` takes it."""
         version = f"/{self.version}" if self.version else ""
-        return f"https://{HOSTS[0]}/1.0/{quote(self.owner)}/{self.kind}/{quote(self.name)}{version}"
+        return f"https://{HOSTS[0]}/1.0/{quoted(self.owner)}/{self.kind}/{quoted(self.name)}{version}"
 
     @property
     def folder(self) -> Path:
         """The folder of its versions, relative to that of a host in a cache."""
         return Path(self.owner.lower(), self.kind, self.name.lower())
+
+
+def quoted(name: str) -> str:
+    """A name as a part of a URL."""
+    return quote(name, safe="", errors="surrogateescape")
 
 
 def in_fuel(rest: str) -> tuple[FuelModel, str] | None:

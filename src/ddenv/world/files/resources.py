@@ -313,7 +313,7 @@ def model_file(folder: Path) -> Path:
     try:
         text = read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT)
     except Missing:
-        return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
+        return _first([folder / "model.sdf"], f"{folder} has neither model.config nor model.sdf")
     name = ""
     try:
         newest = (-1, -1)
