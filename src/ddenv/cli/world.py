@@ -109,7 +109,7 @@ def world_report(world: World) -> dict[str, Any]:
         "world": world.name,
         "gravity": list(world.gravity),
         "models": models,
-        "notes": _notes(world, ""),
+        "notes": _notes(world, *({note.model for note in world.notes} - {model.name for model in world.models})),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
         "files": [{"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found],
@@ -117,11 +117,11 @@ def world_report(world: World) -> dict[str, Any]:
     }
 
 
-def _notes(world: World, model: str) -> list[dict[str, str]]:
+def _notes(world: World, *models: str) -> list[dict[str, str]]:
     return [
         {"kind": note.kind, "what": note.what, "why": note.why, "detail": note.detail, "place": note.place}
         for note in world.notes
-        if note.model == model
+        if note.model in models
     ]
 
 

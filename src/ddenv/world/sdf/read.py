@@ -117,11 +117,13 @@ def _world(text: bytes, path: Path, context: Context) -> World:
 
 def _opened(world: World, root: Element, scope: Scope, context: Context) -> World:
     """`world` with the parts of its models as models; models from other files are first copied into its text."""
+    part_at = {part.at.start: part for part in scope.parts}
     parts = {
-        model.name: part
-        for model, part in zip(world.models, scope.parts, strict=True)
-        if has_includes(part) and model.static and model.name not in world.anchors and len(model.collisions) > 1
+        model.name: part_at[model.spans[0][0]]
+        for model in world.models
+        if model.static and model.name not in world.anchors and len(model.collisions) > 1
     }
+    parts = {name: part for name, part in parts.items() if has_includes(part)}
     reading = context.reading.model_copy(update={"inside": False})
 
     def solid(model: Model) -> list[Collision]:
@@ -147,8 +149,11 @@ def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tu
     names = [part.name for part in scope.parts]
     counts, models = Counter(names), []
     for part, name in zip(scope.parts, unique_names(names, " #"), strict=True):
+        context.model = name
+        if scope.is_left_out(part):
+            context.note("ignored", part.at, "all that it includes is left out")
+            continue
         if name != part.name:
-            context.model = name
             context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
         entries = state.get(part.name)
         models.append(assemble(part, name, scope, entries.pop(0) if entries else None, context))
