@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 from collections import Counter
@@ -145,13 +146,17 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     from ddenv.world.placement import note_inside, note_unseen
     from ddenv.world.sdf.official import refused
 
-    numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
+    by_kind: dict[str, list[Note]] = {}
+    for note in world.notes:
+        by_kind.setdefault(_kind_of(note), []).append(note)
     by_model: dict[str, dict[str, None]] = {}
-    for note in sorted(world.notes, key=lambda note: numbers[_text(note)]):
-        detail = printable(note.detail.removesuffix(" away"))
-        words = f"{numbers[_text(note)]} ({detail})" if detail else str(numbers[_text(note)])
-        by_model.setdefault(note.model, {})[words] = None
-    notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
+    notes: list[str] = []
+    for number, alike in enumerate(by_kind.values(), start=1):
+        notes += wrapped(_text(alike), columns, f"{number:4}  ")
+        for note in alike:
+            detail = printable(note.detail.removesuffix(" away"))
+            words = f"{number} ({detail})" if detail else str(number)
+            by_model.setdefault(note.model, {})[words] = None
     below = ["", "notes", *notes] if notes else []
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
@@ -194,8 +199,17 @@ def _named(uris: Iterable[str]) -> str:
     return first_of([shortened(uri, LONGEST_URI) for uri in uris], MOST_NAMES)
 
 
-def _text(note: Note) -> str:
-    return printable(f"{note.kind}: {note.what} {note.why}")
+def _kind_of(note: Note) -> str:
+    """What notes have in common that differ only in the names that they quote."""
+    return re.sub(r"'[^']*'", "''", f"{note.kind}: {note.what} {note.why}")
+
+
+def _text(alike: list[Note]) -> str:
+    """The first of notes of one kind, and how many there are."""
+    first, *others = dict.fromkeys(f"{note.kind}: {note.what} {note.why}" for note in alike)
+    more = f"; and {count(len(others), 'other')} like it" if others else ""
+    times = f" ({len(alike)} times)" if len(alike) > 1 else ""
+    return printable(f"{first}{more}{times}")
 
 
 def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None) -> list[str]:

@@ -20,7 +20,7 @@ from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
 from ddenv.text import first_of, shortened
-from ddenv.world.access import MissingFiles, is_world, read_bytes, resolved, write_file
+from ddenv.world.access import MissingFiles, is_read_as_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
@@ -92,7 +92,7 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     fetch: Fetch | None = others.pop("fetch", None)
     reading = {option: others.pop(option) for option in READING if option in others}
     spawn, goal = given["spawn"], given["goal"]
-    if not is_world(Path(name)):
+    if not is_read_as_world(Path(name)):
         scenario = load_scenario(find_scenario(name))
     elif spawn is None or goal is None:
         # A file that is no world needs no places either.

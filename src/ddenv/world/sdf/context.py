@@ -131,6 +131,11 @@ class Context:
 def sdf_root(text: bytes, path: Path) -> Element:
     """The `<sdf>` element of a file of a supported version. Raises UserError."""
     root = parse(text, path)
+    macro = next(filter(is_xacro, root.iter()), None) if b"xacro" in text else None
+    if macro is not None:
+        raise refuse_xacro(macro, "SDF", "new.sdf")
+    if root.tag == "robot":
+        raise complain(root, f"is a robot in URDF, and no world; {how_to_include(path)}")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
     given = (root.get("version") or "").strip()
@@ -138,6 +143,22 @@ def sdf_root(text: bytes, path: Path) -> Element:
         said = f"version '{given[:20]}' is not supported" if given else "has no version attribute"
         raise complain(root, f"{said}; use SDF {VERSIONS[0]} to {VERSIONS[-1]}")
     return root
+
+
+def how_to_include(path: Path) -> str:
+    """How a world gets the model that is in a file, as the end of a sentence."""
+    return f"name it in one: <include><uri>{path.absolute().as_uri()}</uri></include>"
+
+
+def is_xacro(element: Element) -> bool:
+    """Whether an element is one of xacro's, whose file says with `xmlns` what the prefix means, or uses the usual one."""
+    return "xacro}" in element.tag or element.tag.startswith("xacro:")
+
+
+def refuse_xacro(element: Element, expected: str, file: str) -> UserError:
+    """The error for macros. They hold Python, which only the user can trust."""
+    advice = f"run 'xacro FILE > {file}' and name that file ('pip install xacro' brings the command)"
+    return complain(element, f"is xacro, not {expected}; {advice}")
 
 
 def version(element: Element) -> tuple[int, int]:

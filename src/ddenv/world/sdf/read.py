@@ -20,7 +20,7 @@ from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
-from ddenv.world.sdf.context import Context, note_unread, sdf_root
+from ddenv.world.sdf.context import Context, how_to_include, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.inside import has_includes, opened, with_copies
 from ddenv.world.sdf.urdf import root_of, without_mass
@@ -85,7 +85,8 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     worlds = root.findall("world")
     if len(worlds) != 1:
         found = "no <world>" if not worlds else f"{len(worlds)} <world> elements"
-        raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}")
+        instead = f"; to use its model in a world, {how_to_include(path)}" if root.find("model") is not None else ""
+        raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}{instead}")
     world = worlds[0]
     for tag, message in REFUSED.items():
         refused = world.find(tag)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ddenv.schemas import nearest
 from ddenv.world.model import Model
-from ddenv.world.sdf.context import VERSIONS, Context, sdf_root
+from ddenv.world.sdf.context import VERSIONS, Context, is_xacro, refuse_xacro, sdf_root
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse, text_of
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
@@ -28,8 +28,8 @@ ROOT = "robot"
 def to_sdf(robot: Element, context: Context) -> Element:
     """The `<sdf>` for a URDF `<robot>`, its root link first. Raises UserError."""
     for each in robot.iter():
-        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
-            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
+        if is_xacro(each) or any("${" in text or "$(" in text for text in each.attrib.values()):
+            raise refuse_xacro(each, "URDF", "robot.urdf")
     # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
     links = {name_of(link): link for link in robot.findall("link")}
