@@ -239,6 +239,7 @@ class World:
     everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
     `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
     that go when several models are gone. `found` are the other files that were read from disk, `absent` the URIs without one.
+    `guessed` has (model, URI) where a shape of the model is a guess.
     """
 
     path: Path
@@ -254,6 +255,7 @@ class World:
     shared: tuple[Shared, ...] = ()
     found: tuple[Found, ...] = field(default=(), repr=False, compare=False)
     absent: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    guessed: tuple[tuple[str, str], ...] = ()
 
     def model(self, name: str) -> Model:
         for model in self.models:

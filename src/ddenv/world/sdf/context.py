@@ -76,7 +76,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `files` the parsed files.
+    lists, `files` the parsed files, `guessed` what has a guessed shape: the model, and the URI.
     """
 
     resources: Resources
@@ -88,6 +88,7 @@ class Context:
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
+    guessed: list[tuple[str, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)

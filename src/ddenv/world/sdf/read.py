@@ -112,6 +112,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         resources=context.resources.taken,
         found=tuple(context.resources.found.values()),
         absent=context.resources.absent(),
+        guessed=tuple(context.guessed),
     )
     return _opened(whole, root, scope, context) if context.reading.inside else whole
 
