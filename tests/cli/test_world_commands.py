@@ -7,9 +7,10 @@ import pytest
 
 from ddenv.cli.world import world_lines as lines
 from ddenv.cli.world import world_report as report
+from ddenv.errors import UserError
 from ddenv.text import width
 from ddenv.world.sdf.read import parse_world, read_world
-from tests.command import ddenv
+from tests.command import ddenv, in_process
 from tests.conftest import DATA, ROOT
 
 WORLD = b"""<sdf version='1.6'><world name='hall'>
@@ -168,3 +169,78 @@ def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, command)
     assert checked.stdout.splitlines()[-1].startswith("falls starts 0.80 m inside leans")
     refused = command("world", "settle", path, "-o", path)
     assert refused.returncode == 2 and "is the world itself; choose another file" in refused.stderr
+
+
+def test_it_is_said_where_each_file_was_found_and_how_to_get_those_that_were_not(tmp_path, monkeypatch):
+    def include(uri):
+        return f"<include><uri>{uri}</uri></include>"
+
+    for folder in ("worlds", "models/crate", "gz/barrel"):
+        (tmp_path / folder).mkdir(parents=True)
+    for name in ("models/crate", "gz/barrel"):
+        (tmp_path / name / "model.sdf").write_text(f"<sdf version='1.6'>{box(name[-3:])}</sdf>")
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", str(tmp_path / "gz"))
+    tree = "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Oak%20tree"
+    text = f"""<sdf version='1.6'><world name='w'>{include("model://crate")}{include("model://barrel")}
+    <model name='tree'><static>1</static><link name='l'><visual name='v'><geometry>
+    <mesh><uri>{tree}/2/files/meshes/a.dae</uri></mesh></geometry></visual></link></model></world></sdf>"""
+    world = parse_world(text.encode(), tmp_path / "worlds" / "w.sdf")
+    told = lines(world)
+    assert f"   1 in models beside worlds, {tmp_path / 'models'}: model://crate" in told
+    assert f"   1 in GZ_SIM_RESOURCE_PATH, {tmp_path / 'gz'}: model://barrel" in told
+    assert f"--fetch downloads this model from Fuel, as does gz fuel download -u {tree}/2" in "\n".join(told)
+    assert report(world)["files"][1] == {
+        "uri": "model://barrel",
+        "path": str(tmp_path / "gz" / "barrel" / "model.sdf"),
+        "from": "GZ_SIM_RESOURCE_PATH",
+    }
+    assert report(world)["absent"] == [f"{tree}/2/files/meshes/a.dae"]
+
+
+NOT_YET = {
+    "a.sdf": (
+        "<sdf version='1.6'><model name='m'><link name='l'/></model></sdf>",
+        "expected one <world> inside <sdf>, found no <world>; to use its model in a world, name it in one: "
+        "<include><uri>file://{file}</uri></include>",
+    ),
+    "b.urdf": (
+        "<robot name='r'><link name='l'/></robot>",
+        "is a robot in URDF, and no world; name it in one: <include><uri>file://{file}</uri></include>",
+    ),
+    "c.world.xacro": (
+        "<sdf version='1.6' xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:arg name='a'/><world name='w'/></sdf>",
+        "is xacro, not SDF; run 'xacro FILE > new.sdf' and name that file ('pip install xacro' brings the command)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NOT_YET)
+def test_what_is_no_world_yet_says_how_it_becomes_one(tmp_path, monkeypatch, capsys, name):
+    text, advice = NOT_YET[name]
+    file = tmp_path / name
+    file.write_text(text)
+    for words in (("world", "check"), ("run",)):
+        said = in_process(monkeypatch, capsys, *words, file)
+        assert said.returncode == 2
+        (line,) = said.stderr.splitlines()
+        assert line.endswith(advice.format(file=file))
+
+
+def test_a_model_is_included_as_the_refusal_says(tmp_path):
+    (tmp_path / "a b.sdf").write_text(f"<sdf version='1.6'>{box('crate')}</sdf>")
+    with pytest.raises(UserError) as refused:
+        read_world(tmp_path / "a b.sdf")
+    include = str(refused.value).rpartition("name it in one: ")[2]
+    assert [model.name for model in world_of(tmp_path, include).models] == ["crate"]
+
+
+def test_notes_of_one_kind_are_one_line_with_their_number(tmp_path):
+    missing = "<visual name='v'><geometry><mesh><uri>model://{}</uri></mesh></geometry></visual>"
+    visuals = [missing.format(name).replace("'v'", f"'v{at}'") for at, name in enumerate(["a", "b", "c", "a"])]
+    model = f"<model name='m'><static>1</static><link name='l'>{''.join(visuals)}</link></model>"
+    told = lines(world_of(tmp_path, model, more="<plugin name='p' filename='f'/>"))
+    (drawn,) = (line for line in told if "is not drawn" in line)
+    assert drawn.lstrip().startswith("2  ignored: <mesh> 'model://a' is not drawn: ")
+    assert drawn.endswith("; and 2 others like it (4 times)")
+    assert "   1  ignored: <plugin> plugins are not run" in told
+    assert told[-1].endswith("; 5 ignored")

@@ -6,7 +6,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
-from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, scenario_named, with_options
 from ddenv.world.load import load_scenario
 from ddenv.world.model import Cylinder, Mesh
 from tests.runs.test_export import TETRAHEDRON
@@ -102,3 +102,21 @@ def test_a_wrong_stand_in_in_a_scenario_is_told_with_its_uri(world, tmp_path):
     reading = scenario.reading.model_copy(update={"stand_ins": {"model://barrel": "tube:1"}})
     with pytest.raises(UserError, match="stand-in for 'model://barrel': 'tube:1' is not a stand-in"):
         create_run(with_options(scenario, reading=reading), tmp_path / "run.ddenv")
+
+
+def test_a_guess_is_left_out_where_the_robot_starts(tmp_path):
+    def include(name, x):
+        return f"<include><uri>model://{name}</uri><name>{name}</name><pose>{x} 0 0 0 0 0</pose></include>"
+
+    path, said = tmp_path / "world.sdf", []
+    models = include("hall", 0) + include("crate", 4) + include("wagon", 0.3)
+    path.write_text(f"<sdf version='1.9'><world name='w'>{GROUND}{models}</world></sdf>")
+    given = {"stand_in": ["auto"], "spawn": (0, 0, 0.2, 0), "goal": (9, 0), "world": None}
+    scenario = scenario_named(str(path), given, said.append)
+    world, _ = load_parts(scenario)
+    assert [model.name for model in world.models] == ["ground", "crate"]
+    assert said == ["the robot would start inside a guess, so this is left out: model://hall, model://wagon"]
+    run = tmp_path / "run.ddenv"
+    create_run(scenario, run)
+    with RunFile(run) as file:
+        assert read_parts(file)[1].elements() == ("crate",)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from ddenv.world.files.resources import ENVIRONMENT, PACKAGES, PREFIXES
+from ddenv.world.files.fuel import CACHES
+from ddenv.world.files.roots import VARIABLES
 from tests.command import in_process
 
 pytest.register_assert_rewrite("tests.world.hostile", "tests.world.soundness")
@@ -11,7 +12,7 @@ pytest.register_assert_rewrite("tests.world.hostile", "tests.world.soundness")
 @pytest.fixture
 def no_gazebo(monkeypatch, tmp_path):
     """A machine on which nothing says where models are."""
-    for variable in (*ENVIRONMENT, PACKAGES, PREFIXES, "GZ_FUEL_CACHE_PATH"):
+    for variable in (*VARIABLES, *CACHES):
         monkeypatch.delenv(variable, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
 

@@ -90,6 +90,12 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
             b"<sdf version='1.9'><world name='a'/><world name='b'/></sdf>",
         ]
     },
+    "macros of xacro": {
+        r":1: /sdf/.*: is xacro, not SDF; run 'xacro FILE > new.sdf'": [
+            b"<sdf version='1.9' xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:arg name='a'/><world name='w'/></sdf>",
+            b"<sdf version='1.9' xmlns:x='http://www.ros.org/wiki/xacro'><world name='w'><x:include filename='a'/></world></sdf>",
+        ]
+    },
 }
 
 

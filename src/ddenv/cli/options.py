@@ -179,6 +179,24 @@ reading_options = together(
 )
 
 
+def _fetching(_: Any, __: Any, is_set: bool) -> Any:
+    """What downloads the files that a world lacks, with a bar on the terminal; None if the user did not ask for it."""
+    if not is_set:
+        return None
+    from ddenv.cli.fetch import fetch_with_bar
+
+    return fetch_with_bar
+
+
+# For commands that read a given world. Its value is a `Fetch`, or None.
+fetch_option = click.option(
+    "--fetch",
+    is_flag=True,
+    callback=_fetching,
+    help="Download models that are missing and that the world names by their address in Gazebo Fuel, into Gazebo's own cache.",
+)
+
+
 def given_reading(reading: Mapping[str, Any]) -> Mapping[str, Any]:
     """The options for reading worlds, checked before a screen opens. Raises UserError."""
     if any(reading.values()):

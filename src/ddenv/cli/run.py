@@ -28,6 +28,7 @@ LONGEST_URI = 80
 @click.argument("scenario", shell_complete=options.scenarios)
 @options.scenario_options
 @options.reading_options
+@options.fetch_option
 @options.setting_options()
 @click.option(
     "--exact",

@@ -29,6 +29,7 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @options.scenario_options
 @options.setting_options(only=("timeout",))
 @options.reading_options
+@options.fetch_option
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
 @click.option(

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Whole, given_reading, reading_options, runs, runs_and_scenarios
+from ddenv.cli.options import Whole, fetch_option, given_reading, reading_options, runs, runs_and_scenarios
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named
+
+if TYPE_CHECKING:
+    from ddenv.runs.subject import Fetch
 
 PORT = 8000
 
@@ -18,6 +21,7 @@ PORT = 8000
 @click.command("open")
 @click.argument("run", metavar="RUN_OR_FILE", type=click.Path(), shell_complete=runs_and_scenarios)
 @reading_options
+@fetch_option
 @click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
 @click.option("--lines", is_flag=True, help="Plain lines that are never redrawn, for screen readers: type help.")
 def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
@@ -25,6 +29,7 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
 
     'ddenv RUN_OR_FILE' does the same.
     """
+    from ddenv.runs.subject import reading_of, world_of
     from ddenv.workbench.launch import run_workbench
     from ddenv.world.access import is_folder
 
@@ -47,7 +52,12 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
         raise UserError(f"{run}: no such file")
     if watch or lines:
         raise UserError(f"{'--watch' if watch else '--lines'}: only for runs")
-    return run_workbench(None, reading=given_reading(reading), file=path.absolute())
+    fetch: Fetch | None = reading.pop("fetch")
+    given = given_reading(reading)
+    if fetch is not None:
+        world, own = world_of(path)
+        fetch(world, reading_of(own, **given))
+    return run_workbench(None, reading=given, file=path.absolute())
 
 
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 from collections import Counter
@@ -13,20 +14,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Numbers, reading_options, remembered_option, scenarios, together
+from ddenv.cli.options import Numbers, fetch_option, reading_options, remembered_option, scenarios, together
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
-from ddenv.runs.folder import find_run, named_file
+from ddenv.runs.folder import find_run
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_directives
 
 if TYPE_CHECKING:
+    from ddenv.runs.subject import Fetch
     from ddenv.world.model import Model, Note, World
     from ddenv.world.scenario import Reading
 
 # A line names so many models.
 MOST_NAMES = 5
-LONGEST_NAME = 34
+LONGEST_NAME, LONGEST_URI = 34, 80
 HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes")
 TO_THE_RIGHT = ("links", "yaw")
 # The columns that are left out first where not all fit; the width where all do.
@@ -36,6 +38,7 @@ SPARE, WIDEST = ("links", "shapes", "yaw"), 10_000
 world_argument = together(
     click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
     reading_options,
+    fetch_option,
     remembered_option,
 )
 
@@ -47,16 +50,15 @@ def world_command() -> None:
 
 def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
-    from ddenv.runs.subject import reading_of, with_remembered
-    from ddenv.world.load import load_scenario
-    from ddenv.world.scenario import PLAIN
+    from ddenv.runs.subject import reading_of, with_remembered, world_of
     from ddenv.world.sdf.read import read_world
 
-    kind, path = named_file(str(file)) or ("world", file)
-    scenario = load_scenario(path) if kind == "scenario" else None
-    file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
+    file, own = world_of(file)
+    fetch: Fetch | None = options.pop("fetch")
     reads_remembered = options.pop("remembered")
     read_as = reading_of(own, **options)
+    if fetch is not None:
+        fetch(file, read_as)
     if reads_remembered:
         read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as
@@ -108,17 +110,19 @@ def world_report(world: World) -> dict[str, Any]:
         "world": world.name,
         "gravity": list(world.gravity),
         "models": models,
-        "notes": _notes(world, ""),
+        "notes": _notes(world, *({note.model for note in world.notes} - {model.name for model in world.models})),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
+        "files": [{"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found],
+        "absent": list(world.absent),
     }
 
 
-def _notes(world: World, model: str) -> list[dict[str, str]]:
+def _notes(world: World, *models: str) -> list[dict[str, str]]:
     return [
         {"kind": note.kind, "what": note.what, "why": note.why, "detail": note.detail, "place": note.place}
         for note in world.notes
-        if note.model == model
+        if note.model in models
     ]
 
 
@@ -142,13 +146,17 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     from ddenv.world.placement import note_inside, note_unseen
     from ddenv.world.sdf.official import refused
 
-    numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
+    by_kind: dict[str, list[Note]] = {}
+    for note in world.notes:
+        by_kind.setdefault(_kind_of(note), []).append(note)
     by_model: dict[str, dict[str, None]] = {}
-    for note in sorted(world.notes, key=lambda note: numbers[_text(note)]):
-        detail = printable(note.detail.removesuffix(" away"))
-        words = f"{numbers[_text(note)]} ({detail})" if detail else str(numbers[_text(note)])
-        by_model.setdefault(note.model, {})[words] = None
-    notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
+    notes: list[str] = []
+    for number, alike in enumerate(by_kind.values(), start=1):
+        notes += wrapped(_text(alike), columns, f"{number:4}  ")
+        for note in alike:
+            detail = printable(note.detail.removesuffix(" away"))
+            words = f"{number} ({detail})" if detail else str(number)
+            by_model.setdefault(note.model, {})[words] = None
     below = ["", "notes", *notes] if notes else []
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
@@ -166,13 +174,42 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
         "",
         *_table(world, by_model, columns),
         *below,
+        *_files(world, columns),
         "",
         *(line for words in (_totals(world), *wrong) for line in wrapped(words, columns)),
     ]
 
 
-def _text(note: Note) -> str:
-    return printable(f"{note.kind}: {note.what} {note.why}")
+def _files(world: World, columns: int | None) -> list[str]:
+    """Where the world's other files were found, and which were not."""
+    from ddenv.world.files.resources import how_to_fetch
+
+    found: dict[str, dict[str, None]] = {}
+    for file in world.found:
+        named = f"{file.source}, {file.root}" if file.source else str(file.root)
+        found.setdefault(named, {})[file.uri] = None
+    lines = [f"{len(uris)} in {where}: {_named(uris)}" for where, uris in found.items()]
+    if world.absent:
+        lines.append(f"{len(world.absent)} not found: {_named(world.absent)}{how_to_fetch(world.absent)}")
+    titled = ["", "files"] if lines else []
+    return [*titled, *(line for each in lines for line in wrapped(printable(each), columns, "   "))]
+
+
+def _named(uris: Iterable[str]) -> str:
+    return first_of([shortened(uri, LONGEST_URI) for uri in uris], MOST_NAMES)
+
+
+def _kind_of(note: Note) -> str:
+    """What notes have in common that differ only in the names that they quote."""
+    return re.sub(r"'[^']*'", "''", f"{note.kind}: {note.what} {note.why}")
+
+
+def _text(alike: list[Note]) -> str:
+    """The first of notes of one kind, and how many there are."""
+    first, *others = dict.fromkeys(f"{note.kind}: {note.what} {note.why}" for note in alike)
+    more = f"; and {count(len(others), 'other')} like it" if others else ""
+    times = f" ({len(alike)} times)" if len(alike) > 1 else ""
+    return printable(f"{first}{more}{times}")
 
 
 def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None) -> list[str]:

@@ -14,7 +14,7 @@ import platformdirs
 
 from ddenv.errors import UserError
 from ddenv.text import plain
-from ddenv.world.access import WORLD_ENDINGS, is_world
+from ddenv.world.access import WORLD_ENDINGS, is_read_as_world, is_world
 
 SUFFIX = ".ddenv"
 SCENARIO_FILES = (".yaml", ".yml")
@@ -46,7 +46,9 @@ def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
     A run comes before a bundled scenario, and every file before both.
     """
     run = find_run(name)
-    if (run.is_file() and not is_world(run) and run.suffix.lower() not in SCENARIO_FILES) or name.endswith(SUFFIX):
+    if (run.is_file() and not is_read_as_world(run) and run.suffix.lower() not in SCENARIO_FILES) or name.endswith(
+        SUFFIX
+    ):
         return "run", run
     return named_file(name)
 
@@ -56,7 +58,7 @@ def named_file(name: str) -> tuple[Literal["scenario", "world"], Path] | None:
     from ddenv.world.load import SCENARIOS, bundled_names
 
     path = Path(name)
-    if is_world(path):
+    if is_read_as_world(path):
         return "world", path
     if path.suffix.lower() in SCENARIO_FILES:
         return "scenario", path

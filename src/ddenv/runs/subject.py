@@ -14,23 +14,25 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runs.folder import named
+from ddenv.runs.folder import named, named_file
 from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
 from ddenv.text import first_of, shortened
-from ddenv.world.access import MissingFiles, is_world, read_bytes, resolved, write_file
+from ddenv.world.access import MissingFiles, is_read_as_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
 from ddenv.world.model import Model, World
-from ddenv.world.placement import check_spawn
+from ddenv.world.placement import at_start, check_spawn
 from ddenv.world.scenario import PLAIN, Reading, Scenario
-from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_world
-from ddenv.world.sdf.standin import parse_option
+from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_model, read_world
+from ddenv.world.sdf.standin import AUTO, NONE, parse_option
 
 Announce = Callable[[str], None]
+# Downloads what a world lacks, which is read in this way.
+Fetch = Callable[[Path, Reading], None]
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
@@ -65,7 +67,7 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
         return Subject(scenario, *load_parts(scenario))
     if has_options(given):
         raise UserError(
-            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore and --inside are only for scenarios; "
+            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore, --inside and --fetch are only for scenarios; "
             "a run keeps its own"
         )
     with RunFile(path) as file:
@@ -87,9 +89,10 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     """
     others = dict(given)
     reads_remembered = others.pop("remembered", False)
+    fetch: Fetch | None = others.pop("fetch", None)
     reading = {option: others.pop(option) for option in READING if option in others}
     spawn, goal = given["spawn"], given["goal"]
-    if not is_world(Path(name)):
+    if not is_read_as_world(Path(name)):
         scenario = load_scenario(find_scenario(name))
     elif spawn is None or goal is None:
         # A file that is no world needs no places either.
@@ -102,9 +105,21 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
         scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
-    if not reads_remembered:
-        return scenario
-    return scenario.model_copy(update={"reading": with_remembered(scenario.world, read_as, announce)})
+    if fetch is not None:
+        fetch(scenario.world, read_as)
+    if reads_remembered:
+        read_as = with_remembered(scenario.world, read_as, announce)
+        scenario = scenario.model_copy(update={"reading": read_as})
+    return without_guesses_at_start(scenario, announce)
+
+
+def world_of(path: Path) -> tuple[Path, Reading]:
+    """The world that a file is, or that a scenario's file or name stands for; and how the scenario reads it. Raises UserError."""
+    kind, path = named_file(str(path)) or ("world", path)
+    if kind == "world":
+        return path, PLAIN
+    scenario = load_scenario(path)
+    return scenario.world, scenario.reading
 
 
 def reading_of(
@@ -148,6 +163,30 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
         names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED)
         announce(f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out")
     return read_as if found else reading
+
+
+def without_guesses_at_start(scenario: Scenario, announce: Announce | None = None) -> Scenario:
+    """`scenario`, in which what is missing is left out where a guess of its shape would be around the robot; it says what that is.
+
+    Raises UserError.
+    """
+    reading, left_out = scenario.reading, list[str]()
+    if AUTO not in reading.stand_ins.values():
+        return scenario
+    robot = read_model(scenario.robot.model, reading)
+    while True:
+        world = read_world(scenario.world, reading)
+        around = at_start(world, robot, scenario.robot.spawn)
+        uris = [uri for name, uri in world.guessed if around is not None and name in (around.name, around.inside)]
+        if not uris:
+            break
+        left_out += uris
+        stand_ins = {**reading.stand_ins, **dict.fromkeys(uris, NONE)}
+        reading = reading.model_copy(update={"stand_ins": stand_ins})
+    if left_out and announce is not None:
+        names = first_of([shortened(uri, LONGEST) for uri in left_out], NAMED)
+        announce(f"the robot would start inside a guess, so this is left out: {names}")
+    return scenario.model_copy(update={"reading": reading})
 
 
 def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:

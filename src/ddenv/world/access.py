@@ -15,11 +15,18 @@ MAX_BYTES = 100_000_000  # of a file that the user names
 # How the names of worlds end: SDF, and Drake's model directives.
 SDF_ENDINGS, DIRECTIVES_ENDINGS = (".sdf", ".world"), (".dmd.yaml", ".dmd.yml")
 WORLD_ENDINGS = (*SDF_ENDINGS, *DIRECTIVES_ENDINGS)
+# What users take for worlds: macros that make one, and robots.
+OTHER_ENDINGS = (".xacro", ".urdf")
 
 
 def is_world(path: Path) -> bool:
     """Whether the name of `path` is that of a world."""
     return path.name.lower().endswith(WORLD_ENDINGS)
+
+
+def is_read_as_world(path: Path) -> bool:
+    """Whether a file is read as a world, by its name: one that cannot be a world as it is says then how it becomes one."""
+    return path.name.lower().endswith((*WORLD_ENDINGS, *OTHER_ENDINGS))
 
 
 def is_directives(path: Path) -> bool:
@@ -105,6 +112,15 @@ def is_folder(path: Path) -> bool:
         return stat.S_ISDIR(path.stat().st_mode)
     except (OSError, ValueError):
         return False
+
+
+def folders_of(folder: Path) -> list[str]:
+    """The sorted names of the folders in `folder`; none if it is not accessible."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries if entry.is_dir())
+    except (OSError, ValueError):
+        return []
 
 
 def is_file(path: Path) -> bool:

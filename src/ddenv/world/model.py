@@ -213,6 +213,16 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True)
+class Found:
+    """A file that a URI refers to, in the searched folder `root`, which `source` names, such as an environment variable."""
+
+    uri: str
+    path: Path
+    source: str
+    root: Path
+
+
+@dataclass(frozen=True, slots=True)
 class Shared:
     """A byte range (start, end) of a world's text that goes when all of `models` are gone, and what is written `instead`."""
 
@@ -228,7 +238,8 @@ class World:
     `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
     everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
     `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
-    that go when several models are gone.
+    that go when several models are gone. `found` are the other files that were read from disk, `absent` the URIs without one.
+    `guessed` has (model, URI) where a shape of the model is a guess.
     """
 
     path: Path
@@ -242,6 +253,9 @@ class World:
     resources: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     ties: tuple[tuple[str, str], ...] = ()
     shared: tuple[Shared, ...] = ()
+    found: tuple[Found, ...] = field(default=(), repr=False, compare=False)
+    absent: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    guessed: tuple[tuple[str, str], ...] = ()
 
     def model(self, name: str) -> Model:
         for model in self.models:

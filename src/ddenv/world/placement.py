@@ -49,8 +49,7 @@ def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn 
     That is on a grid of `STEP`; None if there is none within `FAR`.
     Raises UserError for a robot without collision shapes.
     """
-    shapes = [(model, one) for model in world.models for one in model.collisions]
-    boxes = stacked(filled_bounds(one) for _, one in shapes)
+    shapes, boxes = _shapes(world)
     if (found := _obstacle(shapes, boxes, robot, spawn)) is None:
         return None
     model, depth, shape = found
@@ -67,6 +66,18 @@ def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn 
     # The hull of a hollow mesh fills space that looks free.
     what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
     return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free
+
+
+def at_start(world: World, robot: Model, spawn: Spawn) -> Model | None:
+    """The first model that the robot at `spawn` stands inside of. Raises UserError for a robot without collision shapes."""
+    found = _obstacle(*_shapes(world), robot, spawn)
+    return None if found is None else found[0]
+
+
+def _shapes(world: World) -> tuple[list[tuple[Model, Collision]], Bounds]:
+    """All shapes, one model after another, and the boxes around them."""
+    shapes = [(model, one) for model in world.models for one in model.collisions]
+    return shapes, stacked(filled_bounds(one) for _, one in shapes)
 
 
 def _obstacle(

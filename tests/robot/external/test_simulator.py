@@ -54,8 +54,8 @@ def test_the_command_gets_the_world_the_seed_and_the_scenario(simulator_of, tmp_
     assert "far_box" not in text and "deck" in text and "ground_plane" in text
     assert (reported["DDENV_WORLD"], reported["DDENV_SEED"], reported["DDENV_TIMEOUT"]) == (world, "5", "5")
     assert (reported["DDENV_SPAWN"], reported["DDENV_GOAL"]) == ("0 0 0.45 0", "4 0 0.5")
-    assert reported["GZ_SIM_RESOURCE_PATH"] == f"{DATA}{os.pathsep}/models"
-    assert reported["GAZEBO_MODEL_PATH"] == str(DATA)
+    assert reported["GZ_SIM_RESOURCE_PATH"] == os.pathsep.join([str(DATA), str(DATA / "models"), "/models"])
+    assert reported["GAZEBO_MODEL_PATH"] == os.pathsep.join([str(DATA), str(DATA / "models")])
 
 
 def test_the_scenario_goes_along_in_the_reduced_world(simulator_of, tmp_path):

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.access import Missing, Unusable, read
-from ddenv.world.files.resources import find, model_file, model_named, search_folders
+from ddenv.world.files.resources import Resources, find, fuel_model, model_file, model_named
+from ddenv.world.files.roots import search_roots
 from tests.tiers import examples
 
 pytestmark = pytest.mark.usefixtures("no_gazebo")
@@ -51,8 +52,8 @@ def test_folders_in_order_without_doubles(tmp_path, monkeypatch):
     monkeypatch.setenv("SDF_PATH", f"{folders['sdf']}{os.pathsep}{folders['gz']}/../gz")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(folders["ros1"]))
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'ros2'}{os.pathsep}{tmp_path / 'gone'}")
-    found = search_folders([folders["own"], tmp_path / "none"], folders["world"])
-    assert found == tuple(folders.values())
+    found = search_roots([folders["own"], tmp_path / "none"], folders["world"])
+    assert tuple(found) == tuple(folders.values())
 
 
 def test_a_package_of_ros_is_found_in_its_share_folder_or_by_its_own(tmp_path, monkeypatch):
@@ -60,7 +61,7 @@ def test_a_package_of_ros_is_found_in_its_share_folder_or_by_its_own(tmp_path, m
     old = put(tmp_path / "src" / "lamp" / "lamp.dae")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "ros2"))
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src" / "lamp"))
-    folders = search_folders([], tmp_path)
+    folders = search_roots([], tmp_path)
     for scheme in ("package", "model"):
         assert find(f"{scheme}://cart/meshes/cart.dae", tmp_path, folders) == new
         assert find(f"{scheme}://lamp/lamp.dae", tmp_path, folders) == old
@@ -155,7 +156,8 @@ def test_unusable(models, uri, reason):
         ("/none/x.dae", "there is no such file"),
         ("model://box/model.sdf/x", "looked in /"),
         ("https://example.org/box.dae", "is not downloaded"),
-        ("https://fuel.gazebosim.org/1.0/o/worlds/box", "is not downloaded"),
+        ("https://fuel.gazebosim.org/1.0/o/worlds/box", "Fuel cache"),
+        ("https://fuel.gazebosim.org/1.0/o/things/box", "is not downloaded"),
         ("https://fuel.gazebosim.org/1.0/o/models/none", "Fuel cache"),
     ],
 )
@@ -309,3 +311,59 @@ def test_any_uri_stays_inside_or_is_refused(tmp_path_factory, words):
     else:
         is_absolute = uri.strip().replace("file:", "", 1).startswith(("/", "%2f"))
         assert path.is_relative_to(folder) or is_absolute
+
+
+def test_models_that_go_with_a_world_are_found_by_themselves(tmp_path):
+    beside = put(tmp_path / "pkg" / "models" / "crate" / "model.sdf")
+    inside = put(tmp_path / "pkg" / "worlds" / "models" / "lamp" / "model.sdf")
+    for world in (tmp_path / "pkg" / "worlds", tmp_path / "pkg" / "worlds" / "small" / "day"):
+        world.mkdir(parents=True, exist_ok=True)
+        roots = search_roots([], world)
+        assert find("model://crate/model.sdf", world, roots) == beside
+        assert roots[tmp_path / "pkg" / "models"] == "models beside worlds"
+    roots = search_roots([], tmp_path / "pkg" / "worlds")
+    assert find("model://lamp/model.sdf", tmp_path, roots) == inside
+    with pytest.raises(Missing):
+        find("model://crate", tmp_path, search_roots([], tmp_path / "pkg" / "maps"))
+
+
+def test_files_of_worlds_in_fuel_and_addresses_without_the_number_of_the_interface(tmp_path):
+    host = tmp_path / "home" / ".ignition" / "fuel" / "fuel.ignitionrobotics.org" / "some one"
+    mesh = put(host / "worlds" / "big hall" / "3" / "meshes" / "Hall.dae")
+    put(host / "models" / "box" / "1" / "model.sdf")
+    uri = "https://fuel.gazebosim.org/1.0/Some%20One/worlds/Big%20Hall/tip/files/meshes/Hall.dae"
+    assert find(uri, tmp_path, {}) == mesh
+    assert find("http://fuel.gazebosim.org//Some One/models/Box/", tmp_path, {}) == host / "models" / "box" / "1"
+
+
+def test_a_link_that_leads_out_of_the_cache_is_not_followed(tmp_path):
+    secret = put(tmp_path / "secret.sdf", "<sdf version='1.6'/>")
+    cache = tmp_path / "home" / ".gz" / "fuel" / "fuel.gazebosim.org" / "o" / "models" / "box" / "1"
+    cache.mkdir(parents=True)
+    (cache / "model.sdf").symlink_to(secret)
+    (cache / "own.sdf").symlink_to(put(cache / "real.sdf"))
+    (cache.parent / "2").symlink_to(tmp_path)
+    disk = Resources({}, {})
+    url = "https://fuel.gazebosim.org/1.0/o/models/box/1"
+    for uri in (url, "https://fuel.gazebosim.org/1.0/o/models/box/files/secret.sdf"):
+        with pytest.raises(Unusable, match="is a link that leads out of Fuel's cache"):
+            disk.sdf(uri, tmp_path)
+    assert disk.sdf(f"{url}/files/own.sdf", tmp_path)[1] == b"x"
+
+
+@pytest.mark.parametrize(
+    ("uri", "url"),
+    [
+        (" https://fuel.gazebosim.org/1.0/Open%20R/models/Oak tree/2/files/a.dae", "Open%20R/models/Oak%20tree/2"),
+        ("http://fuel.ignitionrobotics.org/1.0/o/worlds/w/tip", "o/worlds/w"),
+        ("https://FUEL.gazebosim.org/o/models/it's;rm", "o/models/it%27s%3Brm"),
+        ("https://fuel.gazebosim.org/1.0/../models/x", None),
+        ("https://fuel.gazebosim.org/1.0/o/models/%2e%2e", None),
+        ("https://fuel.gazebosim.org/1.0/o/models", None),
+        ("https://fuel.gazebosim.org.evil.org/1.0/o/models/x", None),
+        ("model://o/models/x", None),
+    ],
+)
+def test_the_model_in_fuel_that_a_uri_belongs_to(uri, url):
+    model = fuel_model(uri)
+    assert (model and model.url) == (url and f"https://fuel.gazebosim.org/1.0/{url}")

@@ -6,7 +6,8 @@ import pytest
 
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.meshes import pack
-from ddenv.world.files.resources import Resources, search_folders
+from ddenv.world.files.resources import Resources
+from ddenv.world.files.roots import search_roots
 
 CUBE = "\n".join(
     [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
@@ -26,7 +27,7 @@ def world(tmp_path, no_gazebo):
 
 
 def test_stored_gives_the_same_without_the_files(world):
-    disk = Resources({}, search_folders((), world))
+    disk = Resources({}, search_roots((), world))
     ways = [
         {"convex": convex, "center": center, "submesh": name}
         for convex in (False, True)
@@ -70,7 +71,7 @@ def damaged(packed: bytes):
 
 
 def test_damaged_bytes(world):
-    disk = Resources({}, search_folders((), world))
+    disk = Resources({}, search_roots((), world))
     disk.mesh("cube.obj", world, convex=True)
     disk.sdf("model://box", world)
     keys = {json.loads(key)[0]: key for key in disk.taken}
@@ -83,7 +84,7 @@ def test_damaged_bytes(world):
 
 
 def test_files_of_one_name_are_told_apart_by_content(world):
-    disk = Resources({}, search_folders((), world))
+    disk = Resources({}, search_roots((), world))
     first = disk.mesh("cube.obj", world, convex=True)
     (world / "box" / "cube.obj").write_text(CUBE.replace("2", "3"))
     other = disk.mesh("cube.obj", world / "box", convex=True)

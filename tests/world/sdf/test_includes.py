@@ -278,3 +278,13 @@ def test_links_collide_with_their_own_model_as_they_say(read):
 def test_a_missing_file_is_told_before_what_follows_from_it(read):
     with pytest.raises(UserError, match="'model://table' was not found"):
         read(included() + "<model name='cup'><pose relative_to='table'/><link name='l'/></model>")
+
+
+def test_a_model_of_which_all_is_left_out_is_left_out(read):
+    lamp = "<model name='lamp'><static>1</static><link name='l'/></model>"
+    wrapped = f"<model name='wall'>{included()}<model name='inner'>{included()}</model></model>"
+    world = read(wrapped + f"<model name='half'>{included()}{lamp}</model>", stand_ins={"model://table": "none"})
+    assert [model.name for model in world.models] == ["half"]
+    assert "all that it includes is left out" in [note.why for note in world.notes if note.model == "wall"]
+    with pytest.raises(UserError, match="has no <link>"):
+        read("<model name='m'><plugin name='p' filename='f'/></model>")

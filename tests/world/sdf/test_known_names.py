@@ -115,6 +115,18 @@ def test_auto_says_that_it_knows_nothing(read, inside):
     assert "by a guess, box:1,1,1: nothing says how large it is" in note
 
 
+@pytest.mark.parametrize("name", ["FloorB_01", "my_ground_plane", "Terrain%20map"])
+def test_auto_puts_no_box_where_a_floor_would_be(read, name):
+    for text in (included(f"model://{name}"), lost(f"model://{name}/x.dae"), lost(f"model://hall/{name}.dae")):
+        world = read(text, stand_ins={"*": "auto"})
+        assert not any(model.collisions for model in world.models)
+        assert any("is left out: a floor of unknown size is not guessed" in note.why for note in world.notes)
+    seen = "<visual name='v'><geometry><box><size>8 8 0.1</size></box></geometry></visual>"
+    collision, _ = guessed(read(lost(f"model://{name}/x.dae", inside=seen), stand_ins={"*": "auto"}))
+    assert collision.shape == Box((8, 8, 0.1))
+    assert read(lost("model://playground/x.dae"), stand_ins={"*": "auto"}).models[0].collisions
+
+
 def test_auto_leaves_what_is_there(read, tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n")
     world = read(lost("a.obj"), stand_ins={"*": "auto", "a.obj": "auto"})

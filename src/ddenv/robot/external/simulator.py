@@ -26,8 +26,9 @@ from ddenv.robot.external.process import BEGIN, Ended, running, signal_name, wat
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import RECORD_PERIOD, Ends, Progress, RunResult
 from ddenv.text import printable
+from ddenv.world.access import is_folder
 from ddenv.world.command import command_words, filled, has_placeholder, start_folder
-from ddenv.world.files.resources import ENVIRONMENT, PACKAGES
+from ddenv.world.files.roots import PLACES, VARIABLES, around
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario, Whole
@@ -117,8 +118,10 @@ class ExternalSimulator:
         known["DDENV_TIMEOUT"] = f"{self._scenario.failure.timeout:.12g}"
         known["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
         known["DDENV_GOAL"] = _numbers(goal.x, goal.y, goal.tolerance)
-        folders = [self._scenario.world.parent, *self._scenario.reading.model_path]
-        for name in (*ENVIRONMENT, PACKAGES):
+        # The folders that are searched for the world's models without any variable.
+        beside = [folder for folder, _ in around(self._scenario.world.parent) if is_folder(folder)]
+        folders = [*beside, *self._scenario.reading.model_path]
+        for name in (variable for variable in VARIABLES if not PLACES[variable]):
             before = os.environ.get(name)
             known[name] = os.pathsep.join([*map(str, folders), *([before] if before else [])])
         return {**os.environ, **known}

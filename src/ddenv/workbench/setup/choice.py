@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 from ddenv.text import plain
 from ddenv.workbench.setup.missing_files import Missing, read_with_remedies
-from ddenv.world.access import is_world
+from ddenv.world.access import is_read_as_world
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, World
@@ -126,7 +126,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
         with RunFile(path) as run:
             scenario, world, _ = read_parts(run)
         return Choice(path, world, scenario, run=True)
-    bare = is_world(path)
+    bare = is_read_as_world(path)
     settings = scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)) if bare else load_scenario(path)
     world, chosen, missing = read_with_remedies(settings.world, settings.reading, options)
     settings = settings.model_copy(update={"reading": reading_of(settings.reading, **chosen)})

@@ -1,6 +1,6 @@
 """The files that an SDF file refers to: found by URI and read from disk, or taken from what an earlier reading stored.
 
-Nothing is ever downloaded, and no URI leaves the folder it is relative to.
+Reading downloads nothing, and no URI leaves the folder it is relative to.
 """
 
 from __future__ import annotations
@@ -9,16 +9,19 @@ import errno
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ddenv.world.access import Missing, Unusable, is_file, is_folder, read, reason, without_tilde, xml_root
+from ddenv.text import first_of
+from ddenv.world.access import Missing, Unusable, folders_of, is_file, is_folder, read, reason, xml_root
+from ddenv.world.files.fuel import GAZEBO, FuelModel, cached, caches, hosts, in_fuel, newest, refuse_link_out
 from ddenv.world.files.meshes import build, read_parts, unpack
+from ddenv.world.files.roots import absolute, source_of
 from ddenv.world.files.triangles import Part
-from ddenv.world.model import Mesh
+from ddenv.world.model import Found, Mesh
 from ddenv.world.tinyxml import Element
 
 SDF_LIMIT = 50_000_000  # bytes of a file
@@ -29,12 +32,12 @@ MOST_KEPT = 200_000_000
 class Resources:
     """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from disk, if there are `folders`.
 
-    `base` is the folder of the file that contains the URI; `folders` are from `search_folders`. Both methods raise Missing if there
+    `base` is the folder of the file that contains the URI; `folders` are from `search_roots`. Both methods raise Missing if there
     is no such file, and Unusable if it cannot be used, or if its stored bytes are damaged. Equal requests return the same object.
     Failures are kept too: a world may name one broken file a thousand times.
     """
 
-    def __init__(self, taken: Mapping[str, bytes], folders: Sequence[Path] | None = None) -> None:
+    def __init__(self, taken: Mapping[str, bytes], folders: Mapping[Path, str] | None = None) -> None:
         self.taken = dict(taken)
         self._folders = folders
         self._files: dict[str, tuple[Path, bytes]] = {}
@@ -44,13 +47,15 @@ class Resources:
         self._parts_of: dict[Path, list[Part]] = {}
         # All requests so far: the URI, and its base.
         self.asked: dict[tuple[str, Path], None] = {}
+        # Where those are that were read from disk.
+        self.found: dict[tuple[str, Path], Found] = {}
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         """Path and content of an SDF file, given by its own URI or by its model's folder."""
         self.asked[uri, base] = None
         key = json.dumps(["sdf", uri, str(base)])
         if key not in self._files:
-            path, end, text = self._bytes(key, lambda folders: _sdf(uri, base, folders)).partition(b"\0")
+            path, end, text = self._bytes(key, lambda folders: self._sdf(uri, base, folders)).partition(b"\0")
             if not end or not path:
                 raise Unusable("its stored file is damaged")
             self._files[key] = Path(path.decode("utf-8", "surrogateescape")), text
@@ -62,7 +67,7 @@ class Resources:
         way: list[Any] = [submesh, center, convex]
         key = json.dumps(["mesh", uri, str(base), *way])
         if key not in self._meshes:
-            packed = self._bytes(key, lambda folders: build(self._parts(find(uri, base, folders)), *way))
+            packed = self._bytes(key, lambda folders: self._mesh(uri, base, folders, *way))
             self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
         return self._meshes[key]
 
@@ -80,7 +85,7 @@ class Resources:
             if [kind, *names] == ["mesh", uri, folder]:
                 self.taken[json.dumps([kind, new, new_folder, submesh, center, convex])] = content
 
-    def _bytes(self, key: str, ask: Callable[[Sequence[Path]], bytes]) -> bytes:
+    def _bytes(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> bytes:
         if key in self._failed:
             # A new exception each time: an exception raised again would collect a traceback of all its uses.
             raise type(self._failed[key])(str(self._failed[key]))
@@ -94,6 +99,37 @@ class Resources:
                 raise
         return self.taken[key]
 
+    def absent(self) -> tuple[str, ...]:
+        """The URIs for which no file was found so far."""
+        missing = [json.loads(key)[1] for key, error in self._failed.items() if isinstance(error, Missing)]
+        return tuple(dict.fromkeys(missing))
+
+    def _find(self, uri: str, base: Path, folders: Mapping[Path, str], *, model: bool) -> Path:
+        """The file that `uri` refers to, by its folder if it is a `model`."""
+        path = find(uri, base, folders)
+        if model and is_folder(path):
+            path = model_file(path)
+        refuse_link_out(path)
+        roots = {**folders, **dict.fromkeys(map(absolute, caches()), "Fuel's cache")}
+        self.found[uri, base] = Found(uri, path, *source_of(path, roots))
+        return path
+
+    def _mesh(self, uri: str, base: Path, folders: Mapping[Path, str], *way: Any) -> bytes:
+        path = self._find(uri, base, folders, model=False)
+        return build(self._parts(path), *way)
+
+    def _sdf(self, uri: str, base: Path, folders: Mapping[Path, str]) -> bytes:
+        """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
+        try:
+            path = self._find(uri, base, folders, model=True)
+            text = read(path, SDF_LIMIT)
+        except Missing:
+            name = model_named(uri)
+            if name not in _TEXTS:
+                raise
+            path, text = FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
+        return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
+
     def _parts(self, path: Path) -> list[Part]:
         if path not in self._parts_of:
             self._parts_of[path] = read_parts(path)
@@ -106,20 +142,6 @@ class Resources:
 def _size(parts: Sequence[Part]) -> int:
     """The bytes of all `parts`."""
     return sum(part.vertices.nbytes + part.faces.nbytes for part in parts)
-
-
-def _sdf(uri: str, base: Path, folders: Sequence[Path]) -> bytes:
-    """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
-    try:
-        path = find(uri, base, folders)
-        path = model_file(path) if is_folder(path) else path
-        text = read(path, SDF_LIMIT)
-    except Missing:
-        name = model_named(uri)
-        if name not in _TEXTS:
-            raise
-        path, text = FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
-    return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
 
 
 # In place of a folder: messages name it.
@@ -137,16 +159,10 @@ _TEXTS = {
 }
 
 
-HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
-CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
-ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
-DOWNLOADS = "~/.gazebo/models"  # of Gazebo Classic
-# ROS packages are in the folders of the one, and in `share` of those of the other.
-PACKAGES, PREFIXES = "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"
-# The owner of Gazebo's own models in Fuel.
-GAZEBO = "openrobotics"
 # The newest supported SDF version: a model's folder may hold one file per version.
 NEWEST_SDF = (1, 12)
+# A line names so many commands.
+MOST_COMMANDS = 3
 MODEL_CONFIG_LIMIT = 1_000_000  # bytes
 CLIMBS = "leaves its folder with '..' (give the target folder with --model-path)"
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
@@ -154,37 +170,40 @@ _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 
 
-def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path, ...]:
-    """The folders searched for models: `model_path`, the world's own folder, then those of Gazebo and ROS.
-
-    They are absolute, exist, and are listed once.
-    """
-    gazebo = [folder for variable in ENVIRONMENT for folder in _listed_in(variable)]
-    packages = [*_listed_in(PACKAGES), *(str(Path(prefix, "share")) for prefix in _listed_in(PREFIXES))]
-    named = [*map(str, (*model_path, world_folder)), *gazebo, DOWNLOADS, *packages]
-    absolute = [_absolute(without_tilde(name)) for name in named]
-    return tuple(dict.fromkeys(folder for folder in absolute if is_folder(folder)))
-
-
-def _listed_in(variable: str) -> list[str]:
-    return [folder for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
-
-
 def model_named(uri: str) -> str:
     """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called; "" if it names none."""
     match = _SCHEME.fullmatch(uri.strip())
     if match is None:
         return ""
-    words = unquote(match[2], errors="replace").strip("/").split("/")
-    if match[1].lower() in ("http", "https"):
-        words = words[4:] if words[3:4] == ["models"] else []
-    elif match[1].lower() not in ("model", "package"):
-        words = []
-    return _plain(words[0]).replace(" ", "_") if words else ""
+    rest, name = unquote(match[2], errors="replace"), ""
+    if match[1].lower() in ("model", "package"):
+        name = rest.strip("/").split("/")[0]
+    elif (model := fuel_model(uri)) is not None and model.kind == "models":
+        name = model.name
+    return _plain(name).replace(" ", "_")
 
 
-def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
-    """The file or folder that `uri`, in a file of the folder `base`, refers to; `folders` are from `search_folders`.
+def fuel_model(uri: str) -> FuelModel | None:
+    """The model in Fuel that `uri`, or the file that it names, belongs to; None if it is no such URL."""
+    match = _SCHEME.fullmatch(uri.strip())
+    if match is None or match[1].lower() not in ("http", "https"):
+        return None
+    found = in_fuel(unquote(match[2], errors="surrogateescape"))
+    return None if found is None else found[0]
+
+
+def how_to_fetch(uris: Iterable[str]) -> str:
+    """What downloads those of the missing `uris` that are in Fuel, as the end of a sentence; empty if none is."""
+    models = [model for model in map(fuel_model, uris) if model is not None]
+    commands = [f"gz fuel download -u {url}" for url in dict.fromkeys(model.url for model in models)]
+    if not commands:
+        return ""
+    what = "this model" if len(commands) == 1 else f"these {len(commands)} models"
+    return f"; --fetch downloads {what} from Fuel, as does {first_of(commands, MOST_COMMANDS)}"
+
+
+def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
+    """The file or folder that `uri`, in a file of the folder `base`, refers to; `folders` are from `search_roots`.
 
     Raises Missing if there is none, and Unusable if the URI is invalid or not supported.
     """
@@ -201,7 +220,7 @@ def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
         return _first([Path(os.path.normpath(rest))], "there is no such file")
     around = (base, *folders)
     paths = [Path(os.path.normpath(folder / rest)) for folder in around]
-    staying = [path for path in paths if any(map(_absolute(path).is_relative_to, map(_absolute, around)))]
+    staying = [path for path in paths if any(map(absolute(path).is_relative_to, map(absolute, around)))]
     if not staying:
         raise Unusable(CLIMBS)
     return _first(staying, f"looked beside the file that names it and in {_listed(folders)}")
@@ -227,7 +246,7 @@ def _inside(rest: str) -> str:
     return path
 
 
-def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
+def _of_model(path: str, folders: Collection[Path]) -> Iterator[Path]:
     if path == ".":
         raise Unusable("names no file")
     name, _, rest = path.partition(os.sep)
@@ -245,61 +264,36 @@ def _package(folder: Path) -> str:
         return ""
 
 
-def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
-    """`rest` is HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE]: a model that was downloaded from Fuel before."""
+def _downloaded(rest: str, folders: Collection[Path]) -> Path:
+    """What a URL refers to, if it is of a model in Fuel that was downloaded before."""
     words = rest.split("/")
-    if words[0].lower() not in HOSTS or len(words) < 5 or words[3] != "models" or not (words[2] and words[4]):
-        raise Missing("is not downloaded; name a file or folder on this machine instead")
     if any(word in (".", "..") for word in words):
         raise Unusable(CLIMBS if ".." in words else "names no file")
-    owner, name, tail = words[2], words[4], words[5:]
-    version = tail.pop(0) if tail and tail[0] != "files" else ""
-    path = _inside("/".join(tail[1:] if tail[:1] == ["files"] else tail))
-    cached = [host / owner.lower() / "models" / name.lower() for host in _caches()]
-    # "tip" is the newest.
-    versions = [cache / version for cache in cached] if version.isdecimal() else chain(*map(_newest, cached))
-    models = (*versions, *of_name(name, folders))
-    where = f"looked in the Fuel cache and in {_listed(folders)}; nothing is downloaded"
-    return _first((model / path for model in models), where)
+    found = in_fuel(rest)
+    if found is None:
+        raise Missing("is not downloaded; name a file or folder on this machine instead")
+    model, file = found
+    # A copy of a model can be in any folder of models.
+    copies = of_name(model.name, folders) if model.kind == "models" else ()
+    where = f"looked in the Fuel cache and in {_listed(folders)}"
+    return _first((folder / file for folder in (*cached(model), *copies)), where)
 
 
 def _cached(path: str) -> Iterator[Path]:
-    """`path`, which begins with a model's name, in the newest version of each such model in the Fuel cache."""
+    """`path`, which begins with a model's name, in the newest version of each such model in Fuel's caches."""
     name, _, rest = path.partition(os.sep)
-    for host in _caches():
+    for host in hosts():
         for owner in sorted(folders_of(host), key=lambda each: each != GAZEBO):
             models = of_name(name, [host / owner / "models"])
-            yield from (version / rest for model in models for version in _newest(model))
+            yield from (version / rest for model in models for version in newest(model))
 
 
-def _caches() -> Iterator[Path]:
-    """The Fuel caches, by host: $GZ_FUEL_CACHE_PATH, by default `CACHES`. Fuel moved from one host to the other."""
-    chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
-    for cache in (chosen,) if chosen else CACHES:
-        yield from (without_tilde(cache) / host for host in HOSTS)
-
-
-def _newest(folder: Path) -> list[Path]:
-    """The newest version of a model in the Fuel cache, if there is one."""
-    versions = [entry for entry in folders_of(folder) if entry.isdecimal()]
-    return [folder / max(versions, key=int)] if versions else []
-
-
-def of_name(name: str, folders: Sequence[Path]) -> Iterator[Path]:
+def of_name(name: str, folders: Collection[Path]) -> Iterator[Path]:
     """Folders called `name` in any of `folders`; then those that differ only in case, or in `_` for a space."""
     for folder in folders:
         yield folder / name
     for folder in folders:
         yield from (folder / entry for entry in folders_of(folder) if _plain(entry) == _plain(name))
-
-
-def folders_of(folder: Path) -> list[str]:
-    """The sorted names of the folders in `folder`; none if it is not accessible."""
-    try:
-        with os.scandir(folder) as entries:
-            return sorted(entry.name for entry in entries if entry.is_dir())
-    except (OSError, ValueError):
-        return []
 
 
 def _plain(name: str) -> str:
@@ -323,14 +317,9 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
     raise Missing(where)
 
 
-def _absolute(path: Path) -> Path:
-    """`path` made absolute and without `..`; symbolic links are not followed."""
-    return Path(os.path.normpath(path.absolute()))
-
-
-def _listed(folders: Sequence[Path]) -> str:
+def _listed(folders: Collection[Path]) -> str:
     """The first three folders by name."""
-    names = ", ".join(str(folder)[:100] for folder in folders[:3])
+    names = ", ".join(str(folder)[:100] for folder in list(folders)[:3])
     return names if len(folders) <= 3 else f"{names} and {len(folders) - 3} more"
 
 
@@ -347,7 +336,7 @@ def model_file(folder: Path) -> Path:
             raise Unusable(f"model.config: {error}") from None
         config = None
     except Missing:
-        return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
+        return _first([folder / "model.sdf"], f"{folder} has neither model.config nor model.sdf")
     name = "model.sdf" if config is None else _newest_file(config)
     if not name:
         return _first([folder / "model.sdf"], "model.config names no file for SDF 1.12 or older")

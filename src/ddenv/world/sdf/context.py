@@ -9,7 +9,7 @@ from typing import Literal
 
 from ddenv.errors import UserError
 from ddenv.world.access import MissingFiles
-from ddenv.world.files.resources import Resources
+from ddenv.world.files.resources import Resources, how_to_fetch
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
@@ -78,7 +78,8 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `unreadable` those of these that were found, `files` the parsed files.
+    lists, `unreadable` those of these that were found, `files` the parsed files, `guessed` what has a guessed shape: the model,
+    and the URI.
     """
 
     resources: Resources
@@ -91,6 +92,7 @@ class Context:
     missing: dict[str, UserError] = field(default_factory=dict)
     unreadable: set[str] = field(default_factory=set)
     files: dict[Path, Element] = field(default_factory=dict)
+    guessed: list[tuple[str, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)
@@ -121,7 +123,7 @@ class Context:
         first, *others = self.missing
         absent = _also("missing", [uri for uri in others if uri not in self.unreadable])
         broken = _also("unreadable", [uri for uri in others if uri in self.unreadable])
-        raise MissingFiles(f"{self.missing[first]}{absent}{broken}", list(self.missing))
+        raise MissingFiles(f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}", list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
@@ -149,6 +151,11 @@ def _also(what: str, uris: Sequence[str]) -> str:
 def sdf_root(text: bytes, path: Path) -> Element:
     """The `<sdf>` element of a file of a supported version. Raises UserError."""
     root = parse(text, path, root="sdf")
+    macro = first_macro(root) if b"xacro" in text else None
+    if macro is not None:
+        raise refuse_xacro(macro, "SDF", "new.sdf")
+    if root.tag == "robot":
+        raise complain(root, f"is a robot in URDF, and no world; {how_to_include(path)}")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
     given = (root.get("version") or "").strip()
@@ -156,6 +163,28 @@ def sdf_root(text: bytes, path: Path) -> Element:
         said = f"version '{given[:20]}' is not supported" if given else "has no version attribute"
         raise complain(root, f"{said}; use SDF {VERSIONS[0]} to {VERSIONS[-1]}")
     return root
+
+
+def how_to_include(path: Path) -> str:
+    """How a world gets the model that is in a file, as the end of a sentence."""
+    return f"name it in one: <include><uri>{path.absolute().as_uri()}</uri></include>"
+
+
+def first_macro(root: Element) -> Element | None:
+    """The first element of xacro: with its usual prefix, or with one that the file gives to its namespace."""
+    prefixes = {"xacro"}
+    for element in root.iter():
+        prefixes |= {name.removeprefix("xmlns:") for name, value in element.attrib.items() if value.endswith("xacro")}
+        prefix, colon, _ = element.tag.partition(":")
+        if colon and prefix in prefixes:
+            return element
+    return None
+
+
+def refuse_xacro(element: Element, expected: str, file: str) -> UserError:
+    """The error for macros. They hold Python, which only the user can trust."""
+    advice = f"run 'xacro FILE > {file}' and name that file ('pip install xacro' brings the command)"
+    return complain(element, f"is xacro, not {expected}; {advice}")
 
 
 def version(element: Element) -> tuple[int, int]:

@@ -49,6 +49,13 @@ class Scope:
             self._scopes[key] = Scope(part.element, part.files, self._context, self._scopes)
         return self._scopes[key]
 
+    def is_left_out(self, part: Part) -> bool:
+        """Whether nothing is left of one of the `parts`, since all that it includes was left out."""
+        if part.element.find("link") is not None or next(part.element.iter("include"), None) is None:
+            return False
+        inner = self.inside(part)
+        return all(inner.is_left_out(each) for each in inner.parts)
+
     @cached_property
     def named(self) -> dict[str, Element | Part]:
         """Everything with a name here."""

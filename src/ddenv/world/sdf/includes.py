@@ -9,7 +9,7 @@ from urllib.parse import unquote
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
-from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
+from ddenv.world.sdf.standin import NO_FLOOR, NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.urdf import root_of
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 from ddenv.world.write import primitive
@@ -90,31 +90,23 @@ def _last_of(uri: str) -> str:
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
     """The root of the included file; None if it is missing (noted or remembered in `context`)."""
-
-    def note(by: str) -> None:
-        outer, context.model = context.model, context.model or text_of(include.find("name")) or _last_of(uri)
-        context.note("replaced", include, f"'{uri}' by {by}")
-        context.model = outer
-
     given = context.stand_in(uri)
     if given is not None and given[1] == NONE:
         context.note("ignored", include, f"'{uri}' is left out as asked")
         return None
     if given is not None:
-        note(f"the stand-in {given[0]}")
+        _note_replaced(include, uri, f"the stand-in {given[0]}", context)
         return _stand_in_root(include, *given)
     try:
         root = _file_root(include, uri, context)
         if root.source.parent == FOLDER and root.find("model") is not None:
-            note("the one built into ddenv, which is like Gazebo's")
+            _note_replaced(include, uri, "the one built into ddenv, which is like Gazebo's", context)
         return root
     except Unusable as error:
         raise complain(include, f"'{uri[:200]}' cannot be included: {error}") from None
     except Missing as missing:
         if context.may_guess(uri):
-            stand_in, words, why, _ = guess(uri)
-            note(f"a guess, {words}: {why}")
-            return _stand_in_root(include, words, stand_in)
+            return _guessed_root(include, uri, context)
         if context.ignores("include"):
             context.note("ignored", include, f"'{uri}' was not found: {missing}")
             return None
@@ -137,6 +129,29 @@ def _file_root(include: Element, uri: str, context: Context) -> Element:
         context.note("ignored", include, f"model.config of '{uri[:200]}', {fault}; {path.name} is taken")
     root = context.files[path] = root_of(text, path, context)
     return root
+
+
+def _note_replaced(include: Element, uri: str, by: str, context: Context) -> None:
+    outer, context.model = context.model, _model_of(include, uri, context)
+    context.note("replaced", include, f"'{uri}' by {by}")
+    context.model = outer
+
+
+def _model_of(include: Element, uri: str, context: Context) -> str:
+    """The world's model that an included one belongs to."""
+    return context.model or text_of(include.find("name")) or _last_of(uri)
+
+
+def _guessed_root(include: Element, uri: str, context: Context) -> Element | None:
+    """A file with a guess for a missing model; None if nothing is guessed for it."""
+    guessed = guess(uri)
+    if guessed is None:
+        context.note("ignored", include, f"'{uri}' {NO_FLOOR}")
+        return None
+    stand_in, words, why, _ = guessed
+    _note_replaced(include, uri, f"a guess, {words}: {why}", context)
+    context.guessed.append((_model_of(include, uri, context), uri))
+    return _stand_in_root(include, words, stand_in)
 
 
 def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:

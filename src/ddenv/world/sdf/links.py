@@ -14,7 +14,7 @@ from ddenv.world.sdf.frames import pose_of
 from ddenv.world.sdf.geometry import Lost, read_shape, remedies, scaled
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
 from ddenv.world.sdf.joints import Spot
-from ddenv.world.sdf.standin import AUTO, NONE, Placed, guess
+from ddenv.world.sdf.standin import AUTO, NO_FLOOR, NONE, Placed, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
@@ -106,6 +106,8 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
     if lost.word == NONE:
         context.note("ignored", lost.element, f"'{lost.uri}' is left out as asked: nothing collides with it")
         return None
+    if lost.word == AUTO:
+        context.guessed.append((context.model, lost.uri))
     if lost.word:
         kind = "visual" if lost.word == AUTO else lost.word
         near = [(one.shape, one.pose) for one in items if one.element.tag == kind and isinstance(one.shape, Placed)]
@@ -128,9 +130,13 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
     return None
 
 
-def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed:
-    """A shape for a missing mesh whose link has no other visual shape to go by."""
-    stand_in, text, why, scale = guess(lost.uri, link)
+def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed | None:
+    """A shape for a missing mesh whose link has no other visual shape to go by; None for a floor."""
+    guessed = guess(lost.uri, link)
+    if guessed is None:
+        context.note("ignored", lost.element, f"'{lost.uri}' {NO_FLOOR}")
+        return None
+    stand_in, text, why, scale = guessed
     context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {text}: {why}")
     if scale is None:
         mass = link.find("inertial/pose")

@@ -14,12 +14,13 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.access import is_directives, read_bytes
-from ddenv.world.files.resources import Resources, search_folders
+from ddenv.world.files.resources import Resources
+from ddenv.world.files.roots import search_roots
 from ddenv.world.model import Box, Collision, Mesh, Model, World, unique_names
 from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import assemble, state_entries
-from ddenv.world.sdf.context import Context, note_unread, sdf_root
+from ddenv.world.sdf.context import Context, how_to_include, note_unread, sdf_root
 from ddenv.world.sdf.frames import FARTHEST, Scope, TooFar
 from ddenv.world.sdf.inside import has_includes, opened, with_copies
 from ddenv.world.sdf.urdf import root_of, without_mass
@@ -76,7 +77,7 @@ def disk_of(path: Path, reading: Reading) -> Resources:
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return Resources({}, search_folders(reading.model_path, path.parent))
+    return Resources({}, search_roots(reading.model_path, path.parent))
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:
@@ -85,7 +86,8 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     worlds = root.findall("world")
     if len(worlds) != 1:
         found = "no <world>" if not worlds else f"{len(worlds)} <world> elements"
-        raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}")
+        instead = f"; to use its model in a world, {how_to_include(path)}" if root.find("model") is not None else ""
+        raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}{instead}")
     world = worlds[0]
     for tag, message in REFUSED.items():
         refused = world.find(tag)
@@ -109,6 +111,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         notes=tuple(context.notes),
         anchors=frozenset(model.name for model in models if model.name in anchors),
         resources=context.resources.taken,
+        found=tuple(context.resources.found.values()),
+        absent=context.resources.absent(),
+        guessed=tuple(context.guessed),
     )
     return _opened(whole, root, scope, context) if context.reading.inside else whole
 
@@ -148,8 +153,11 @@ def _models(scope: Scope, state: dict[str, list[Element]], context: Context) -> 
     names = [part.name for part in scope.parts]
     counts, models = Counter(names), []
     for part, name in zip(scope.parts, unique_names(names, " #"), strict=True):
+        context.model = name
+        if scope.is_left_out(part):
+            context.note("ignored", part.at, "all that it includes is left out")
+            continue
         if name != part.name:
-            context.model = name
             context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
         entries = state.get(part.name)
         entry = entries.pop(0) if entries else None

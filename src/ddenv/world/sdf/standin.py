@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from urllib.parse import unquote
 
 from ddenv.errors import UserError
 from ddenv.world.extent import shape_bounds
@@ -102,20 +104,34 @@ DEFAULT_MOMENT = 1.0
 SOME = "box:1,1,1"
 
 
-def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vector | None]:
+# A box of any size would be a hill where these words name a floor.
+FLOORS = ("floor", "ground", "terrain")
+NO_FLOOR = "is left out: a floor of unknown size is not guessed"
+
+
+def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vector | None] | None:
     """The shape for a missing model, or for a missing mesh of the `link`: the stand-in, its text, and why it is this one.
 
     It stands where the mesh would, and has the size of a mesh of that scale; without a scale, at the link's centre of mass.
+    None for a floor of which nothing says how large it is.
     """
     text, scale = KNOWN_SIZES.get(model_named(uri), (SOME, ONE))
     why, box = "the size of Gazebo's model", None
     if text == SOME:
         box = None if link is None else _box_of_inertia(link)
+        if box is None and is_floor(uri):
+            return None
         text = box or SOME
         why = "the box that has the link's inertia" if box else "nothing says how large it is"
     stand_in = parse_stand_in(text, "guess")
     assert isinstance(stand_in, Placed)
     return stand_in, text, why, None if box else scale
+
+
+def is_floor(uri: str) -> bool:
+    """Whether a model or a mesh is called a floor, such as `FloorB_01`."""
+    words = re.findall("[A-Z]?[a-z]+", unquote(uri))
+    return any(word.lower() in FLOORS for word in words)
 
 
 def _box_of_inertia(link: Element) -> str | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ddenv.schemas import nearest
 from ddenv.world.model import Model
-from ddenv.world.sdf.context import VERSIONS, Context, sdf_root
+from ddenv.world.sdf.context import VERSIONS, Context, first_macro, refuse_xacro, sdf_root
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse, text_of
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
@@ -25,15 +25,18 @@ FRICTION = {"mu1": "mu", "mu2": "mu2"}
 ROOT = "robot"
 
 
+def _has_expression(element: Element) -> bool:
+    """Whether an attribute has an expression or a substitution of xacro."""
+    return any("${" in text or "$(" in text for text in element.attrib.values())
+
+
 def to_sdf(robot: Element, context: Context) -> Element:
     """The `<sdf>` for a URDF `<robot>`, its root link first. Raises UserError."""
-    prefixes = {"xacro"}
-    for each in robot.iter():
-        prefixes |= {name.removeprefix("xmlns:") for name, value in each.attrib.items() if value.endswith("xacro")}
-        if each.tag.rpartition(":")[0] in prefixes or any(
-            "${" in text or "$(" in text for text in each.attrib.values()
-        ):
-            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
+    macro = first_macro(robot)
+    if macro is None:
+        macro = next(filter(_has_expression, robot.iter()), None)
+    if macro is not None:
+        raise refuse_xacro(macro, "URDF", "robot.urdf")
     # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
     links = {name_of(link): link for link in robot.findall("link")}

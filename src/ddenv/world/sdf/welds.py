@@ -366,6 +366,9 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
         notes=tuple(context.notes),
         anchors=frozenset(map(builder.carrier, builder.anchors)),
         resources=context.resources.taken,
+        found=tuple(context.resources.found.values()),
+        absent=context.resources.absent(),
+        guessed=tuple(context.guessed),
         ties=tuple(dict.fromkeys((name, other) for name, other in ties if name != other)),
         shared=tuple(shared),
     )
