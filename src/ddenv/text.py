@@ -8,6 +8,11 @@ import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
 
+# Names in their order, such as those of the models in a world.
+Names = tuple[str, ...]
+# Sentences, or short pieces of text, one after the other.
+Sentences = tuple[str, ...]
+
 # 100 * 0.29 is a bit less than 29.
 ROUNDING = 1e-9
 

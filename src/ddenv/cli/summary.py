@@ -10,7 +10,7 @@ from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_mi
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.slices import simulated
 from ddenv.runfile.progress import Node
-from ddenv.runfile.state import BROKEN, RunState, spent
+from ddenv.runfile.state import RunState, spent
 from ddenv.runs.folder import attach_name
 from ddenv.text import count, first_of, percent, printable
 from ddenv.words.claims import drift, meaning, means, missing, promise, rate, seen, smaller_known, verdict_on, what_ran
@@ -115,7 +115,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     more += f"; {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
     names = first_of(state.environment, MOST_NAMES)
     # They say nothing about the failure.
-    broken = [test for test in state.tests if test.outcome in BROKEN]
+    broken = [test for test in state.tests if test.broke]
     said = [
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
         *_certificate_lines(state),

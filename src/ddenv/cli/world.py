@@ -295,7 +295,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
         raise UserError(f"{path}: does not record which models affected its runs of the whole world; make a new run")
     head = f"{count(len(times), 'model')} of {len(state.elements)} may have affected the runs of the whole world:"
     lines = [f"  {printable(model)}: {number} of {count(runs, 'run')}" for model, number in times.most_common()]
-    return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
+    return world, frozenset(world.names) - times.keys(), [head, *lines]
 
 
 # Other worlds made from it.

@@ -128,7 +128,7 @@ class Bench:
         journal.record(TestStarted(*start, source))
         self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
-        full = full or (source is not None and not state.tests[source - 1].cut)
+        full = full or (source is not None and not state.test(source).cut)
         keep = frozenset(wanted.environment.names(state.elements))
         known = self._others.pop((keep, seed), None)
         if known is not None and (taken := result_of(known)) is not None:
@@ -156,7 +156,7 @@ class Bench:
         """
         state, run = self._journal.state, self._journal.file.path
         sound = (test for test in state.tests if test.phase == "baseline" and test.is_finished)
-        test = next((test for test in sound if test.outcome not in BROKEN), None)
+        test = next((test for test in sound if not test.broke), None)
         if state.physics.now == state.physics.proven or test is None:
             return
         result = self.made_again(test)
@@ -183,7 +183,7 @@ class Bench:
             journal.record(Comparing(test.id))
         keep = frozenset(state.environments[test.environment].names(state.elements))
         # It ends as the one that was simulated.
-        simulated = test if test.implied_by is None else state.tests[test.implied_by - 1]
+        simulated = test if test.implied_by is None else state.test(test.implied_by)
         ends = ends_of(self._known()) if simulated.cut else None
         self._pool.submit(0, Run(keep, test.seed, ends, wall_limit(state)))
         while not (ended := self._pool.finished(WAIT)):
@@ -290,7 +290,7 @@ class Bench:
     def _record(self, test: int, result: RunResult | Broken) -> None:
         journal = self._journal
         data = result_data(result, self._known())
-        started = journal.state.tests[test - 1]
+        started = journal.state.test(test)
         environment = journal.state.environments[started.environment]
         before = journal.test(environment, started.run)
         if data["outcome"] in BROKEN:
@@ -301,6 +301,6 @@ class Bench:
         if "took_part" in data:
             data["took_part"] = journal.models(data["took_part"])
         journal.record(TestFinished(test, **data), motions_of(result))
-        compare(journal, [journal.state.tests[test - 1]])
+        compare(journal, [journal.state.test(test)])
         if before is not None and before.cut and data["outcome"] not in (before.outcome, *BROKEN) and not data["cut"]:
             journal.record(EarlyStopEnded(test=before.id, by=test))

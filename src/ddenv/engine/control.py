@@ -278,7 +278,7 @@ def _left_out(journal: Journal, asked: c.LeaveOut) -> events.Event:
 
 def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
     state = journal.state
-    test = state.tests[asked.test - 1]
+    test = state.test(asked.test)
     unnamed = asked.instead or test.phase == "hand"
     what = f"test {test.id}" if unnamed else c.label_of(state, test)
     judged = _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id))

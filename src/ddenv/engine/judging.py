@@ -21,7 +21,7 @@ from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
 from ddenv.runfile.failures import grouped
-from ddenv.runfile.state import BROKEN, RunState, Test
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import ROBOT, Motions, RunFile
 from ddenv.runs.playback import table
 from ddenv.text import count, percent_at_most
@@ -113,7 +113,7 @@ def failures_of(file: RunFile, state: RunState) -> tuple[Failure, ...]:
 def failure_of(file: RunFile, state: RunState, test: int) -> Failure:
     """The failure that a test showed. Raises UserError for a damaged run file."""
     f, spec = known_failure(state), spec_of(state)
-    end = f.position if test == f.failure_test else end_of(state.tests[test - 1])
+    end = f.position if test == f.failure_test else end_of(state.test(test))
     return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
 
 
@@ -192,17 +192,17 @@ def fix_failure(
         seen.append(SeenFailure(group[0].id, len(group), names, end_of(group[0])))
     if wanted > len(seen):
         listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
-        runs = sum(test.outcome not in BROKEN for test in tests)
+        runs = sum(not test.broke for test in tests)
         return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
     f = groups[wanted - 1][0]
     judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failed}
     shown = {id for id, judgement in judged.items() if judgement.outcome == "similar"}
     if not any(test.id in shown for test in tests if test.run >= chose):
         chose = 0
-    sound = [test for test in tests if test.outcome not in BROKEN and test.run >= chose]
+    sound = [test for test in tests if not test.broke and test.run >= chose]
     similar = sum(test.id in shown for test in sound)
     rate = similar / len(sound)
-    broken = sum(test.outcome in BROKEN and test.run >= chose for test in tests)
+    broken = sum(test.broke and test.run >= chose for test in tests)
     interval = anytime_interval if len(tests) > usual else wilson_interval
     shows = len(sound), similar, rate, *interval(similar, len(sound)), failing[f].id, failures[f].position
     chance, needed = miss_chance(rate, iterations), iterations_needed(rate)
@@ -215,7 +215,7 @@ def _outcomes(judged: Mapping[int, Judgement]) -> Outcomes:
 
 
 def _no_failure(tests: Sequence[Test]) -> str:
-    broken = [test for test in tests if test.outcome in BROKEN]
+    broken = [test for test in tests if test.broke]
     if len(broken) == len(tests):
         return f"no baseline run finished: {broken[0].failure}"
     reached = len(tests) - len(broken)
@@ -252,9 +252,9 @@ class Sight:
 
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""
-        state, run = journal.state, journal.state.tests[test - 1]
+        state, run = journal.state, journal.state.test(test)
         # If several failures count as f, the one that the run showed.
-        ends = [end_of(state.tests[test - 1]) for test in state.failures]
+        ends = [end_of(state.test(test)) for test in state.failures]
         end = ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, end_of(run)))
         # Whether a model that affected no run was sensed depends on which of two equal runs was simulated.
         seen = set(state.elements) if run.took_part is None else set(run.took_part.names(state.elements))

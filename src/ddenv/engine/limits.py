@@ -14,7 +14,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.certificate import certificate_tests
 from ddenv.evidence.ends import ends_of, groups_of, joining, of_baseline, one_place
 from ddenv.runfile import events
-from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live
 from ddenv.runs import processor
 from ddenv.runs.programs import log_of
@@ -63,7 +63,7 @@ def wall_limit(state: RunState) -> float:
 
 def limit_after(state: RunState, timeout: float) -> float:
     """What a test of `timeout` simulated s may take after the baseline, s."""
-    sound = (test for test in state.tests if test.phase == "baseline" and test.outcome not in BROKEN)
+    sound = (test for test in state.tests if test.phase == "baseline" and not test.broke)
     slowest = max((test.wall_seconds / test.simulated_seconds for test in sound if test.simulated_seconds), default=0.0)
     return max(LEAST, math.ceil(FACTOR * slowest * timeout))
 

@@ -28,7 +28,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import table
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
-from ddenv.text import count
+from ddenv.text import Names, count
 from ddenv.words.claims import still_fails
 from ddenv.words.early_stop import beside_record
 from ddenv.world.scenario import Oracle, seed_of
@@ -74,7 +74,7 @@ def plan(
             raise UserError("--test: needs a run; a scenario has no tests yet")
         if not 0 < test <= len(state.tests):
             raise UserError(f"--test: there is no test {test}; the run has tests 1 to {len(state.tests)}")
-        models, seed = state.models_of(state.tests[test - 1]), state.tests[test - 1].seed
+        models, seed = state.models_of(state.test(test)), state.test(test).seed
     for name in leave_out or []:
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
@@ -90,7 +90,7 @@ def plan(
     return trials
 
 
-def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
+def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
     if minimal and subject.state is None:
         raise UserError("--minimal: needs a run; a scenario has no minimal environment yet")
     if minimal and keep is not None:

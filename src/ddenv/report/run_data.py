@@ -20,6 +20,7 @@ from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.changes import Change, changes
 from ddenv.runs.reasons import Nearest, Reason, nearest, reasons
 from ddenv.runs.subject import read_parts
+from ddenv.text import Sentences
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 
@@ -50,7 +51,7 @@ class Record:
     models: tuple[Drawn, ...]
     original: array[float] | None
     evidence: array[float] | None
-    troubles: tuple[str, ...]
+    troubles: Sentences
     elements: frozenset[str]
     kept: frozenset[str]
     reasons: tuple[Reason, ...]

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ddenv.arrays import Floats
+from ddenv.text import Names
 from ddenv.world.drive import Twist as Twist
 from ddenv.world.drive import WheelSpeeds as WheelSpeeds
 from ddenv.world.pose import Vector
@@ -105,7 +106,7 @@ class Setup:
     goal: tuple[float, float]
     tolerance: float
     start: tuple[float, float, float]
-    joints: tuple[str, ...]
+    joints: Names
     left: tuple[bool, ...]
     radius: float
     track: float

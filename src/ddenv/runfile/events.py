@@ -12,7 +12,7 @@ from typing import Annotated, Any, dataclass_transform
 from ddenv.environment import NOTHING
 from ddenv.runfile.deeds import named
 from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Pose, Positive, Real, Seconds, Share
-from ddenv.text import snake_case
+from ddenv.text import Names, snake_case
 
 Pair = tuple[Natural, Natural]
 Place = tuple[Real, Real, Real]
@@ -38,7 +38,7 @@ class Created(Event):
     """
 
     scenario: dict[str, Any]
-    elements: tuple[str, ...]
+    elements: Names
     welds: tuple[Pair, ...] = ()
 
 
@@ -224,7 +224,7 @@ class SeenFailure:
 
     test: Number
     runs: Natural
-    kinds: tuple[str, ...]
+    kinds: Names
     position: Place
 
     @property

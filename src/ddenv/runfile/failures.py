@@ -51,7 +51,7 @@ def atlas(state: RunState) -> tuple[OtherFailure, ...]:
     found = []
     for kind, ends in kinds.items():
         for position, tests in _by_end(ends, epsilon):
-            sizes = {test: len(state.environments[state.tests[test - 1].environment]) for test in tests}
+            sizes = {test: len(state.environments[state.test(test).environment]) for test in tests}
             smallest = min(tests, key=lambda test: (sizes[test], test))
             found.append(OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest]))
     return tuple(sorted(found, key=lambda one: (-len(one.tests), one.tests)))

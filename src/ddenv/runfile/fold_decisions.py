@@ -19,7 +19,7 @@ from ddenv.runfile.fold_tests import (
 )
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, RunState, Test, Trial
+from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.settings import SETTINGS, read
 from ddenv.text import count, first_of, plain, truncated
 
@@ -69,7 +69,7 @@ def adopted(state: RunState, event: e.Adopted, at: float) -> Changes:
 
 def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Changes:
     """Another failure counts as f from now on, and the environment that showed it becomes the current one."""
-    test = state.tests[event.test - 1]
+    test = state.test(event.test)
     # A trial has a number; otherwise `what` names the candidate.
     trial = None if event.trial is None else state.trials[event.trial - 1]
     what = event.what if trial is None else trial.label
@@ -175,7 +175,7 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
     if state.evidence_test is None:
         raise ValueError("f is not known")
     start = event.round, state.node, event.n_partitions, state.pinned, state.evidence_test, state.scenario["reduction"]
-    tests = tuple(test for test in state.judged if state.tests[test - 1].is_finished)
+    tests = tuple(test for test in state.judged if state.test(test).is_finished)
     leg = Leg(*start, event.rate, state.steps_back, tests, state.again)
     return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
 
@@ -262,7 +262,7 @@ def exact_runs(state: RunState) -> tuple[int, ...]:
     asked, whole = settings(state), origin(state, state.node).id
     if asked.accept_rate != "exact":
         return ()
-    tests = (test for test in rested_on(state) if test.environment == whole and test.outcome == "similar")
+    tests = (test for test in rested_on(state) if test.environment == whole and test.shows_f)
     return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
 
 
@@ -276,7 +276,7 @@ def broken_runs(state: RunState) -> tuple[int, ...]:
     runs: dict[int, bool] = {}
     for test in state.tests:
         if test.phase == "baseline" and test.is_finished:
-            runs[test.run] = runs.get(test.run, True) and test.outcome in BROKEN
+            runs[test.run] = runs.get(test.run, True) and test.broke
     return tuple(sorted(run for run, broke in runs.items() if broke))
 
 

@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from ddenv.runfile.progress import Node, Point, Removal
-from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
+from ddenv.runfile.state import CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -89,8 +89,8 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
     """A test that starts and ends at once: it has the result of another one."""
     started = test_started(state, event, at)
     now = state.changed(**started)
-    test, made = now.tests[-1], now.tests[event.by - 1]
-    if not made.is_finished or made.outcome in BROKEN or made.implied_by is not None or made.run != test.run:
+    test, made = now.tests[-1], now.test(event.by)
+    if not made.is_sound or made.implied_by is not None or made.run != test.run:
         raise ValueError(event.by)
     there = frozenset(now.models_of(test))
     values = {name: getattr(made, name) for name in END} | {
@@ -103,7 +103,7 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
 
 
 def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
-    lost = state.tests[event.test - 1]
+    lost = state.test(event.test)
     return with_test(state, event.test, {"outcome": "lost"}) | {"audits": state.audits - (lost.audits is not None)}
 
 
@@ -130,7 +130,7 @@ def with_outcomes(state: RunState, judged: e.Outcomes) -> Changes:
 def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
     if id < 1:
         raise IndexError(id)
-    before = state.tests[id - 1]
+    before = state.test(id)
     after = replace(before, **values)
     return {"tests": state.tests.changed(id - 1, after), **counts(state, before, after)}
 
@@ -169,9 +169,9 @@ def _noted(state: RunState, test: Test) -> Changes:
     elif round is not None and here is not None and test.candidate is not None and test.round == round.number:
         # It ran ahead of the verdict that made its candidate the environment.
         node = here if round.winner == test.candidate and here.round == round.number else None
-    if node is None or not _is_sound(test):
+    if node is None or not test.is_sound:
         return {}
-    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + (test.outcome == "similar"))
+    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + test.shows_f)
     return {"nodes": with_node(state.nodes, after)}
 
 
@@ -183,17 +183,13 @@ def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
 
 def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:
     """Those of some tests that ended and did not break, each once, and how many of them showed f."""
-    sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and _is_sound(tests[id - 1]))
-    return sound, sum(tests[id - 1].outcome == "similar" for id in sound)
+    sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and tests[id - 1].is_sound)
+    return sound, sum(tests[id - 1].shows_f for id in sound)
 
 
 def counted_again(nodes: Sequence[Node], tests: Sequence[Test]) -> tuple[Node, ...]:
     """The nodes after the outcomes of tests changed."""
     return tuple(replace(node, shown=seen(tests, node.runs)[1]) for node in nodes)
-
-
-def _is_sound(test: Test) -> bool:
-    return test.is_finished and test.outcome not in BROKEN
 
 
 def with_node(nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import Environment
+from ddenv.text import Names
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -78,7 +79,7 @@ class Node:
     parent: int | None
     how: str
     what: str
-    environment: tuple[str, ...]
+    environment: Names
     id: int = 0
     n_partitions: int | None = None
     round: int | None = None
@@ -178,7 +179,7 @@ class Removal:
     broke), by the `tests` with these ids.
     """
 
-    models: tuple[str, ...]
+    models: Names
     environment: int
     verdict: str = ""
     tests: tuple[int, ...] = ()
@@ -247,7 +248,7 @@ class Margins:
     broken_off: bool = False
 
     @property
-    def wanted(self) -> tuple[str, ...]:
+    def wanted(self) -> Names:
         """The names of the numbers that the last call asks for."""
         return tuple(one.name for one in self.asked.numbers)
 
@@ -266,7 +267,7 @@ class Physics:
 
     now: str = ""
     proven: str = ""
-    mixed: tuple[str, ...] = ()
+    mixed: Names = ()
 
     def started(self, engine: e.EngineStarted, tests: int) -> Physics:
         """After the start of an engine, when `tests` tests were finished."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.progress import Isolation, Margins, Node, Physics, path
+from ddenv.text import Names
 
 if TYPE_CHECKING:
     from ddenv.runfile.events import BaselineFinished, EarlyStopEnded, Forecast, Place
@@ -134,9 +135,9 @@ class RunState:
     status: str = "created"
     reason: str = ""
     scenario: dict[str, Any] = field(default_factory=dict)
-    elements: tuple[str, ...] = ()
+    elements: Names = ()
     environments: PersistentTuple[Environment] = field(default_factory=PersistentTuple)
-    environment: tuple[str, ...] = ()
+    environment: Names = ()
     leg: Leg | None = None
     search_due: bool = False
     judged: PersistentTuple[int] = field(default_factory=PersistentTuple)
@@ -204,13 +205,17 @@ class RunState:
         state.__dict__.update(self.__dict__, **values)
         return state
 
-    def models_of(self, test: Test) -> tuple[str, ...]:
+    def models_of(self, test: Test) -> Names:
         """The names of the models in the world of a test, collected at each call."""
         return self.environments[test.environment].names(self.elements)
 
+    def test(self, number: int) -> Test:
+        """The test with this number: they are counted from 1."""
+        return self.tests[number - 1]
+
     def tests_of(self, numbers: Iterable[int]) -> list[Test]:
         """The tests with these numbers, as far as the file has them."""
-        return [self.tests[number - 1] for number in numbers if 0 < number <= len(self.tests)]
+        return [self.test(number) for number in numbers if 0 < number <= len(self.tests)]
 
     @property
     def evidence(self) -> Test | None:
@@ -302,7 +307,7 @@ class RunState:
     @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
-        return tuple(self.tests[test - 1] for test in self.fresh)
+        return tuple(map(self.test, self.fresh))
 
     @property
     def running_tests(self) -> tuple[Test, ...]:
@@ -349,11 +354,11 @@ class Round:
     accepted: int | None = None
 
     @property
-    def environment(self) -> tuple[str, ...]:
+    def environment(self) -> Names:
         return self.split.environment
 
     @property
-    def partitions(self) -> tuple[tuple[str, ...], ...]:
+    def partitions(self) -> tuple[Names, ...]:
         return self.split.partitions
 
 
@@ -364,16 +369,16 @@ class Split:
     part that was one in the round before keeps its letter.
     """
 
-    environment: tuple[str, ...]
-    partitions: tuple[tuple[str, ...], ...]
-    pinned: tuple[str, ...] = ()
+    environment: Names
+    partitions: tuple[Names, ...]
+    pinned: Names = ()
     whole: Environment = NOTHING
     parts: tuple[Environment, ...] = ()
     always: Environment = NOTHING
     letters: tuple[int, ...] = ()
 
     @property
-    def lettered(self) -> Iterator[tuple[int, tuple[str, ...]]]:
+    def lettered(self) -> Iterator[tuple[int, Names]]:
         """Each part's names, with the number of its letter."""
         return zip(self.letters or range(len(self.partitions)), self.partitions, strict=True)
 
@@ -408,7 +413,7 @@ class Candidate:
         return part | self.split.always if self.kind == "partition" else self.split.whole - part
 
     @property
-    def models(self) -> tuple[str, ...]:
+    def models(self) -> Names:
         """The names of its models, collected at each call; use `size` for their number."""
         part = self.split.partitions[self.partition]
         if self.kind == "partition":
@@ -436,7 +441,7 @@ class Trial:
     """
 
     number: int
-    models: tuple[str, ...]
+    models: Names
     node: int
     environment: int = 0
     verdict: str = ""
@@ -493,6 +498,20 @@ class Test:
     @property
     def is_finished(self) -> bool:
         return self.outcome not in UNFINISHED
+
+    @property
+    def broke(self) -> bool:
+        """Whether it ended and says nothing of f."""
+        return self.outcome in BROKEN
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it ended and says whether f showed."""
+        return self.is_finished and not self.broke
+
+    @property
+    def shows_f(self) -> bool:
+        return self.outcome == "similar"
 
     @property
     def is_deflake_run(self) -> bool:

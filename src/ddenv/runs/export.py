@@ -16,6 +16,7 @@ from ddenv.runs.reasons import removed_in_passing
 from ddenv.runs.subject import RESOURCE, Subject, read_subject
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
+from ddenv.text import Names
 from ddenv.world.access import Missing, Unusable, check_ending, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
@@ -145,7 +146,7 @@ def _name(path: Path, folder: Path) -> str:
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
-def renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> tuple[str, ...]:
+def renamed(protected: Names, world: World, removed: frozenset[str], minimal: World) -> Names:
     """The names of protected models in the minimal world, where copies of one name are numbered anew; a part's is its model's."""
     wholes = {model.name: model.inside or model.name for model in world.models}
     kept = dict.fromkeys(whole for name, whole in wholes.items() if name not in removed)

@@ -17,7 +17,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
-from ddenv.text import coordinates, count, first_of, percent
+from ddenv.text import Names, coordinates, count, first_of, percent
 from ddenv.words.claims import of_passing, uncertified, verdict_on
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
@@ -79,7 +79,7 @@ class Reason:
     """
 
     without: str
-    gone: tuple[str, ...]
+    gone: Names
     runs: int
     ends: tuple[End, ...]
     parting: Parting | None
@@ -224,7 +224,7 @@ class Nearest:
     with one seed shows it; `lacks` says why, if the run file does not have what it takes. `first` of `gone` took part first there.
     """
 
-    gone: tuple[str, ...]
+    gone: Names
     words: str
     shown: bool
     parting: Parting | None = None
@@ -257,7 +257,7 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     return Nearest(gone, words, shown, parting, first, lacks)
 
 
-def removed_in_passing(state: RunState, where: object) -> tuple[str, ...]:
+def removed_in_passing(state: RunState, where: object) -> Names:
     """The models that the nearest world that passes lacks. Raises UserError where there is no such world yet."""
     one = state.isolated
     if one is None:

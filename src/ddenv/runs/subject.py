@@ -19,7 +19,7 @@ from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
-from ddenv.text import first_of, shortened
+from ddenv.text import Names, first_of, shortened
 from ddenv.world.access import MissingFiles, is_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
@@ -50,8 +50,8 @@ class Subject:
     state: RunState | None = None
 
     @property
-    def elements(self) -> tuple[str, ...]:
-        return self.world.elements(frozenset(self.scenario.protected))
+    def elements(self) -> Names:
+        return self.world.elements(self.scenario.protected)
 
 
 def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
@@ -231,7 +231,7 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     for name in scenario.protected:
         if name not in known:
             raise UserError(f"protected: the world {scenario.world} has no model '{name}'")
-    if not world.elements(frozenset(scenario.protected)):
+    if not world.elements(scenario.protected):
         raise UserError(f"{scenario.world}: has no model that can be removed")
     if scenario.reading.inside and not any(model.inside for model in world.models):
         why = next((note.why for note in world.notes if note.what == "--inside"), "no static model has two collisions")
@@ -257,7 +257,7 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     stored = Resources(run.documents(RESOURCE))
     world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
     robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
-    if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
+    if fold(run.events(most=1)).elements != world.elements(scenario.protected):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
 

@@ -15,7 +15,7 @@ from ddenv.runfile.fold_decisions import stands_for_all
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.settings import Reduction
-from ddenv.text import about, count, rounded
+from ddenv.text import Sentences, about, count, rounded
 
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
 LATEST, BUSY = 50, 0.9
@@ -72,7 +72,7 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
     return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
 
 
-def left_said(state: RunState, at_work: bool) -> tuple[str, ...]:
+def left_said(state: RunState, at_work: bool) -> Sentences:
     """What is left, in tests and with the time in brackets, from the longest form to none; nothing if it is unknown."""
     left = remaining(state, at_work)
     if left is None:

@@ -239,7 +239,7 @@ def what_happened(moment: Moment) -> str:
     """The same in a few words, without the time."""
     kind, event, state = moment.recorded.kind, moment.recorded.event, moment.after
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
-        return _of_test(state, state.tests[event.test - 1])
+        return _of_test(state, state.test(event.test))
     if kind == "created":
         return "the run was created"
     if kind == "finished":

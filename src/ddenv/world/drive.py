@@ -12,6 +12,7 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.text import Names
 from ddenv.world.extent import bounds
 from ddenv.world.model import (
     Capsule,
@@ -56,7 +57,7 @@ class Drive:
     `signs` are 1 for wheels whose joint velocity is positive when they roll forward, and -1 for the others.
     """
 
-    joints: tuple[str, ...]
+    joints: Names
     left: tuple[bool, ...]
     radius: float
     track: float

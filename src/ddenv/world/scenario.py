@@ -15,6 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from ddenv import settings
 from ddenv.settings import FARTHEST, TURNS, Ignorable
+from ddenv.text import Names
 
 # Maximum of all other numbers.
 LARGEST = 1e6
@@ -61,8 +62,8 @@ PLAIN = Reading()
 class Wheels(Section):
     """The joints of the robot's driven wheels by name, those on its left and those on its right."""
 
-    left: tuple[str, ...] = Field(min_length=1)
-    right: tuple[str, ...] = Field(min_length=1)
+    left: Names = Field(min_length=1)
+    right: Names = Field(min_length=1)
 
 
 class Robot(Section):
@@ -299,5 +300,5 @@ class Scenario(Section):
     failure: FailureSpec = FailureSpec()
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()
-    protected: tuple[str, ...] = Field(default=(), description="models that always stay")
+    protected: Names = Field(default=(), description="models that always stay")
     whole: Whole | None = Field(default=None, description="the world that this one is a part of")

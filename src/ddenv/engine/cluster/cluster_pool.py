@@ -171,7 +171,7 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = Run(frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0))
+        self._whole = Run(frozenset(world.elements(scenario.protected)), seed_of(scenario.reduction, 0))
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.

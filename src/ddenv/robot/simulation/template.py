@@ -53,7 +53,7 @@ class Template:
         self._robot, self._scenario = robot, scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
-        names = frozenset(model.name for model in world.models)
+        names = frozenset(world.names)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
         fixed = set(scenario.protected)
         self._always = grounds | {model.name for model in world.models if fixed & {model.name, model.inside}}

@@ -22,11 +22,10 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import PersistentTuple, Round, RunState, Split, Test, Trial
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.supports import Names
 from ddenv.runfile.tested import purpose
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
-from ddenv.text import count, padded, plain, shortened
+from ddenv.text import Names, count, padded, plain, shortened
 from ddenv.words.signs import outcome
 from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.help.footer import KeyFooter

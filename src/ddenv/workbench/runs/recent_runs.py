@@ -13,6 +13,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
+from ddenv.text import Names
 from ddenv.words.signs import STATUS
 
 # The maximum number of runs in the list of the setup screen.
@@ -38,7 +39,7 @@ class Recent:
     algorithm: str = ""
     pair: str = ""
     total: int = 0
-    kept: tuple[str, ...] = ()
+    kept: Names = ()
     tests: int = 0
     decisions: int = 0
     minimal: bool = False
