@@ -19,6 +19,7 @@ from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named_file
 from ddenv.text import count, first_of, printable, shortened
 from ddenv.world.access import is_directives
+from ddenv.world.pose import Point
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, Note, World
@@ -238,7 +239,7 @@ def _totals(world: World) -> str:
 def show(
     file: Path,
     spawn: tuple[float, ...] | None,
-    goal: tuple[float, float] | None,
+    goal: Point | None,
     svg: Path | None,
     took_part: bool,
     passes: bool,

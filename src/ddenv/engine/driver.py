@@ -19,7 +19,7 @@ from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, SURELY, error_of
+from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, SURELY, NumberedRun, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
 from ddenv.evidence.ends import elsewhere, ends_of, of_baseline
 from ddenv.evidence.rates import anytime_interval, estimated_rate, iterations_needed
@@ -512,9 +512,7 @@ class Driver:
         verdict = "not shown" if named.exact and not exactly else claim.verdict
         return events.ClaimMade(named.model, number, verdict, shown, sound, *interval, dict(outcomes), claim.bound)
 
-    def stepped_back(
-        self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]
-    ) -> NoReturn:
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> NoReturn:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
         node, lost = nodes[place].number, nodes[place + 1].number

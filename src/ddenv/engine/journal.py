@@ -8,6 +8,7 @@ from itertools import count
 
 from ddenv.environment import Environment
 from ddenv.errors import UserError
+from ddenv.evidence.certificate import NumberedRun
 from ddenv.evidence.rates import Shown, estimated_rate
 from ddenv.evidence.slices import Ties, implies
 from ddenv.reduction.procedure import Test as Wanted
@@ -156,7 +157,7 @@ class Journal:
         tests = (self.test(environment, run, full) for run in runs)
         return tuple(test.id for test in tests if test is not None)
 
-    def full_tests(self, tests: Iterable[tuple[Environment, int]], first: int = 0) -> tuple[int, ...]:
+    def full_tests(self, tests: Iterable[NumberedRun], first: int = 0) -> tuple[int, ...]:
         """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
         return tuple(sorted({one for models, run in tests for one in self.tests(models, (first + run,), full=True)}))
 

@@ -27,7 +27,7 @@ from ddenv.runs.playback import table
 from ddenv.text import count, percent_at_most
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
-from ddenv.world.pose import headings
+from ddenv.world.pose import Vector, headings
 from ddenv.world.scenario import FailureSpec, Reduction
 
 # Where no run failed, so many times as many are proposed.
@@ -92,7 +92,7 @@ def known_failure(state: RunState) -> BaselineFinished:
     return state.baseline
 
 
-def end_of(test: Test) -> tuple[float, float, float]:
+def end_of(test: Test) -> Vector:
     """Where the robot was at the end, x, y, z m. Raises UserError for a test without an end."""
     if test.end_pose is None:
         raise UserError(f"damaged run file: test {test.id} has no end pose")

@@ -10,6 +10,8 @@ from statistics import median
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
     HELPING,
+    Expected,
+    NumberedRun,
     Pairs,
     Terms,
     certificate_from_here,
@@ -92,7 +94,7 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     return {None: kept, **{name: settle(falls(rest, left, error), shown) for name, rest in rests.items()}}
 
 
-def _outcomes(state: RunState, certificate: Certificate) -> dict[tuple[Environment, int], Shown]:
+def _outcomes(state: RunState, certificate: Certificate) -> dict[NumberedRun, Shown]:
     """What its finished runs showed, by environment and run, counted from its first one."""
     return {
         (state.environments[test.environment], test.run - certificate.first_run): "broken"
@@ -170,7 +172,7 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
     return sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
 
 
-def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
+def expected_fresh_runs(state: RunState, now: Certificate) -> Expected:
     """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     if now.seeds:
         return now.at_least, now.at_least, now.at_least

@@ -24,6 +24,7 @@ from ddenv.evidence.certificate import (
     HELPING,
     NEEDED_SHARE,
     Claim,
+    NumberedRun,
     Procedure,
     Settling,
     Terms,
@@ -33,7 +34,7 @@ from ddenv.evidence.certificate import (
     keeps,
     often,
 )
-from ddenv.evidence.rates import Shown
+from ddenv.evidence.rates import Shown, ShownIn
 from ddenv.reduction.round import Candidate, Partition, Round, Search
 from ddenv.reduction.verdict import (
     FEWEST_SHOWN,
@@ -216,7 +217,7 @@ class Driver(Runs, Protocol):
     def certified(self, made: Certified) -> None:
         """A certificate is finished."""
 
-    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]) -> Leg:
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> Leg:
         """What is left lost the rate, by these fresh tests, as (environment, run): the search goes back to place number `place` of
         the chain, and leaves out the groups `again` first. The environment at `place` + 1 and all its parts are not taken again.
         """
@@ -523,7 +524,7 @@ def _without_more_runs(named: Iterable[NamedClaim], ended: NamedClaim | None) ->
     return tuple(replace(one, claim=_given_up(one.claim)) for one in used)
 
 
-def _in_drawn_order(tests: Iterable[tuple[Environment, int]], seed: int | None) -> list[tuple[Environment, int]]:
+def _in_drawn_order(tests: Iterable[NumberedRun], seed: int | None) -> list[NumberedRun]:
     return sorted(tests, key=lambda test: Random(f"{seed} {test[1]} {test[0].bits}").random())
 
 
@@ -532,7 +533,7 @@ def _left_of(terms: Terms, made: int) -> float:
     return math.inf if terms.most_tests is None else terms.most_tests - made
 
 
-def _have_turn(of_left: NamedClaim, fresh: Callable[[Environment, int], Shown]) -> bool:
+def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:
     """Whether what is left is judged, or seems to keep the rate that the search aims at and is shown to keep a part of it."""
     claim = of_left.claim
     if claim.verdict or (claim.bound or 0.0) < LOOKS_KEPT_BOUND:
@@ -595,9 +596,7 @@ def groups_again(good: Environment, bad: Environment, end: Environment) -> list[
     return [group for group in (later, *halves) if group]
 
 
-def last_good(
-    chain: Sequence[Environment], judged: Callable[[Environment], Claim]
-) -> int | tuple[tuple[Environment, int], ...]:
+def last_good(chain: Sequence[Environment], judged: Callable[[Environment], Claim]) -> int | tuple[NumberedRun, ...]:
     """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
 
     `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.

@@ -18,7 +18,7 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import LONGER, Terms, Verdict, error_of, tests_in_blocks
+from ddenv.evidence.certificate import LONGER, NumberedRun, Terms, Verdict, error_of, tests_in_blocks
 from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate, wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
@@ -279,7 +279,7 @@ class _Caller:
         self.calls: Counter[str] = Counter()
         self.trials: list[Trial] = []
         self.history = [Step(0, self.names)]
-        self._known: dict[tuple[Environment, int], bool] = {}
+        self._known: dict[NumberedRun, bool] = {}
         # What calls with all elements showed.
         self._of_whole: list[bool] = []
         self._chain: tuple[Environment, ...] = (self.whole,)

@@ -21,7 +21,7 @@ from ddenv.arrays import Floats
 from ddenv.text import Names
 from ddenv.world.drive import Twist as Twist
 from ddenv.world.drive import WheelSpeeds as WheelSpeeds
-from ddenv.world.pose import Vector
+from ddenv.world.pose import Point, Vector
 
 STOP = Twist(0.0, 0.0)
 
@@ -103,9 +103,9 @@ class Setup:
     a controller of your own. `seed` is the seed of the run.
     """
 
-    goal: tuple[float, float]
+    goal: Point
     tolerance: float
-    start: tuple[float, float, float]
+    start: Vector
     joints: Names
     left: tuple[bool, ...]
     radius: float

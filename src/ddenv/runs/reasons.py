@@ -19,6 +19,7 @@ from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.text import Names, coordinates, count, first_of, percent
 from ddenv.words.claims import of_passing, uncertified, verdict_on
+from ddenv.world.pose import Point
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
 F, GOAL = "similar", "pass"
@@ -47,7 +48,7 @@ class End:
     kind: str
     number: int
     seconds: float
-    place: tuple[float, float]
+    place: Point
     reach: float = 0.0
     away: float = math.nan
 
@@ -65,7 +66,7 @@ class Parting:
     seed: int
     equal: float
     apart: float | None
-    place: tuple[float, float] | None
+    place: Point | None
     met: float | None
     touched: bool
 
@@ -148,7 +149,7 @@ def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str
     return parting, first, ""
 
 
-def parted(first: array[float], second: array[float]) -> tuple[float, float | None, tuple[float, float] | None]:
+def parted(first: array[float], second: array[float]) -> tuple[float, float | None, Point | None]:
     """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second is `APART` from the first."""
     equal, same = 0.0, True
     for row in range(0, min(len(first), len(second)), COLUMNS):

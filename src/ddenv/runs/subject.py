@@ -26,6 +26,7 @@ from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
+from ddenv.world.pose import Point
 from ddenv.world.scenario import PLAIN, Reading, Scenario
 from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_world
 from ddenv.world.sdf.standin import parse_option
@@ -150,7 +151,7 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
     return read_as if found else reading
 
 
-def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
+def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: Point) -> Scenario:
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
         "name": world.stem.removesuffix(".dmd")[:80] or "world",

@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.text import count, first_of
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
 from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Point, Pose
 from ddenv.world.scenario import Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
@@ -117,9 +117,7 @@ class Inside:
     depth: float
 
 
-def notes_on_start(
-    world: World, robot: Model, spawn: Spawn, goal: tuple[float, float] | None = None
-) -> Iterator[tuple[str, str]]:
+def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None = None) -> Iterator[tuple[str, str]]:
     """What is wrong with the start of the robot in `world`, and with its `goal` (x, y), m: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
