@@ -11,8 +11,9 @@ import numpy as np
 
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failures_of, motions_of, result_data, rows_of
-from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
+from ddenv.engine.judging import asked_of, failures_of, motions_of, result_data, rows_of
+from ddenv.engine.limits import give_up_if_late, wall_limit
+from ddenv.engine.notes import note_slow
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
 from ddenv.engine.slicing import audit_is_due, compare
@@ -37,7 +38,7 @@ from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
 from ddenv.text import count
-from ddenv.world.scenario import Reduction, seed_of
+from ddenv.world.scenario import seed_of
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -117,7 +118,7 @@ class Bench:
             return None
         environment, state = journal.number(wanted.environment), journal.state
         # All candidates meet the same noise.
-        reduction, number = Reduction.model_validate(state.scenario["reduction"]), len(state.tests) + 1
+        reduction, number = asked_of(state), len(state.tests) + 1
         seed = seed_of(reduction, wanted.run)
         of_round = state.round is not None and wanted.why == "round"
         round, candidate = (journal.current.number, wanted.candidate) if of_round else (None, None)

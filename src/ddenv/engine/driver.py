@@ -14,7 +14,8 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
-from ddenv.engine.limits import limit_after, note, note_alike, note_ends, note_price, note_rare
+from ddenv.engine.limits import limit_after
+from ddenv.engine.notes import note, note_alike, note_ends, note_price, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment

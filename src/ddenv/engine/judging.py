@@ -100,6 +100,11 @@ def end_of(test: Test) -> Vector:
     return x, y, z
 
 
+def asked_of(state: RunState) -> Reduction:
+    """How the run reduces now: the user may have changed it."""
+    return Reduction.model_validate(state.scenario["reduction"])
+
+
 def spec_of(state: RunState) -> FailureSpec:
     """What counts as the same failure now: the user may have changed it."""
     return FailureSpec.model_validate(state.scenario["failure"])
@@ -132,7 +137,8 @@ def rows_of(file: RunFile, test: int) -> np.ndarray:
 
 def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
     """The baseline by what counts as the same failure now, which judges all tests. Raises UserError if it shows none."""
-    before, reduction = known_failure(state), Reduction.model_validate(state.scenario["reduction"])
+    before = known_failure(state)
+    reduction = asked_of(state)
     tests = {test.run: test for test in state.tests if test.phase == "baseline" and test.is_finished}
     failed = ("failed", "similar", "other")
     unjudged = [replace(one, outcome="failed") if one.outcome in failed else one for _, one in sorted(tests.items())]
