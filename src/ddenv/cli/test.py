@@ -186,16 +186,15 @@ def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
     from ddenv.evidence.rates import Shown
     from ddenv.runfile.state import BROKEN
 
-    rest = Environment.whole(1)
-    left = Environment.whole(2)
-    outcomes: dict[Environment, dict[int, Shown]] = {rest: {}, left: {}}
-    for one in results:
-        if one["without"] in (None, without):
-            shown: Shown = "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"
-            outcomes[left if one["without"] is None else rest][one["seed"]] = shown
-    seeds = [seed for seed in outcomes[left] if seed in outcomes[rest]]
+    rest, left = Environment.whole(1), Environment.whole(2)
+    models = {rest: without, left: None}
+    shown: dict[tuple[str | None, int], Shown] = {
+        (one["without"], one["seed"]): "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"
+        for one in results
+    }
+    seeds = [seed for model, seed in shown if model is None and (without, seed) in shown]
 
     def shown_in(environment: Environment, run: int) -> Shown:
-        return outcomes[environment][seeds[run]] if run < len(seeds) else None
+        return shown[models[environment], seeds[run]] if run < len(seeds) else None
 
     return settle(falls(rest, left, ERROR), shown_in).verdict

@@ -193,8 +193,16 @@ class Driver:
         rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back, broke=broken_runs(state))
         rule = self._bench.rule = Acceptance(len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
-        search = leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again
-        self._leg = steps.Leg(*search)
+        self._leg = steps.Leg(
+            first_round=leg.first_round,
+            whole=journal.whole,
+            chain=chain,
+            pinned=stays,
+            free=free,
+            rule=rule,
+            n_partitions=leg.n_partitions,
+            again=leg.again,
+        )
         self._trials, self._unknown = {}, set()
         self._learn(leg.tests, leg.evidence_test)
         return self._leg

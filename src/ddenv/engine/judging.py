@@ -41,15 +41,17 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None.
     """
     if isinstance(result, Broken):
-        unknown: dict[str, Any] = {
+        return {
+            "outcome": result.outcome,
+            "failure": result.failure,
             "distance": None,
             "end_pose": None,
+            "simulated_seconds": 0.0,
+            "wall_seconds": 0.0,
             "first_sensed": {},
             "first_touched": {},
             "cut": False,
         }
-        none = {"simulated_seconds": 0.0, "wall_seconds": 0.0}
-        return {"outcome": result.outcome, "failure": result.failure, **unknown, **none}
     outcome, distance = result.outcome, None
     if failures:
         judgement = nearest([judge(result, failure) for failure in failures])

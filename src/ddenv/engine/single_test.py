@@ -199,16 +199,16 @@ def reproduce(
     of them show together.
     """
     shown: list[bool] = []
-    broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
+    broken = 0
+    seeds = certificate.seeds[:most]
+    rate = certificate.claims[0].low
     state = subject.state
-    known = (
-        {}
-        if state is None
-        else {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
-    )
-    # The search has made these runs; how they compare with its records is said, too.
-    trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
-    for result in run_trials(subject, trials or plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most), jobs):
+    trials = plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most)
+    if seeds and state is not None:
+        # The search has made these runs; how they compare with its records is said, too.
+        known = {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
+        trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
+    for result in run_trials(subject, trials, jobs):
         if result["outcome"] in BROKEN:
             broken += 1
         else:

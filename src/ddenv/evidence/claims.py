@@ -79,8 +79,8 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     left, outcomes = state.environments[node.id], _outcomes(state, certificate)
     rests = {
         test.without: state.environments[test.environment]
-        for test in state.confirm_tests
-        if test.run >= certificate.first_run and test.is_finished and test.node == certificate.node and test.without
+        for test in _finished(state, certificate)
+        if test.node == certificate.node and test.without
     }
 
     def shown(environment: Environment, run: int) -> Shown:
@@ -100,9 +100,12 @@ def _outcomes(state: RunState, certificate: Certificate) -> dict[NumberedRun, Sh
         (state.environments[test.environment], test.run - certificate.first_run): "broken"
         if test.broke
         else test.shows_f
-        for test in state.confirm_tests
-        if test.run >= certificate.first_run and test.is_finished
+        for test in _finished(state, certificate)
     }
+
+
+def _finished(state: RunState, certificate: Certificate) -> list[Test]:
+    return [test for test in state.confirm_tests if test.run >= certificate.first_run and test.is_finished]
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
@@ -169,7 +172,7 @@ def in_the_making(state: RunState) -> Certificate | None:
 
 def fresh_runs_made(state: RunState, now: Certificate) -> int:
     """How many runs of the last certificate are finished."""
-    return sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
+    return len(_finished(state, now))
 
 
 def expected_fresh_runs(state: RunState, now: Certificate) -> Expected:

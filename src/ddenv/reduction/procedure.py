@@ -359,11 +359,12 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
         yield tuple(Test(left, run, "round") for run in missing)
     certificate = driver.certificate_due()
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
+    fresh = _fresh(driver, certificate.first_run)
 
     def ends(claim: NamedClaim) -> bool:
         if claim.model is None:
-            fresh = (driver.shown(left, certificate.first_run + run, full=True) for run in claim.runs)
-            return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in fresh)
+            shown = (fresh(left, run) for run in claim.runs)
+            return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in shown)
         return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
 
     settle_claims = _settled_in_turn if certificate.terms.order_seed is None else _settled_in_blocks
@@ -423,9 +424,7 @@ def settled(
 ) -> Work[tuple[NamedClaim, ...]]:
     """Makes fresh runs until each of `claims` has a verdict, up to one that `ends` them; returns them."""
 
-    def fresh(environment: Environment, run: int) -> Shown:
-        return driver.shown(environment, first_run + run, full=True)
-
+    fresh = _fresh(driver, first_run)
     opened: list[tuple[int | None, Environment, Settling]] = []
     while True:
         named: list[NamedClaim] = []
@@ -466,9 +465,7 @@ def _settled_in_blocks(
     """
     first_run, terms = certificate.first_run, certificate.terms
 
-    def fresh(environment: Environment, run: int) -> Shown:
-        return driver.shown(environment, first_run + run, full=True)
-
+    fresh = _fresh(driver, first_run)
     without = {rest: model for model, rest in rests.items()}
 
     def claims_of(models: Mapping[int, Settling]) -> list[NamedClaim]:
@@ -513,6 +510,11 @@ def _settled_in_blocks(
         yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
 
 
+def _fresh(driver: Runs, first_run: int) -> ShownIn:
+    """Asks for full runs by their number, counted from the first one of a certificate."""
+    return lambda environment, run: driver.shown(environment, first_run + run, full=True)
+
+
 def _opened(rests: Mapping[int, Environment], left: Environment, error: float, first: int) -> dict[int, Settling]:
     """A claim of each model, with runs from block number `first` on."""
     return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
@@ -521,7 +523,9 @@ def _opened(rests: Mapping[int, Environment], left: Environment, error: float, f
 def _without_more_runs(named: Iterable[NamedClaim], ended: NamedClaim | None) -> tuple[NamedClaim, ...]:
     """What is said of these claims. To a search that goes on after one `ended`, those that are still open are of no use."""
     used = (one for one in named if ended is None or one.model in (None, ended.model))
-    return tuple(replace(one, claim=_given_up(one.claim)) for one in used)
+    return tuple(
+        one if one.claim.verdict else replace(one, claim=replace(one.claim, verdict="not shown")) for one in used
+    )
 
 
 def _in_drawn_order(tests: Iterable[NumberedRun], seed: int | None) -> list[NumberedRun]:
@@ -541,10 +545,6 @@ def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:
     with_f = [environment for environment, run in claim.rests_on if fresh(environment, run) is True]
     of_what_is_left = with_f.count(of_left.environment)
     return of_what_is_left >= NEEDED_SHARE * (len(with_f) - of_what_is_left)
-
-
-def _given_up(claim: Claim) -> Claim:
-    return claim if claim.verdict else replace(claim, verdict="not shown")
 
 
 def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified) -> Work[Leg | None]:
@@ -569,10 +569,7 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
     """
     first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
     rate = driver.rate()
-
-    def fresh(environment: Environment, run: int) -> Shown:
-        return driver.shown(environment, first + run, full=True)
-
+    fresh = _fresh(driver, first)
     sound = [shown for run in lost.runs if isinstance(shown := fresh(lost.environment, run), bool)]
     lost_rate = sum(sound) / max(1, len(sound))
     claims: dict[Environment, Claim] = {}

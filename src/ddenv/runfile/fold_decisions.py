@@ -152,15 +152,12 @@ def with_settings(scenario: dict[str, Any], new: Mapping[str, Any]) -> dict[str,
 
 def _judged_anew(state: RunState, baseline: e.BaselineFinished, at: float) -> Changes:
     """Other runs show f now, so the search begins from the whole world again; tests keep their ends."""
-    state = state.changed(**left_round(state))
-    state = state.changed(**baseline_finished(state, baseline, at))
+    changes = left_round(state)
+    changes |= baseline_finished(state.changed(**changes), baseline, at)
+    state = state.changed(**changes)
     nodes = counted_again(state.nodes, state.tests)
     return {
-        **{
-            name: getattr(state, name)
-            for name in ("tests", "tally", "baseline", "certificates", "isolations", "margins")
-        },
-        **{name: getattr(state, name) for name in ("round", "status", "waiting_candidate", "confirming", "failures")},
+        **changes,
         **at_node(state, nodes[0]),
         "nodes": nodes,
         "search_due": True,
