@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 from ddenv.text import Names
 
+# Numbers of models, runs or tests, one after the other.
+Numbers = tuple[int, ...]
+
 
 @dataclass(frozen=True, slots=True)
 class Environment:

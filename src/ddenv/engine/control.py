@@ -15,7 +15,7 @@ from typing import Any
 
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, fixed_again, rejudged
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.errors import UserError
 from ddenv.guiding import commands as c
 from ddenv.runfile import events
@@ -249,7 +249,7 @@ class Control:
         self._journal.record(events.WentBack(node, rejected, outcomes))
 
 
-def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
+def _judged(journal: Journal, failures: Numbers) -> events.Outcomes:
     """The outcomes of all tests if the ends of `failures` count as f."""
     file, state = journal.file, journal.state
     return rejudged(file, state, tuple(failure_of(file, state, test) for test in failures))

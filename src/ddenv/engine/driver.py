@@ -18,7 +18,7 @@ from ddenv.engine.limits import limit_after
 from ddenv.engine.notes import note, note_alike, note_ends, note_price, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
-from ddenv.environment import NOTHING, Environment
+from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, SURELY, NumberedRun, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
@@ -474,7 +474,7 @@ class Driver:
         if any(test.cut for test in accepted):
             journal.record(events.EarlyStopEnded(certificate=certificate.number))
 
-    def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
+    def _elsewhere(self, tests: Numbers) -> events.EndsElsewhere | None:
         """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
         state = self._journal.state
         epsilon = spec_of(state).epsilon

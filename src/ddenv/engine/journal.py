@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from itertools import count
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import NumberedRun
 from ddenv.evidence.rates import Shown, estimated_rate
@@ -152,12 +152,12 @@ class Journal:
         test = None if number is None else self._tests.get((number, run, full))
         return None if test is None else self.state.test(test)
 
-    def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> tuple[int, ...]:
+    def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> Numbers:
         """The numbers of the finished tests among these runs."""
         tests = (self.test(environment, run, full) for run in runs)
         return tuple(test.id for test in tests if test is not None)
 
-    def full_tests(self, tests: Iterable[NumberedRun], first: int = 0) -> tuple[int, ...]:
+    def full_tests(self, tests: Iterable[NumberedRun], first: int = 0) -> Numbers:
         """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
         return tuple(sorted({one for models, run in tests for one in self.tests(models, (first + run,), full=True)}))
 

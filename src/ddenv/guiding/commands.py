@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, dataclass_transform, get_args
 
+from ddenv.environment import Numbers
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, fresh_runs_made, in_the_making, only_helping
 from ddenv.runfile.deeds import deed
@@ -88,7 +89,7 @@ def label_of(state: RunState, test: Test) -> str:
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 
-def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
+def numbers_of(state: RunState, names: Iterable[str]) -> Numbers:
     """The numbers of models, in the order of the world."""
     number = {name: index for index, name in enumerate(state.elements)}
     return tuple(sorted(number[name] for name in names))
@@ -401,7 +402,7 @@ def _names_of(state: RunState, numbers: Sequence[int]) -> Names | None:
 class Pin(Asked):
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
-    models: tuple[int, ...]
+    models: Numbers
 
     def refusal(self, now: Situation) -> str:
         names, kept = _names_of(now.state, self.models), frozenset(now.state.environment)
@@ -422,7 +423,7 @@ class Pin(Asked):
 class Unpin(Asked):
     """Let pinned models be removed again."""
 
-    models: tuple[int, ...]
+    models: Numbers
 
     def refusal(self, now: Situation) -> str:
         return "" if self.pinned(now.state) else "not pinned"
@@ -438,7 +439,7 @@ class Unpin(Asked):
 class Try(Asked):
     """Test a selection: `models` are the ones that are kept."""
 
-    models: tuple[int, ...]
+    models: Numbers
 
     def refusal(self, now: Situation) -> str:
         state, names = now.state, _names_of(now.state, self.models)

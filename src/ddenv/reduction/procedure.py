@@ -19,7 +19,7 @@ from itertools import islice, zip_longest
 from random import Random
 from typing import Protocol, TypeVar
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.evidence.certificate import (
     HELPING,
     NEEDED_SHARE,
@@ -122,7 +122,7 @@ class Certificate:
 
     first_run: int
     terms: Terms
-    exact: tuple[int, ...] = ()
+    exact: Numbers = ()
 
 
 @dataclass(frozen=True)
@@ -134,10 +134,10 @@ class NamedClaim:
     model: int | None
     environment: Environment
     claim: Claim
-    exact: tuple[int, ...] = ()
+    exact: Numbers = ()
 
     @property
-    def runs(self) -> tuple[int, ...]:
+    def runs(self) -> Numbers:
         """The fresh runs of its environment on which it rests, counted from the certificate's first one."""
         return tuple(run for environment, run in self.claim.rests_on if environment == self.environment)
 

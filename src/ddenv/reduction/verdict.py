@@ -8,7 +8,7 @@ from functools import lru_cache
 from itertools import count
 from typing import Literal, NamedTuple, Protocol
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.evidence.rates import HIGHEST_RATE, SPURIOUS, Shown, ShownIn
 
 Verdict = Literal["", "similar", "dissimilar", "unknown"]
@@ -51,8 +51,8 @@ class Acceptance:
     rate: float = 0.0
     keep_rate: float = 0.8
     steps_back: int = 0
-    exact: tuple[int, ...] = ()
-    broke: tuple[int, ...] = ()
+    exact: Numbers = ()
+    broke: Numbers = ()
 
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
+from ddenv.environment import Numbers
 from ddenv.runfile.deeds import named
 from ddenv.runfile.events import Place
 from ddenv.runfile.run_settings import settings
@@ -28,7 +29,7 @@ class OtherFailure:
 
     kind: str
     position: Place
-    tests: tuple[int, ...]
+    tests: Numbers
     smallest: int
     size: int
 

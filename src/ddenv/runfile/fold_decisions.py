@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.runfile.fold_tests import (
     Changes,
     baseline_finished,
@@ -241,7 +241,7 @@ def refused(state: RunState, environment: Environment, verdict: str, round: int 
     return {"refused": (*state.refused, *more), "refusals": state.refusals + 1}
 
 
-def failures_at(state: RunState, number: int) -> tuple[int, ...]:
+def failures_at(state: RunState, number: int) -> Numbers:
     """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
     way, first = path(state.nodes, number), origin(state, number)
     counted = (node for node in way[way.index(first) :] if node is first or node.how == "accepted")
@@ -254,7 +254,7 @@ def origin(state: RunState, number: int) -> Node:
     return next((node for node in reversed(way) if node.how == "instead"), way[0])
 
 
-def exact_runs(state: RunState) -> tuple[int, ...]:
+def exact_runs(state: RunState) -> Numbers:
     """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
     asked, whole = settings(state), origin(state, state.node).id
     if asked.accept_rate != "exact":
@@ -268,7 +268,7 @@ def stands_for_all(state: RunState) -> bool:
     return state.baseline is not None and state.baseline.alike and settings(state).reduces_one_run
 
 
-def broken_runs(state: RunState) -> tuple[int, ...]:
+def broken_runs(state: RunState) -> Numbers:
     """The runs of the baseline that broke each time, ascending."""
     runs: dict[int, bool] = {}
     for test in state.tests:

@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
+from ddenv.environment import Numbers
 from ddenv.runfile.progress import Node, Point, Removal
 from ddenv.runfile.state import CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
 
@@ -175,13 +176,13 @@ def _noted(state: RunState, test: Test) -> Changes:
     return {"nodes": with_node(state.nodes, after)}
 
 
-def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
+def same_runs(state: RunState, test: Test) -> Numbers:
     """The tests that were made for the same candidate, try or environment as `test`."""
     made_for = attrgetter("phase", "round", "candidate", "trial", "removal", "node", "without")
     return tuple(other.id for other in state.tests if made_for(other) == made_for(test))
 
 
-def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:
+def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[Numbers, int]:
     """Those of some tests that ended and did not break, each once, and how many of them showed f."""
     sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and tests[id - 1].is_sound)
     return sound, sum(tests[id - 1].shows_f for id in sound)

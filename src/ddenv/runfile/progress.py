@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.text import Names
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ class Leg:
     settings: dict[str, Any]
     rate: float = 0.0
     steps_back: int = 0
-    tests: tuple[int, ...] = ()
-    again: tuple[tuple[int, ...], ...] = ()
+    tests: Numbers = ()
+    again: tuple[Numbers, ...] = ()
     past: tuple[PastRound, ...] = ()
 
 
@@ -45,8 +45,8 @@ class PastRound:
     digest: int
     winner: int | None
     evidence_test: int | None
-    tests: tuple[int, ...]
-    unknown: tuple[int, ...] = ()
+    tests: Numbers
+    unknown: Numbers = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +91,9 @@ class Node:
     minimal: bool = False
     rejected: bool = False
     lost_rate: bool = False
-    runs: tuple[int, ...] = ()
+    runs: Numbers = ()
     shown: int = 0
-    sliced_by: tuple[int, ...] = ()
+    sliced_by: Numbers = ()
     to_audit: bool = False
 
 
@@ -125,7 +125,7 @@ class Certificate:
     claims: tuple[Claim, ...] = ()
     past: bool = False
     branch: bool = False
-    seeds: tuple[int, ...] = ()
+    seeds: Numbers = ()
     elsewhere: e.EndsElsewhere | None = None
 
 
@@ -182,7 +182,7 @@ class Removal:
     models: Names
     environment: int
     verdict: str = ""
-    tests: tuple[int, ...] = ()
+    tests: Numbers = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from ddenv.environment import NOTHING, Environment
+from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.runfile.progress import Isolation, Margins, Node, Physics, path
 from ddenv.text import Names
 
@@ -143,9 +143,9 @@ class RunState:
     judged: PersistentTuple[int] = field(default_factory=PersistentTuple)
     refused: tuple[Refusal, ...] = ()
     refusals: int = 0
-    lost: tuple[tuple[tuple[int, ...], Environment], ...] = ()
+    lost: tuple[tuple[Numbers, Environment], ...] = ()
     steps_back: int = 0
-    again: tuple[tuple[int, ...], ...] = ()
+    again: tuple[Numbers, ...] = ()
     engines: int = 0
     left_unknown: bool = False
     mixed_until: int = 0
@@ -169,7 +169,7 @@ class RunState:
     came_at: int = 0
     trials: tuple[Trial, ...] = ()
     decisions: tuple[Decision, ...] = ()
-    failures: tuple[int, ...] = ()
+    failures: Numbers = ()
     certificates: tuple[Certificate, ...] = ()
     fresh: PersistentTuple[int] = field(default_factory=PersistentTuple)
     isolations: tuple[Isolation, ...] = ()
@@ -375,7 +375,7 @@ class Split:
     whole: Environment = NOTHING
     parts: tuple[Environment, ...] = ()
     always: Environment = NOTHING
-    letters: tuple[int, ...] = ()
+    letters: Numbers = ()
 
     @property
     def lettered(self) -> Iterator[tuple[int, Names]]:
@@ -404,7 +404,7 @@ class Candidate:
     split: Split = field(repr=False, hash=False)
     distance: float | None = None
     verdict: str = ""
-    tests: tuple[int, ...] = ()
+    tests: Numbers = ()
 
     @property
     def kept(self) -> Environment:
@@ -445,7 +445,7 @@ class Trial:
     node: int
     environment: int = 0
     verdict: str = ""
-    tests: tuple[int, ...] = ()
+    tests: Numbers = ()
     adopted: bool = False
 
     @property
