@@ -17,7 +17,7 @@ from ddenv.engine.notes import note_slow
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
 from ddenv.engine.slicing import audit_is_due, compare
-from ddenv.engine.worker import Broken, Run, Start
+from ddenv.engine.worker import Broken, Ended, Result, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Changed, Test
@@ -66,7 +66,7 @@ class Bench:
         self._pool = pool
         self._control = control
         self._others = dict(others or {})
-        self._taken: list[tuple[int, RunResult | Broken]] = []
+        self._taken: list[Ended] = []
         self._started: set[tuple[Environment, int, bool]] = set()
         self._next_live = 0.0
         self._live_shown = False
@@ -170,7 +170,7 @@ class Bench:
             )
         self._journal.record(Compared(result is None))
 
-    def made_again(self, test: KnownTest, tells: bool = True) -> RunResult | Broken | None:
+    def made_again(self, test: KnownTest, tells: bool = True) -> Result | None:
         """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit.
 
         `tells`: views say so.
@@ -275,7 +275,7 @@ class Bench:
                 self._journal.file.set_live([test for test, _ in live])
             self._live_shown = bool(live)
 
-    def outcome_of(self, result: RunResult | Broken) -> str:
+    def outcome_of(self, result: Result) -> str:
         """What a run showed, judged by what counts as f now."""
         return str(result_data(result, self._known())["outcome"])
 
@@ -288,7 +288,7 @@ class Bench:
             self._failed = failed
         return self._failures
 
-    def _record(self, test: int, result: RunResult | Broken) -> None:
+    def _record(self, test: int, result: Result) -> None:
         journal = self._journal
         data = result_data(result, self._known())
         started = journal.state.test(test)

@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 
 from ddenv.engine.journal import Journal
-from ddenv.engine.worker import Broken
+from ddenv.engine.worker import Broken, Result
 from ddenv.errors import UserError
 from ddenv.evidence.rates import anytime_interval, iterations_needed, miss_chance, wilson_interval
 from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
-from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
 from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import RunState, Test
@@ -34,7 +33,7 @@ from ddenv.world.scenario import FailureSpec, Reduction
 FURTHER = 3
 
 
-def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
+def result_data(result: Result, failures: Sequence[Failure] = ()) -> dict[str, Any]:
     """A result as the fields of `TestFinished`, with models by name, judged by f and the failures accepted as f; the nearest one
     counts.
 
@@ -74,7 +73,7 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     }
 
 
-def motions_of(result: RunResult | Broken) -> Motions:
+def motions_of(result: Result) -> Motions:
     """How the robot and other models moved, as a run file has it."""
     if isinstance(result, Broken):
         return {}
