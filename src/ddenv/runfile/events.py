@@ -80,11 +80,12 @@ class Resumed(Event):
 
 
 class DiskSpace(Event):
-    """Whether the disk has room for more tests: `needed` bytes; `free` are there."""
+    """Whether the disk has room for more tests: `needed` bytes; `free` are there. `in_file`: up to the limit of a file's size."""
 
     enough: bool
     needed: Natural
     free: Natural
+    in_file: bool = False
 
 
 class ClockJumped(Event):

@@ -336,7 +336,10 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
 } | {
     e.Cluster: lambda _, event, __: {"jobs": event.jobs, "cluster": event.words},
     e.Comparing: lambda *_: {},
-    e.DiskSpace: lambda _, event, __: {"needs_room": 0 if event.enough else event.needed},
+    e.DiskSpace: lambda _, event, __: {
+        "needs_room": 0 if event.enough else event.needed,
+        "file_is_full": event.in_file,
+    },
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Still: lambda *_: {"ties": ()},
     e.Noted: lambda state, event, _: {"notes": (*state.notes, (event.about, event.words))},

@@ -128,7 +128,8 @@ class RunState:
     `engines` counts the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one
     makes them again. `notes` say what is wrong with the whole world: a word and a sentence each. `refusal` is the last command
     that the engine could not obey, with the reason. `needs_room` is how many bytes have to be free on the disk before more tests
-    start. `working_seconds` is the time that ended engines have worked; `started_at` (Unix time, s) is set while one works.
+    start; where the `file_is_full`, below the limit of a file's size. `working_seconds` is the time that ended engines have worked;
+    `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
@@ -152,6 +153,7 @@ class RunState:
     accept_mode: str = "automatic"
     paused: bool = False
     needs_room: int = 0
+    file_is_full: bool = False
     waiting_candidate: int | None = None
     baseline: BaselineFinished | None = None
     round: Round | None = None

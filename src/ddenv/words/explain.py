@@ -179,7 +179,12 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
     step, sentences = happening
     if state.needs_room and not state.ended:
         free = f"{state.needs_room / 1e6:.0f} MB"
-        return step, (f"The disk is full: no new test starts until {free} are free. Nothing is lost.", *sentences)
+        full = f"The disk is full: no new test starts until {free} are free."
+        if state.file_is_full:
+            full = (
+                "The run file is as large as a file may be (ulimit -f): no new test starts until that limit is raised."
+            )
+        return step, (f"{full} Nothing is lost.", *sentences)
     if not state.paused:
         return happening
     rest = "running tests finish first" if state.tally["running"] else "none is running"

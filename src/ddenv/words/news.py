@@ -102,6 +102,8 @@ def _compared(before: RunState, after: RunState) -> str:
 
 def _disk_space(before: RunState, after: RunState) -> str:
     if after.needs_room:
+        if after.file_is_full:
+            return "  the run file is as large as a file may be (ulimit -f): waiting until that limit is raised"
         return f"  out of disk space: waiting until {after.needs_room / 1e6:.0f} MB are free"
     return "  there is disk space again" if before.needs_room else ""
 

@@ -143,7 +143,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
     elif status == "lost":
         way_on = ": r resumes"
     elif state.needs_room and not state.ended:
-        sign, word = "!", "out of disk space"
+        sign, word = "!", "file too large" if state.file_is_full else "out of disk space"
     return {
         "state": (f"{sign} {word}{way_on}", f"{sign} {word}"),
         "asked": (f"… {asked}", "…") if asked else (),
