@@ -362,10 +362,12 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     fresh = _fresh(driver, certificate.first_run)
 
     def ends(claim: NamedClaim) -> bool:
-        if claim.model is None:
-            shown = (fresh(left, run) for run in claim.runs)
-            return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in shown)
-        return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
+        verdict = claim.claim.verdict
+        if claim.model is not None:
+            return verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
+        if verdict != "not shown":
+            return verdict == "lost"
+        return all(fresh(left, run) is not True for run in claim.runs)
 
     settle_claims = _settled_in_turn if certificate.terms.order_seed is None else _settled_in_blocks
     made = yield from settle_claims(driver, certificate, left, whole, rests, ends)
