@@ -7,9 +7,12 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 # Names in their order, such as those of the models in a world.
 Names = tuple[str, ...]
+# Plain data by name, as JSON and YAML have it.
+Data = dict[str, Any]
 # Sentences, or short pieces of text, one after the other.
 Sentences = tuple[str, ...]
 

@@ -14,7 +14,7 @@ import click
 
 from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
-from ddenv.text import coordinates, count, percent, printable
+from ddenv.text import Data, coordinates, count, percent, printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.progress import Claim
@@ -114,7 +114,7 @@ def line(result: Mapping[str, Any]) -> str:
     return f"{said}\n  {printable(result['recorded'])}" if "recorded" in result else said
 
 
-def summary(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def summary(results: Sequence[Mapping[str, Any]]) -> list[Data]:
     """For all models, then without each one that was left out: its runs that did not break, and how many of them failed.
 
     `shown` counts the runs that ended in f, or in any failure where no f is known; `rate`, `low` and `high` are None without runs.
@@ -153,7 +153,7 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
     return found
 
 
-def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[dict[str, Any]]:
+def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[Data]:
     """What runs in another simulator show of what is left, of which the certificate says `here`, and of that without each model.
 
     What is left `fails` if f shows there at the certificate's rate, and not if at less than half of it. Without a model it fails if

@@ -17,7 +17,7 @@ from ddenv.cli.options import Numbers, reading_options, remembered_option, scena
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named_file
-from ddenv.text import count, first_of, printable, shortened
+from ddenv.text import Data, count, first_of, printable, shortened
 from ddenv.world.access import is_directives
 from ddenv.world.pose import Point
 
@@ -46,7 +46,7 @@ def world_command() -> None:
     """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
 
 
-def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
+def _read(file: Path, options: Data) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
     from ddenv.runs.subject import reading_of, with_remembered
     from ddenv.world.load import load_scenario
@@ -76,7 +76,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
     return 0
 
 
-def world_report(world: World) -> dict[str, Any]:
+def world_report(world: World) -> Data:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.extent import model_bounds
     from ddenv.world.placement import inside

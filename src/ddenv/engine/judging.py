@@ -8,7 +8,6 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ddenv.runfile.failures import grouped
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import ROBOT, Motions, RunFile
 from ddenv.runs.playback import table
-from ddenv.text import count, percent_at_most
+from ddenv.text import Data, count, percent_at_most
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Vector, headings
@@ -33,7 +32,7 @@ from ddenv.world.scenario import FailureSpec, Reduction
 FURTHER = 3
 
 
-def result_data(result: Result, failures: Sequence[Failure] = ()) -> dict[str, Any]:
+def result_data(result: Result, failures: Sequence[Failure] = ()) -> Data:
     """A result as the fields of `TestFinished`, with models by name, judged by f and the failures accepted as f; the nearest one
     counts.
 
@@ -56,7 +55,7 @@ def result_data(result: Result, failures: Sequence[Failure] = ()) -> dict[str, A
         judgement = nearest([judge(result, failure) for failure in failures])
         outcome, distance = judgement.outcome, judgement.distance
     pose = tuple(float(value) for value in result.end_pose)
-    more: dict[str, Any] = {"taken": result.taken} if result.taken else {}
+    more: Data = {"taken": result.taken} if result.taken else {}
     if result.took_part is not None:
         more["took_part"] = sorted(result.took_part)
     return {

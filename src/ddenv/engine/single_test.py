@@ -8,7 +8,6 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import table
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
-from ddenv.text import Names, count
+from ddenv.text import Data, Names, count
 from ddenv.words.claims import still_fails
 from ddenv.words.early_stop import beside_record
 from ddenv.world.scenario import Oracle, seed_of
@@ -103,7 +102,7 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
     return subject.state.environment if minimal and subject.state else subject.elements
 
 
-def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
+def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Data]:
     """Makes the runs in worker processes; yields the result of each, in order, as plain data. Without f a failed run is just
     "failed".
     """
@@ -118,7 +117,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
                 test.id: (test, table(file.motion(test.id) or array("d"))) for test in repeated if test.is_finished
             }
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
-    results: dict[int, dict[str, Any]] = {}
+    results: dict[int, Data] = {}
     started = shown = 0
     try:
         while shown < len(trials):
@@ -191,9 +190,7 @@ def expected(subject: Subject, where: object) -> Certificate:
     return found
 
 
-def reproduce(
-    subject: Subject, certificate: Certificate, most: int, jobs: int
-) -> Iterator[tuple[dict[str, Any], Reproduction]]:
+def reproduce(subject: Subject, certificate: Certificate, most: int, jobs: int) -> Iterator[tuple[Data, Reproduction]]:
     """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
     expects; where chosen runs were reduced, with their seeds, of which each has to show f. Yields each run's result, and what all
     of them show together.

@@ -23,7 +23,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import made_for, purpose
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.text import Names, as_sentence, coordinates, count, first_of, printable, shortened, snake_case
+from ddenv.text import Data, Names, as_sentence, coordinates, count, first_of, printable, shortened, snake_case
 
 Row = Candidate | Trial
 
@@ -240,7 +240,7 @@ class Change(Asked):
     begins from the whole world.
     """
 
-    settings: dict[str, Any]
+    settings: Data
 
     def refusal(self, now: Situation) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
@@ -637,7 +637,7 @@ def send(file: RunFile, command: Command) -> int:
     return file.send(kind, **data)
 
 
-def written(command: Command) -> tuple[str, dict[str, Any]]:
+def written(command: Command) -> tuple[str, Data]:
     """A command as it stands in the run file: its kind, and its fields as JSON."""
     return snake_case(type(command).__name__), plain(command)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -15,7 +14,7 @@ from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, Test
 from ddenv.runfile.tested import pointed
-from ddenv.text import Names, count
+from ddenv.text import Data, Names, count
 
 SAID = {
     "similar": "f again: it fails as in the whole world",
@@ -25,7 +24,7 @@ SAID = {
 # Candidates of a round to choose from, and models of a candidate that are named there.
 MOST, FEW = 6, 3
 # Why something came about, as questions and answers.
-REASONS: dict[str, dict[str, Any]] = yaml.safe_load(Path(__file__).with_name("reasons.yaml").read_text())
+REASONS: dict[str, Data] = yaml.safe_load(Path(__file__).with_name("reasons.yaml").read_text())
 # By the setting `growth`, what n does.
 _GROWTH = {
     "paper": "After each round n grows by one, but never above the number of models.",

@@ -7,12 +7,12 @@ from 1. A field with a default may be missing in a file. Times are in s, places 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, dataclass_transform
+from typing import Annotated, dataclass_transform
 
 from ddenv.environment import NOTHING
 from ddenv.runfile.deeds import named
 from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Pose, Positive, Real, Seconds, Share
-from ddenv.text import Names, snake_case
+from ddenv.text import Data, Names, snake_case
 
 Pair = tuple[Natural, Natural]
 Place = tuple[Real, Real, Real]
@@ -37,7 +37,7 @@ class Created(Event):
     the second.
     """
 
-    scenario: dict[str, Any]
+    scenario: Data
     elements: Names
     welds: tuple[Pair, ...] = ()
 
@@ -658,7 +658,7 @@ class WentBack(Event):
 class Changed(Event):
     """New values of settings. Where they say anew which failures are the same, `baseline` is fixed again, and judges all tests."""
 
-    settings: dict[str, Any]
+    settings: Data
     baseline: BaselineFinished | None = None
 
 

@@ -21,7 +21,7 @@ from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusa
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.settings import SETTINGS, read
-from ddenv.text import count, first_of, plain, truncated
+from ddenv.text import Data, count, first_of, plain, truncated
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -141,7 +141,7 @@ def changed(state: RunState, event: e.Changed, at: float) -> Changes:
     return changes if set(event.settings) == {"budget"} else changes | searched_anew(state)
 
 
-def with_settings(scenario: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+def with_settings(scenario: Data, new: Mapping[str, Any]) -> Data:
     """A scenario as plain data with new values of settings. Raises KeyError for a setting that there is not."""
     sections = {SETTINGS[name].section for name in new}
     return scenario | {

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.environment import Numbers
 from ddenv.runfile.progress import Node, Point, Removal
 from ddenv.runfile.state import CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
+from ddenv.text import Data
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -54,7 +55,7 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
     return changes | with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
 
 
-def shared(event: Any, kind: type[Any]) -> dict[str, Any]:
+def shared(event: Any, kind: type[Any]) -> Data:
     """The fields that a part of an event and the state have in common."""
     return {field.name: getattr(event, field.name) for field in fields(kind) if hasattr(event, field.name)}
 
@@ -81,7 +82,7 @@ def test_finished(state: RunState, event: e.TestFinished, _: float) -> Changes:
     return _ended_as(state, event.test, values)
 
 
-def _ended_as(state: RunState, test: int, values: dict[str, Any]) -> Changes:
+def _ended_as(state: RunState, test: int, values: Data) -> Changes:
     changes = with_test(state, test, values)
     return changes | _noted(state, changes["tests"][test - 1])
 
@@ -128,7 +129,7 @@ def with_outcomes(state: RunState, judged: e.Outcomes) -> Changes:
     return {"tests": state.tests, "tally": state.tally}
 
 
-def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
+def with_test(state: RunState, id: int, values: Data) -> Changes:
     if id < 1:
         raise IndexError(id)
     before = state.test(id)

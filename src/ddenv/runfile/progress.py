@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ddenv.environment import Environment, Numbers
-from ddenv.text import Names
+from ddenv.text import Data, Names
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -28,7 +28,7 @@ class Leg:
     n_partitions: int | None
     pinned: frozenset[str]
     evidence_test: int
-    settings: dict[str, Any]
+    settings: Data
     rate: float = 0.0
     steps_back: int = 0
     tests: Numbers = ()

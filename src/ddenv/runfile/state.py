@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.runfile.progress import Isolation, Margins, Node, Physics, path
-from ddenv.text import Names
+from ddenv.text import Data, Names
 
 if TYPE_CHECKING:
     from ddenv.runfile.events import BaselineFinished, EarlyStopEnded, Forecast, Place
@@ -135,7 +135,7 @@ class RunState:
     revision: int = 0
     status: str = "created"
     reason: str = ""
-    scenario: dict[str, Any] = field(default_factory=dict)
+    scenario: Data = field(default_factory=dict)
     elements: Names = ()
     environments: PersistentTuple[Environment] = field(default_factory=PersistentTuple)
     environment: Names = ()

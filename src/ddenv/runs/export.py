@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.evidence.margins import fixes_of
@@ -16,7 +15,7 @@ from ddenv.runs.reasons import removed_in_passing
 from ddenv.runs.subject import RESOURCE, Subject, read_subject
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
-from ddenv.text import Names
+from ddenv.text import Data, Names
 from ddenv.world.access import Missing, Unusable, check_ending, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
@@ -125,7 +124,7 @@ def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Pa
     return name, found
 
 
-def keys_in(folder: Path, scenario: Scenario) -> dict[str, Any]:
+def keys_in(folder: Path, scenario: Scenario) -> Data:
     """The keys of a file in `folder` with this scenario: what lies in there is named relative to it, so that it can be moved."""
     data = scenario.model_dump(mode="json")
     # The scenario's folder is only searched for the user's own programs.

@@ -19,7 +19,7 @@ from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
-from ddenv.text import Names, first_of, shortened
+from ddenv.text import Data, Names, first_of, shortened
 from ddenv.world.access import MissingFiles, is_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
@@ -199,7 +199,7 @@ def with_options(
     return validate(chosen, "options", named)
 
 
-def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
+def with_values(data: Data, values: Mapping[str, Value]) -> Data:
     """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
     for name in values:
         if name not in SETTINGS:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import meshcat.geometry as meshcat
 import numpy as np
 
 from ddenv.scene import colors
 from ddenv.scene.colors import Color
+from ddenv.text import Data
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, Visual
 from ddenv.world.pose import Point, Pose
 
@@ -227,7 +227,7 @@ def paint(model: Model) -> list[Surface]:
 
 def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> meshcat.Mesh:
     """An object of one colour. `glow` 0..1 is its own light; with `offset` above 0, others in the same plane are drawn over it."""
-    options: dict[str, Any] = {}
+    options: Data = {}
     if glow:
         red, green, blue, _ = color
         options["emissive"] = colors.hexadecimal((glow * red, glow * green, glow * blue, 1.0))

@@ -26,7 +26,7 @@ from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
 from ddenv.scene.shot import Shot, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
-from ddenv.text import Names
+from ddenv.text import Data, Names
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
 from ddenv.world.sdf.numbers import changed
@@ -80,7 +80,7 @@ class Player:
         self._wanted = wanted
         self._position.go(wanted.at)
 
-    def play(self, test: int) -> dict[str, Any]:
+    def play(self, test: int) -> Data:
         """A finished test for a browser: what is there, how it moves, and what the run file `lacks` of it, in sentences.
 
         `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
@@ -109,7 +109,7 @@ class Player:
             "lacks": " ".join(one.lacks),
         }
 
-    def pairs(self) -> dict[str, Any]:
+    def pairs(self) -> Data:
         """What a browser may choose: how many tests there are, and pairs with the same seed that show why the robot fails.
 
         There are none before fresh runs show it. The ghost's test is the last of a pair; `equal` is until when they are the same,

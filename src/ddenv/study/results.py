@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
@@ -30,7 +30,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.study.plan import Cell, Method, Plan, run_path
-from ddenv.text import Names
+from ddenv.text import Data, Names
 from ddenv.world.access import read_bytes
 from ddenv.world.scenario import Scenario
 
@@ -191,7 +191,7 @@ class Paper(NamedTuple):
 
 
 # The paper's tables, by scenario: their numbers, and their rows by pair.
-TABLES: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text())
+TABLES: Data = yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text())
 
 
 def paper_row(cell: Cell) -> Paper | None:
