@@ -1,4 +1,4 @@
-"""What `ddenv.reduce` costs and finds with its defaults: our columns of the table "Beside Shrink Ray".
+"""What `ddenv.reduce` costs and finds with its defaults, beside Shrink Ray where that is installed.
 
     python benchmarks/library.py [--worlds N] [--only TEXT] [--jobs N]
 
@@ -6,16 +6,23 @@ Worlds of 43, 100 and 200 models of which 2 or 5 are needed, without a robot (se
 column an algorithm: the calls of the test until it ended, mean (worst); in how many % of the worlds all needed models are left,
 and nothing needless; the share of the failure rate that is really kept, and in how many % the result says that it is not shown.
 
-Shrink Ray itself has no column here: it needs a newer Python than this project has to support.
+Shrink Ray needs Python 3.12. It reduces a file with a model in each line, in this process, with its handling of flaky tests, and
+by its deletion of lines alone: all else has no use for a list of names. Candidates that are no such list count as no calls. It
+needs neither Drake nor a language model here:
+
+    pip install --no-deps shrinkray
+    pip install attrs chardet click humanize libcst numpy tree-sitter tree-sitter-language-pack trio
 """
 
 from __future__ import annotations
 
 import argparse
+import random
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from multiprocessing import get_context
 from statistics import fmean
 
@@ -25,7 +32,8 @@ from tests_needed import World, make_world
 import ddenv
 
 SIZES = tuple((n, k) for n in (43, 100, 200) for k in (2, 5))
-COLUMNS = ("splitting", "ddenv", "probdd", "ddmin")
+SHRINK_RAY = "Shrink Ray"
+COLUMNS = ("splitting", "ddenv", "probdd", "ddmin", *((SHRINK_RAY,) if find_spec("shrinkray") else ()))
 Test = Callable[[frozenset[str]], bool]
 
 
@@ -86,6 +94,57 @@ def by_ddenv(world: World, test: Test, algorithm: str, seed: int) -> Ending:
     return Ending(found.tests, frozenset(found.kept), found.claims[0].verdict if found.claims else "")
 
 
+def by_shrink_ray(world: World, test: Test, seed: int) -> Ending:
+    """Raises UserError where it finds no failure to reduce."""
+    import trio
+    from shrinkray.nondeterminism import NondeterminismPolicy
+    from shrinkray.passes.bytes import Split
+    from shrinkray.passes.definitions import compose
+    from shrinkray.passes.sequences import delete_elements
+    from shrinkray.problem import BasicReductionProblem, InvalidInitialExample
+    from shrinkray.reducer import ShrinkRay
+    from shrinkray.work import WorkContext
+
+    calls = 0
+
+    def names(file: bytes) -> frozenset[str]:
+        return frozenset(file.decode(errors="replace").splitlines())
+
+    async def fails(file: bytes) -> bool:
+        nonlocal calls
+        if not names(file) <= set(world.elements):
+            return False
+        calls += 1
+        return test(names(file))
+
+    async def remember(file: bytes) -> None:
+        history.append(file)
+
+    whole = "\n".join(world.elements).encode()
+    history = [whole]
+    problem = BasicReductionProblem(
+        whole, fails, WorkContext(random=random.Random(seed)), policy=NondeterminismPolicy(), history=history
+    )
+    problem.on_reduce(remember)
+    reducer = ShrinkRay(
+        target=problem,
+        initial_cuts=[],
+        # One line after the other, larger blocks as that succeeds. Its blocks of all sizes took twenty times as many calls.
+        great_passes=[compose(Split(b"\n"), delete_elements)],
+        ok_passes=[],
+        last_ditch_passes=[],
+        polish_passes=[],
+        # A list of names is taken for Python.
+        python_reducer=False,
+        restart_at_fixpoint=False,
+    )
+    try:
+        trio.run(reducer.run)
+    except InvalidInitialExample as error:
+        raise ddenv.UserError(str(error)) from None
+    return Ending(calls, names(problem.current_test_case), "")
+
+
 def one(task: Task) -> tuple[float, ...] | None:
     """Calls, whether the needed models are left, whether nothing needless is, the share of the rate, whether that is not shown.
 
@@ -103,7 +162,10 @@ def one(task: Task) -> tuple[float, ...] | None:
         return bool(rng.random() < failure.in_kept(kept, world, more))
 
     try:
-        ending = by_ddenv(world, test, task.column, task.seed)
+        if task.column == SHRINK_RAY:
+            ending = by_shrink_ray(world, test, task.seed)
+        else:
+            ending = by_ddenv(world, test, task.column, task.seed)
     except ddenv.UserError:
         return None
     useful = set(more[:5]) if failure.less < 1.0 else set(more[:2]) if failure.drifts < 1.0 else set()

@@ -8,6 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from ddenv.text import Names
+
+# Numbers of models, runs or tests, one after the other.
+Numbers = tuple[int, ...]
+
 
 @dataclass(frozen=True, slots=True)
 class Environment:
@@ -62,7 +67,7 @@ class Environment:
             yield model
             model = digits.find("1", model + 1)
 
-    def names(self, elements: Sequence[str]) -> tuple[str, ...]:
+    def names(self, elements: Sequence[str]) -> Names:
         """The names of its models, in the order of `elements`, the names of all models."""
         return tuple(elements[model] for model in self)
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from ddenv.text import plain
+from ddenv.text import Data, plain
 
 Value = int | float | str | bool | None
 
@@ -381,7 +381,7 @@ def read(scenario: Mapping[str, Any], one: Setting) -> Value:
     return plain(value) if isinstance(value, str) else value
 
 
-def put(scenario: Mapping[str, dict[str, Any]], one: Setting, value: Value) -> None:
+def put(scenario: Mapping[str, Data], one: Setting, value: Value) -> None:
     """Writes a setting to a scenario as plain data, unchecked: the scenario's model checks it."""
     section = scenario[one.section]
     if one.stored:

@@ -7,6 +7,14 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
+
+# Names in their order, such as those of the models in a world.
+Names = tuple[str, ...]
+# Plain data by name, as JSON and YAML have it.
+Data = dict[str, Any]
+# Sentences, or short pieces of text, one after the other.
+Sentences = tuple[str, ...]
 
 # 100 * 0.29 is a bit less than 29.
 ROUNDING = 1e-9

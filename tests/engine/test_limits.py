@@ -10,13 +10,13 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.limits import (
     FACTOR,
     GENEROUS,
-    KNOWN_AFTER,
     LEAST,
     MOST_DEATHS,
     MOST_LATE,
     check_crash_loop,
     memory_limit,
 )
+from ddenv.engine.notes import KNOWN_AFTER
 from ddenv.engine.pool import Pool
 from ddenv.engine.worker import Broken, Run
 from ddenv.errors import UserError

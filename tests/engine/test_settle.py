@@ -4,7 +4,7 @@ import pytest
 
 from ddenv.engine import bench
 from ddenv.engine.journal import Journal
-from ddenv.engine.limits import note_start
+from ddenv.engine.notes import note_start
 from ddenv.engine.worker import Broken
 from ddenv.errors import UserError
 from ddenv.robot.settled import Settled, notes_on

@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.engine.driver import Driver
-from ddenv.engine.limits import note_start
+from ddenv.engine.notes import note_start
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.store import RunFile

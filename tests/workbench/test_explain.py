@@ -158,6 +158,9 @@ def test_a_full_disk_comes_first(run):
     fake_moments.mid_round(run).write("disk_space", enough=False, needed=32_000_000, free=1)
     assert told(run)[1].startswith("The disk is full: no new test starts until 32 MB are free.")
     assert facts(snapshot(run))["state"][0] == "! out of disk space"
+    run.write("disk_space", enough=False, needed=2_000_000, free=1, in_file=True)
+    assert told(run)[1].startswith("The run file is as large as a file may be (ulimit -f)")
+    assert facts(snapshot(run))["state"][0] == "! file too large"
     run.write("disk_space", enough=True, needed=32_000_000, free=10**9)
     assert "disk" not in told(run)[1]
 

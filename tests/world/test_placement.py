@@ -1,6 +1,7 @@
 """What stands inside what, and how deep: no robot starts inside something, or in the air, unnoticed."""
 
 import math
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -232,6 +233,16 @@ def test_the_way_down_is_measured_to_what_is_below(spawn, height):
     assert drop(WALL, HUSKY, spawn) == pytest.approx(height, abs=0.05)
     told = [about for about, _ in notes_on_start(WALL, HUSKY, spawn)]
     assert told == (["drop"] if height > DROP else [])
+
+
+def test_wheels_in_the_air_and_a_world_that_pulls_nothing_down_are_noted():
+    # Between the wheels a block of 0.3 m stands on the deck.
+    block = world(box_model("block", "0 0 0.45 0 0 0", "0.3 0.3 0.3", None)).models[-1]
+    ((about, words),) = notes_on_start(replace(WALL, models=(*WALL.models, block)), HUSKY, Spawn(x=0, y=0, z=0.65))
+    assert about == "wheels" and "no wheel touches anything" in words
+    for gravity in (0.0, 9.81):
+        floating = replace(WALL, gravity=(0.0, 0.0, gravity))
+        assert [about for about, _ in notes_on_start(floating, HUSKY, Spawn(x=0, y=0, z=0.45))] == ["gravity"]
 
 
 def test_a_goal_inside_a_post_is_noted():

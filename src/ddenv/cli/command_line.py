@@ -29,7 +29,7 @@ from ddenv.schemas import nearest
 COMMANDS = {
     **dict.fromkeys(("run", "resume", "certify"), "run"),
     **dict.fromkeys(("open", "serve"), "workbench"),
-    **dict.fromkeys(("runs", "schemas", "config", "doctor"), "lists"),
+    **dict.fromkeys(("runs", "diff", "schemas", "config", "doctor"), "lists"),
     **dict.fromkeys(("export", "reproduce", "report"), "share"),
     **dict.fromkeys(("why", "isolate", "margins"), "explain"),
     **{name: name for name in ("test", "learn", "study", "world")},

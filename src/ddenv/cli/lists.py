@@ -1,4 +1,4 @@
-"""Commands that only look: `ddenv runs`, `schemas`, `config` and `doctor`."""
+"""Commands that only look: `ddenv runs`, `diff`, `schemas`, `config` and `doctor`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import click
 
-from ddenv.cli.options import json_option, runs
-from ddenv.cli.terminal import terminal_columns, wrapped
+from ddenv.cli.options import json_option, runs, runs_and_scenarios
+from ddenv.cli.terminal import say, terminal_columns, wrapped
 from ddenv.doctor import Finding, is_well
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, runs_folder
@@ -40,6 +40,32 @@ def runs_command() -> int:
         size = f"{len(run.kept)} of {run.total} models"
         says = run.trouble or f"{status:<18}  {size:<20}  {run.tests} tests"
         print(printable(f"{run.path.stem:<{width}}  {says}"))
+    return 0
+
+
+@click.command("diff")
+@click.argument("first", metavar="SCENARIO_OR_RUN", shell_complete=runs_and_scenarios)
+@click.argument("second", metavar="SCENARIO_OR_RUN", shell_complete=runs_and_scenarios)
+@json_option
+def diff_command(first: str, second: str, as_json: bool) -> int:
+    """Shows in what two runs, or two scenarios, differ: how they ended, which models are there, and their settings.
+
+    Of a run, the models are those that are left. Models of one name that differ in place, size or friction are listed, too.
+    """
+    from ddenv.runs.comparison import as_recent, compared, unlike
+    from ddenv.runs.subject import open_subject
+
+    subjects = [open_subject(name, dict.fromkeys(("spawn", "goal", "world"))) for name in (first, second)]
+    one, other = (as_recent(name, each) for name, each in zip((first, second), subjects, strict=True))
+    models = unlike(subjects[0].world, subjects[1].world)
+    rows = [row for row in (*compared(one, other), *models) if row[1] != row[2]]
+    if as_json:
+        keys = ("what", "first", "second")
+        print(json.dumps({"differences": [dict(zip(keys, row, strict=True)) for row in rows]}))
+        return 0
+    width = max(len(name) for name, *_ in rows)
+    for name, value, another in rows:
+        say(f"{value} | {another}", f"{name:<{width}}  ")
     return 0
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Any
 
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out, only_helping
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.slices import simulated
 from ddenv.runfile.progress import Node
-from ddenv.runfile.state import BROKEN, RunState, spent
+from ddenv.runfile.state import RunState, spent
 from ddenv.runs.folder import attach_name
-from ddenv.text import count, first_of, percent, printable
+from ddenv.text import Data, count, first_of, percent, printable
 from ddenv.words.claims import drift, meaning, means, missing, promise, rate, seen, smaller_known, verdict_on, what_ran
 from ddenv.words.early_stop import why_off
 
@@ -20,7 +19,7 @@ from ddenv.words.early_stop import why_off
 MOST_NAMES = 12
 
 
-def summary(state: RunState, path: Path) -> dict[str, Any]:
+def summary(state: RunState, path: Path) -> Data:
     """The object that `--json` prints. Durations are in s."""
     return {
         "models_before": len(state.elements),
@@ -46,17 +45,17 @@ def summary(state: RunState, path: Path) -> dict[str, Any]:
     }
 
 
-def _rate(node: Node | None) -> dict[str, Any] | None:
+def _rate(node: Node | None) -> Data | None:
     """How often f showed in an environment, from all runs of it that did not break."""
     return None if node is None or not node.runs else _share(node.shown, len(node.runs))
 
 
-def _share(shown: int, runs: int) -> dict[str, Any]:
+def _share(shown: int, runs: int) -> Data:
     low, high = wilson_interval(shown, runs)
     return {"shown": shown, "runs": runs, "rate": shown / runs, "low": low, "high": high}
 
 
-def certificate(state: RunState) -> dict[str, Any] | None:
+def certificate(state: RunState) -> Data | None:
     """What fresh runs show of what is left; None where none were made."""
     found = current(state)
     if found is None:
@@ -115,7 +114,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     more += f"; {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
     names = first_of(state.environment, MOST_NAMES)
     # They say nothing about the failure.
-    broken = [test for test in state.tests if test.outcome in BROKEN]
+    broken = [test for test in state.tests if test.broke]
     said = [
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
         *_certificate_lines(state),

@@ -14,7 +14,7 @@ import click
 
 from ddenv.cli import options
 from ddenv.cli.terminal import announce, asking
-from ddenv.text import coordinates, count, percent, printable
+from ddenv.text import Data, coordinates, count, percent, printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.progress import Claim
@@ -115,7 +115,7 @@ def line(result: Mapping[str, Any]) -> str:
     return f"{said}\n  {printable(result['recorded'])}" if "recorded" in result else said
 
 
-def summary(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def summary(results: Sequence[Mapping[str, Any]]) -> list[Data]:
     """For all models, then without each one that was left out: its runs that did not break, and how many of them failed.
 
     `shown` counts the runs that ended in f, or in any failure where no f is known; `rate`, `low` and `high` are None without runs.
@@ -154,7 +154,7 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
     return found
 
 
-def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[dict[str, Any]]:
+def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[Data]:
     """What runs in another simulator show of what is left, of which the certificate says `here`, and of that without each model.
 
     What is left `fails` if f shows there at the certificate's rate, and not if at less than half of it. Without a model it fails if
@@ -187,16 +187,15 @@ def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
     from ddenv.evidence.rates import Shown
     from ddenv.runfile.state import BROKEN
 
-    rest = Environment.whole(1)
-    left = Environment.whole(2)
-    outcomes: dict[Environment, dict[int, Shown]] = {rest: {}, left: {}}
-    for one in results:
-        if one["without"] in (None, without):
-            shown: Shown = "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"
-            outcomes[left if one["without"] is None else rest][one["seed"]] = shown
-    seeds = [seed for seed in outcomes[left] if seed in outcomes[rest]]
+    rest, left = Environment.whole(1), Environment.whole(2)
+    models = {rest: without, left: None}
+    shown: dict[tuple[str | None, int], Shown] = {
+        (one["without"], one["seed"]): "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"
+        for one in results
+    }
+    seeds = [seed for model, seed in shown if model is None and (without, seed) in shown]
 
     def shown_in(environment: Environment, run: int) -> Shown:
-        return outcomes[environment][seeds[run]] if run < len(seeds) else None
+        return shown[models[environment], seeds[run]] if run < len(seeds) else None
 
     return settle(falls(rest, left, ERROR), shown_in).verdict

@@ -18,8 +18,9 @@ from ddenv.cli.options import Numbers, fetch_option, reading_options, remembered
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
-from ddenv.text import count, first_of, printable, shortened
+from ddenv.text import Data, count, first_of, printable, shortened
 from ddenv.world.access import is_directives
+from ddenv.world.pose import Point
 
 if TYPE_CHECKING:
     from ddenv.runs.subject import Fetch
@@ -48,7 +49,7 @@ def world_command() -> None:
     """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
 
 
-def _read(file: Path, options: dict[str, Any]) -> tuple[World, Reading]:
+def _read(file: Path, options: Data) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
     from ddenv.runs.subject import reading_of, with_remembered, world_of
     from ddenv.world.sdf.read import read_world
@@ -77,7 +78,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
     return 0
 
 
-def world_report(world: World) -> dict[str, Any]:
+def world_report(world: World) -> Data:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.extent import model_bounds
     from ddenv.world.placement import inside
@@ -275,7 +276,7 @@ def _totals(world: World) -> str:
 def show(
     file: Path,
     spawn: tuple[float, ...] | None,
-    goal: tuple[float, float] | None,
+    goal: Point | None,
     svg: Path | None,
     took_part: bool,
     passes: bool,
@@ -333,7 +334,7 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
         raise UserError(f"{path}: does not record which models affected its runs of the whole world; make a new run")
     head = f"{count(len(times), 'model')} of {len(state.elements)} may have affected the runs of the whole world:"
     lines = [f"  {printable(model)}: {number} of {count(runs, 'run')}" for model, number in times.most_common()]
-    return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
+    return world, frozenset(world.names) - times.keys(), [head, *lines]
 
 
 # Other worlds made from it.

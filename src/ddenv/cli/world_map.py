@@ -16,6 +16,7 @@ from ddenv.map.paint import Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
 from ddenv.text import count, padded, shortened, width
 from ddenv.world.model import World
+from ddenv.world.pose import Point
 
 # Columns for numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.
 NUMBERS, AXIS, AROUND = 6, 8, 4
@@ -28,7 +29,6 @@ START, GOAL, WHITE = 0x1F6FEB, 0x1A7F37, 0xFFFFFF
 Entry = tuple[str, str, str, str]
 # x, y m, and yaw rad.
 Pose = tuple[float, float, float]
-Point = tuple[float, float]
 
 
 def terminal_map(

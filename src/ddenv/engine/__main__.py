@@ -17,8 +17,9 @@ from ddenv.engine.control import Control, DiskSpace, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
-from ddenv.engine.limits import check_crash_loop, note_start
+from ddenv.engine.limits import check_crash_loop
 from ddenv.engine.margins import find_margins
+from ddenv.engine.notes import note_start
 from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError

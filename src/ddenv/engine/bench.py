@@ -11,12 +11,13 @@ import numpy as np
 
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import failures_of, motions_of, result_data, rows_of
-from ddenv.engine.limits import give_up_if_late, note_slow, wall_limit
+from ddenv.engine.judging import asked_of, failures_of, motions_of, result_data, rows_of
+from ddenv.engine.limits import give_up_if_late, wall_limit
+from ddenv.engine.notes import note_slow
 from ddenv.engine.pool import Workers
 from ddenv.engine.shared import Key, Place, result_of
 from ddenv.engine.slicing import audit_is_due, compare
-from ddenv.engine.worker import Broken, Run, Start
+from ddenv.engine.worker import Broken, Ended, Result, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Changed, Test
@@ -37,7 +38,7 @@ from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import ROBOT
 from ddenv.text import count
-from ddenv.world.scenario import Reduction, seed_of
+from ddenv.world.scenario import seed_of
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -65,7 +66,7 @@ class Bench:
         self._pool = pool
         self._control = control
         self._others = dict(others or {})
-        self._taken: list[tuple[int, RunResult | Broken]] = []
+        self._taken: list[Ended] = []
         self._started: set[tuple[Environment, int, bool]] = set()
         self._next_live = 0.0
         self._live_shown = False
@@ -117,7 +118,7 @@ class Bench:
             return None
         environment, state = journal.number(wanted.environment), journal.state
         # All candidates meet the same noise.
-        reduction, number = Reduction.model_validate(state.scenario["reduction"]), len(state.tests) + 1
+        reduction, number = asked_of(state), len(state.tests) + 1
         seed = seed_of(reduction, wanted.run)
         of_round = state.round is not None and wanted.why == "round"
         round, candidate = (journal.current.number, wanted.candidate) if of_round else (None, None)
@@ -128,7 +129,7 @@ class Bench:
         journal.record(TestStarted(*start, source))
         self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
-        full = full or (source is not None and not state.tests[source - 1].cut)
+        full = full or (source is not None and not state.test(source).cut)
         keep = frozenset(wanted.environment.names(state.elements))
         known = self._others.pop((keep, seed), None)
         if known is not None and (taken := result_of(known)) is not None:
@@ -156,7 +157,7 @@ class Bench:
         """
         state, run = self._journal.state, self._journal.file.path
         sound = (test for test in state.tests if test.phase == "baseline" and test.is_finished)
-        test = next((test for test in sound if test.outcome not in BROKEN), None)
+        test = next((test for test in sound if not test.broke), None)
         if state.physics.now == state.physics.proven or test is None:
             return
         result = self.made_again(test)
@@ -169,7 +170,7 @@ class Bench:
             )
         self._journal.record(Compared(result is None))
 
-    def made_again(self, test: KnownTest, tells: bool = True) -> RunResult | Broken | None:
+    def made_again(self, test: KnownTest, tells: bool = True) -> Result | None:
         """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit.
 
         `tells`: views say so.
@@ -183,7 +184,7 @@ class Bench:
             journal.record(Comparing(test.id))
         keep = frozenset(state.environments[test.environment].names(state.elements))
         # It ends as the one that was simulated.
-        simulated = test if test.implied_by is None else state.tests[test.implied_by - 1]
+        simulated = test if test.implied_by is None else state.test(test.implied_by)
         ends = ends_of(self._known()) if simulated.cut else None
         self._pool.submit(0, Run(keep, test.seed, ends, wall_limit(state)))
         while not (ended := self._pool.finished(WAIT)):
@@ -274,7 +275,7 @@ class Bench:
                 self._journal.file.set_live([test for test, _ in live])
             self._live_shown = bool(live)
 
-    def outcome_of(self, result: RunResult | Broken) -> str:
+    def outcome_of(self, result: Result) -> str:
         """What a run showed, judged by what counts as f now."""
         return str(result_data(result, self._known())["outcome"])
 
@@ -287,10 +288,10 @@ class Bench:
             self._failed = failed
         return self._failures
 
-    def _record(self, test: int, result: RunResult | Broken) -> None:
+    def _record(self, test: int, result: Result) -> None:
         journal = self._journal
         data = result_data(result, self._known())
-        started = journal.state.tests[test - 1]
+        started = journal.state.test(test)
         environment = journal.state.environments[started.environment]
         before = journal.test(environment, started.run)
         if data["outcome"] in BROKEN:
@@ -301,6 +302,6 @@ class Bench:
         if "took_part" in data:
             data["took_part"] = journal.models(data["took_part"])
         journal.record(TestFinished(test, **data), motions_of(result))
-        compare(journal, [journal.state.tests[test - 1]])
+        compare(journal, [journal.state.test(test)])
         if before is not None and before.cut and data["outcome"] not in (before.outcome, *BROKEN) and not data["cut"]:
             journal.record(EarlyStopEnded(test=before.id, by=test))

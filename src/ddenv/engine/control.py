@@ -5,22 +5,24 @@ disk and the clock.
 from __future__ import annotations
 
 import math
+import resource
 import shutil
 import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, fixed_again, rejudged
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.errors import UserError
 from ddenv.guiding import commands as c
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import failures_at, with_settings
-from ddenv.runfile.store import NoRoom, Request, RunFile
+from ddenv.runfile.store import LOGS, NoRoom, Request, RunFile
 
 # Decisions within this time start one new search, not several, s.
 SETTLE = 0.5
@@ -34,6 +36,8 @@ class Stopped(Exception):
 
 # What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log of them.
 NEEDED = 32_000_000
+# The same below the limit of a file's size: it is one result's, since the limit is there for all files.
+NEEDED_IN_FILE = 2_000_000
 # The time between two looks, s.
 PERIOD = 1.0
 
@@ -52,32 +56,46 @@ class DiskSpace:
         """Whether a test may start. Writes an event when that changes."""
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + PERIOD
-            self._tell(self._free() >= NEEDED)
+            self._tell(self._room())
         return self._enough
 
     def wait(self, full: NoRoom) -> bool:
         """Waits for a moment; returns whether to try again what found no room."""
         if self._telling or self._terminated.is_set():
             return False
+        room = replace(self._room(), enough=False)
         if self._enough:
+            until = (
+                "the limit of a file's size (ulimit -f) is raised"
+                if room.in_file
+                else f"{NEEDED / 1e6:.0f} MB are free"
+            )
             # The log may be on the same disk.
             with suppress(OSError):
-                print(f"{full}; waits until {NEEDED / 1e6:.0f} MB are free", file=sys.stderr, flush=True)
-        self._tell(False)
+                print(f"{full}; waits until {until}", file=sys.stderr, flush=True)
+        self._tell(room)
         return not self._terminated.wait(PERIOD)
 
-    def _tell(self, enough: bool) -> None:
-        if enough == self._enough:
+    def _tell(self, room: events.DiskSpace) -> None:
+        if room.enough == self._enough:
             return
-        self._enough = enough
+        self._enough = room.enough
         # A small event may find room where a result does not.
         self._telling = True
         with suppress(UserError):
-            self._file.append(events.DiskSpace(enough, NEEDED, self._free()))
+            self._file.append(room)
         self._telling = False
 
-    def _free(self) -> int:
-        return shutil.disk_usage(self._file.path.parent).free
+    def _room(self) -> events.DiskSpace:
+        path = self._file.path
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if limit != resource.RLIM_INFINITY:
+            files = (path, *(path.with_name(f"{path.name}{ending}") for ending in LOGS))
+            below = limit - max(file.stat().st_size for file in files if file.exists())
+            if below < NEEDED_IN_FILE:
+                return events.DiskSpace(enough=False, needed=NEEDED_IN_FILE, free=max(0, below), in_file=True)
+        free = shutil.disk_usage(path.parent).free
+        return events.DiskSpace(enough=free >= NEEDED, needed=NEEDED, free=free)
 
 
 # How far a clock that is kept exact may go on or back between two looks, s.
@@ -249,7 +267,7 @@ class Control:
         self._journal.record(events.WentBack(node, rejected, outcomes))
 
 
-def _judged(journal: Journal, failures: tuple[int, ...]) -> events.Outcomes:
+def _judged(journal: Journal, failures: Numbers) -> events.Outcomes:
     """The outcomes of all tests if the ends of `failures` count as f."""
     file, state = journal.file, journal.state
     return rejudged(file, state, tuple(failure_of(file, state, test) for test in failures))
@@ -278,7 +296,7 @@ def _left_out(journal: Journal, asked: c.LeaveOut) -> events.Event:
 
 def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
     state = journal.state
-    test = state.tests[asked.test - 1]
+    test = state.test(asked.test)
     unnamed = asked.instead or test.phase == "hand"
     what = f"test {test.id}" if unnamed else c.label_of(state, test)
     judged = _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id))

@@ -14,12 +14,13 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
-from ddenv.engine.limits import limit_after, note, note_alike, note_ends, note_price, note_rare
+from ddenv.engine.limits import limit_after
+from ddenv.engine.notes import note, note_alike, note_ends, note_price, note_rare
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
-from ddenv.environment import NOTHING, Environment
+from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, SURELY, error_of
+from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, SURELY, NumberedRun, error_of
 from ddenv.evidence.claims import current, is_minimal, terms_of
 from ddenv.evidence.ends import elsewhere, ends_of, of_baseline
 from ddenv.evidence.rates import anytime_interval, estimated_rate, iterations_needed
@@ -192,8 +193,16 @@ class Driver:
         rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back, broke=broken_runs(state))
         rule = self._bench.rule = Acceptance(len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
-        search = leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again
-        self._leg = steps.Leg(*search)
+        self._leg = steps.Leg(
+            first_round=leg.first_round,
+            whole=journal.whole,
+            chain=chain,
+            pinned=stays,
+            free=free,
+            rule=rule,
+            n_partitions=leg.n_partitions,
+            again=leg.again,
+        )
         self._trials, self._unknown = {}, set()
         self._learn(leg.tests, leg.evidence_test)
         return self._leg
@@ -259,10 +268,10 @@ class Driver:
     def _learn(self, tests: Iterable[int], similar: int | None) -> None:
         """The schemas see the tests behind the verdicts of a round, and the last similar run: a resumed run sees the same."""
         state = self._journal.state
-        for test in (state.tests[number - 1] for number in tests):
-            if test.outcome not in BROKEN:
+        for test in (state.test(number) for number in tests):
+            if not test.broke:
                 environment = state.environments[test.environment]
-                self._trials[test.id] = Trial(environment, test.outcome == "similar", state.elements)
+                self._trials[test.id] = Trial(environment, test.shows_f, state.elements)
         if similar is not None:
             self._evidence = self._sight.evidence(self._journal, similar)
 
@@ -270,7 +279,7 @@ class Driver:
 
     def baseline_ran(self, runs: int, chose: int) -> steps.Baseline | None:
         journal, whole = self._journal, self._journal.state.environments[0]
-        tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(runs))]
+        tests = [journal.state.test(test) for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         asked = self._reduction
         found = self._baseline = fix_failure(
@@ -395,7 +404,7 @@ class Driver:
         Only another simulator can change in the course of time.
         """
         state = self._journal.state
-        shown = [test for test in state.tests if test.outcome == "similar"]
+        shown = [test for test in state.tests if test.shows_f]
         failing = [test for test in shown if test.phase == "baseline"]
         base = known_failure(state)
         replays = max(FEWEST_REPLAYS, 1 + iterations_needed(estimated_rate(base.failures, base.runs), SURELY))
@@ -431,7 +440,7 @@ class Driver:
             # Where chosen runs were reduced, a rate is shown if the user asks for one.
             exact = () if self._certify_rate else self._leg.rule.exact
             shown = [run for run in exact if journal.shown(journal.environment, run)]
-            seeds = tuple(journal.state.tests[test - 1].seed for test in journal.tests(journal.environment, shown))
+            seeds = tuple(journal.state.test(test).seed for test in journal.tests(journal.environment, shown))
             beside = RUNS_BESIDE_ALIKE if stands_for_all(journal.state) else RUNS_BESIDE
             at_least = max(self._only_certify or 0, beside) if seeds else self._only_certify or asked.baseline_runs
             first, error = (before.first_run, before.error) if before else (journal.fresh_run, error_of(number))
@@ -465,7 +474,7 @@ class Driver:
         if any(test.cut and test.outcome == "similar" for test in accepted):
             journal.record(events.EarlyStopEnded(certificate=certificate.number))
 
-    def _elsewhere(self, tests: tuple[int, ...]) -> events.EndsElsewhere | None:
+    def _elsewhere(self, tests: Numbers) -> events.EndsElsewhere | None:
         """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
         state = self._journal.state
         epsilon = spec_of(state).epsilon
@@ -482,7 +491,7 @@ class Driver:
         Where some runs do not repeat, one that showed or missed f by chance may have misled it.
         """
         journal = self._journal
-        for test in (journal.state.tests[number - 1] for number in tests):
+        for test in (journal.state.test(number) for number in tests):
             repeats = self._bench.made_again(test) is None
             if journal.state.search_due:
                 raise steps.Changed
@@ -504,7 +513,7 @@ class Driver:
     def _claim_made(self, named: steps.NamedClaim, first: int, exactly: bool) -> events.ClaimMade:
         journal, runs = self._journal, named.exact or [first + run for run in named.runs]
         tests = journal.tests(named.environment, runs, full=not named.exact)
-        outcomes = Counter(journal.state.tests[test - 1].outcome for test in tests)
+        outcomes = Counter(journal.state.test(test).outcome for test in tests)
         shown, sound = outcomes["similar"], outcomes.total() - sum(outcomes[outcome] for outcome in BROKEN)
         number, claim = journal.number(named.environment), named.claim
         share = shown / max(1, sound)
@@ -512,9 +521,7 @@ class Driver:
         verdict = "not shown" if named.exact and not exactly else claim.verdict
         return events.ClaimMade(named.model, number, verdict, shown, sound, *interval, dict(outcomes), claim.bound)
 
-    def stepped_back(
-        self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]
-    ) -> NoReturn:
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> NoReturn:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
         node, lost = nodes[place].number, nodes[place + 1].number

@@ -18,7 +18,7 @@ from ddenv.reduction.round import Stacks
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import exact_runs
 from ddenv.runfile.progress import Isolation
-from ddenv.runfile.state import BROKEN, FRESH_RUNS
+from ddenv.runfile.state import FRESH_RUNS
 from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction
@@ -58,7 +58,7 @@ def _open(journal: Journal) -> Isolation:
 def _begin(world: World, journal: Journal, at_least: int | None, before: str) -> None:
     state, reduction = journal.state, Reduction.model_validate(journal.state.scenario["reduction"])
     baseline = [test for test in state.tests if test.phase == "baseline" and test.is_finished]
-    sound = [test for test in baseline if test.outcome not in BROKEN]
+    sound = [test for test in baseline if not test.broke]
     rule = Passing.of(sum(test.outcome == "pass" for test in sound), len(sound))
     least = at_least or max(FEWEST_RUNS, reduction.baseline_runs)
     last = state.isolations[-1] if state.isolations else None
@@ -118,7 +118,7 @@ class _Isolator:
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a finished run reached the goal; None if it is not made yet."""
         test = self._journal.test(environment, run, full=True)
-        return None if test is None else "broken" if test.outcome in BROKEN else test.outcome == "pass"
+        return None if test is None else "broken" if test.broke else test.outcome == "pass"
 
     def refused(self, environment: Environment) -> bool:
         return False

@@ -6,8 +6,9 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from itertools import count
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.errors import UserError
+from ddenv.evidence.certificate import NumberedRun
 from ddenv.evidence.rates import Shown, estimated_rate
 from ddenv.evidence.slices import Ties, implies
 from ddenv.reduction.procedure import Test as Wanted
@@ -59,18 +60,18 @@ class Journal:
         for test in after.tests.changed_since(before.tests):
             self._enter(test)
         if after.engines != before.engines:
-            self._forget(lambda test: test.outcome in BROKEN and self._is_made_again(test))
+            self._forget(lambda test: test.broke and self._is_made_again(test))
         if after.refuted is not before.refuted:
             self._forget(lambda test: test.implied_by is not None)
         if after.early_stop_ended is not before.early_stop_ended or _f_of(after) != _f_of(before):
             self._forget(lambda test: test.cut)
             for known in self._implying.values():
-                known[:] = [implying for implying in known if not self.state.tests[implying[2] - 1].cut]
+                known[:] = [implying for implying in known if not self.state.test(implying[2]).cut]
 
     def _enter(self, test: Test) -> None:
         if not test.is_finished:
             return
-        if test.outcome in BROKEN:
+        if test.broke:
             key = test.environment, test.run, test.phase == CERTIFY, test.engine
             self._broke[key] += 1
             if self._broke[key] < 2:
@@ -79,13 +80,13 @@ class Journal:
             if not holds:
                 continue
             self._tests[test.environment, test.run, full] = test.id
-            simulated = test.implied_by is None and test.outcome not in BROKEN
+            simulated = test.implied_by is None and not test.broke
             if test.took_part is not None and simulated and test.id > self.state.mixed_until:
                 there = self.state.environments[test.environment]
                 self._implying[test.run, full].append((test.took_part, there, test.id))
 
     def _forget(self, which: Callable[[Test], bool]) -> None:
-        self._tests = {key: test for key, test in self._tests.items() if not which(self.state.tests[test - 1])}
+        self._tests = {key: test for key, test in self._tests.items() if not which(self.state.test(test))}
 
     def _is_made_again(self, broken: Test) -> bool:
         """A baseline that is done, and a certificate, may do without a few runs that broke."""
@@ -149,25 +150,25 @@ class Journal:
         """The finished test of a run; None if it has to be made. With `full` only a run to its end counts."""
         number = self._numbers.get(environment)
         test = None if number is None else self._tests.get((number, run, full))
-        return None if test is None else self.state.tests[test - 1]
+        return None if test is None else self.state.test(test)
 
-    def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> tuple[int, ...]:
+    def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> Numbers:
         """The numbers of the finished tests among these runs."""
         tests = (self.test(environment, run, full) for run in runs)
         return tuple(test.id for test in tests if test is not None)
 
-    def full_tests(self, tests: Iterable[tuple[Environment, int]], first: int = 0) -> tuple[int, ...]:
+    def full_tests(self, tests: Iterable[NumberedRun], first: int = 0) -> Numbers:
         """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
         return tuple(sorted({one for models, run in tests for one in self.tests(models, (first + run,), full=True)}))
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a run showed f; None if it is not made yet."""
         test = self.test(environment, run, full)
-        return None if test is None else "broken" if test.outcome in BROKEN else test.outcome == "similar"
+        return None if test is None else "broken" if test.broke else test.shows_f
 
     def evidence_of(self, tests: Iterable[int]) -> int:
         """The first of `tests` that showed f."""
-        return next(test for test in tests if self.state.tests[test - 1].outcome == "similar")
+        return next(test for test in tests if self.state.test(test).shows_f)
 
     @property
     def stops_early(self) -> bool:
@@ -216,8 +217,8 @@ class Journal:
                 if test is None or not state.rests_on >> test.id & 1:
                     break
                 tests.append(test)
-        sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
-        return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
+        sound = [test for test in tests if test.is_sound]
+        return estimated_rate(sum(test.shows_f for test in sound), len(sound))
 
     @property
     def fresh_run(self) -> int:

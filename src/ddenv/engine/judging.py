@@ -8,54 +8,54 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ddenv.engine.journal import Journal
-from ddenv.engine.worker import Broken
+from ddenv.engine.worker import Broken, Result
 from ddenv.errors import UserError
 from ddenv.evidence.rates import anytime_interval, iterations_needed, miss_chance, wilson_interval
 from ddenv.reduction.evidence import Evidence, Traits
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
-from ddenv.robot.result import RunResult
 from ddenv.runfile.events import BaselineFinished, Outcomes, SeenFailure
 from ddenv.runfile.failures import grouped
-from ddenv.runfile.state import BROKEN, RunState, Test
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import ROBOT, Motions, RunFile
 from ddenv.runs.playback import table
-from ddenv.text import count, percent_at_most
+from ddenv.text import Data, count, percent_at_most
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
-from ddenv.world.pose import headings
+from ddenv.world.pose import Vector, headings
 from ddenv.world.scenario import FailureSpec, Reduction
 
 # Where no run failed, so many times as many are proposed.
 FURTHER = 3
 
 
-def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
+def result_data(result: Result, failures: Sequence[Failure] = ()) -> Data:
     """A result as the fields of `TestFinished`, with models by name, judged by f and the failures accepted as f; the nearest one
     counts.
 
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None.
     """
     if isinstance(result, Broken):
-        unknown: dict[str, Any] = {
+        return {
+            "outcome": result.outcome,
+            "failure": result.failure,
             "distance": None,
             "end_pose": None,
+            "simulated_seconds": 0.0,
+            "wall_seconds": 0.0,
             "first_sensed": {},
             "first_touched": {},
             "cut": False,
         }
-        none = {"simulated_seconds": 0.0, "wall_seconds": 0.0}
-        return {"outcome": result.outcome, "failure": result.failure, **unknown, **none}
     outcome, distance = result.outcome, None
     if failures:
         judgement = nearest([judge(result, failure) for failure in failures])
         outcome, distance = judgement.outcome, judgement.distance
     pose = tuple(float(value) for value in result.end_pose)
-    more: dict[str, Any] = {"taken": result.taken} if result.taken else {}
+    more: Data = {"taken": result.taken} if result.taken else {}
     if result.took_part is not None:
         more["took_part"] = sorted(result.took_part)
     return {
@@ -72,7 +72,7 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     }
 
 
-def motions_of(result: RunResult | Broken) -> Motions:
+def motions_of(result: Result) -> Motions:
     """How the robot and other models moved, as a run file has it."""
     if isinstance(result, Broken):
         return {}
@@ -92,12 +92,17 @@ def known_failure(state: RunState) -> BaselineFinished:
     return state.baseline
 
 
-def end_of(test: Test) -> tuple[float, float, float]:
+def end_of(test: Test) -> Vector:
     """Where the robot was at the end, x, y, z m. Raises UserError for a test without an end."""
     if test.end_pose is None:
         raise UserError(f"damaged run file: test {test.id} has no end pose")
     x, y, z = test.end_pose[:3]
     return x, y, z
+
+
+def asked_of(state: RunState) -> Reduction:
+    """How the run reduces now: the user may have changed it."""
+    return Reduction.model_validate(state.scenario["reduction"])
 
 
 def spec_of(state: RunState) -> FailureSpec:
@@ -113,7 +118,7 @@ def failures_of(file: RunFile, state: RunState) -> tuple[Failure, ...]:
 def failure_of(file: RunFile, state: RunState, test: int) -> Failure:
     """The failure that a test showed. Raises UserError for a damaged run file."""
     f, spec = known_failure(state), spec_of(state)
-    end = f.position if test == f.failure_test else end_of(state.tests[test - 1])
+    end = f.position if test == f.failure_test else end_of(state.test(test))
     return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
 
 
@@ -132,7 +137,8 @@ def rows_of(file: RunFile, test: int) -> np.ndarray:
 
 def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
     """The baseline by what counts as the same failure now, which judges all tests. Raises UserError if it shows none."""
-    before, reduction = known_failure(state), Reduction.model_validate(state.scenario["reduction"])
+    before = known_failure(state)
+    reduction = asked_of(state)
     tests = {test.run: test for test in state.tests if test.phase == "baseline" and test.is_finished}
     failed = ("failed", "similar", "other")
     unjudged = [replace(one, outcome="failed") if one.outcome in failed else one for _, one in sorted(tests.items())]
@@ -192,17 +198,17 @@ def fix_failure(
         seen.append(SeenFailure(group[0].id, len(group), names, end_of(group[0])))
     if wanted > len(seen):
         listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
-        runs = sum(test.outcome not in BROKEN for test in tests)
+        runs = sum(not test.broke for test in tests)
         return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
     f = groups[wanted - 1][0]
     judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failed}
     shown = {id for id, judgement in judged.items() if judgement.outcome == "similar"}
     if not any(test.id in shown for test in tests if test.run >= chose):
         chose = 0
-    sound = [test for test in tests if test.outcome not in BROKEN and test.run >= chose]
+    sound = [test for test in tests if not test.broke and test.run >= chose]
     similar = sum(test.id in shown for test in sound)
     rate = similar / len(sound)
-    broken = sum(test.outcome in BROKEN and test.run >= chose for test in tests)
+    broken = sum(test.broke and test.run >= chose for test in tests)
     interval = anytime_interval if len(tests) > usual else wilson_interval
     shows = len(sound), similar, rate, *interval(similar, len(sound)), failing[f].id, failures[f].position
     chance, needed = miss_chance(rate, iterations), iterations_needed(rate)
@@ -215,7 +221,7 @@ def _outcomes(judged: Mapping[int, Judgement]) -> Outcomes:
 
 
 def _no_failure(tests: Sequence[Test]) -> str:
-    broken = [test for test in tests if test.outcome in BROKEN]
+    broken = [test for test in tests if test.broke]
     if len(broken) == len(tests):
         return f"no baseline run finished: {broken[0].failure}"
     reached = len(tests) - len(broken)
@@ -252,9 +258,9 @@ class Sight:
 
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""
-        state, run = journal.state, journal.state.tests[test - 1]
+        state, run = journal.state, journal.state.test(test)
         # If several failures count as f, the one that the run showed.
-        ends = [end_of(state.tests[test - 1]) for test in state.failures]
+        ends = [end_of(state.test(test)) for test in state.failures]
         end = ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, end_of(run)))
         # Whether a model that affected no run was sensed depends on which of two equal runs was simulated.
         seen = set(state.elements) if run.took_part is None else set(run.took_part.names(state.elements))

@@ -15,13 +15,12 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, motions_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
-from ddenv.engine.worker import Broken, Run
+from ddenv.engine.worker import Result, Run
 from ddenv.errors import UserError
 from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import estimated_rate
 from ddenv.robot.oracle import ends_of
-from ddenv.robot.result import RunResult
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN, RunState
@@ -190,7 +189,7 @@ class _Search:
         self._pool.submit(self._submitted, test)
         self._control.started()
 
-    def _record(self, one: Wanted, result: RunResult | Broken) -> None:
+    def _record(self, one: Wanted, result: Result) -> None:
         data, seed = result_data(result, self._failures), seed_of(self._parts[0].reduction, one[2])
         kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
         # Of each value, the run that can be played beside one of what is left.

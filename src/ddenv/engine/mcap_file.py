@@ -128,7 +128,7 @@ def write_mcap(run: Path, target: Path) -> list[str]:
         if subject.scenario.oracle is not None:
             raise UserError(f"{run}: a simulator of your own made it; only runs on Drake have streams to write")
         state = fold(file.events())
-        chosen = [(name, state.tests[number - 1], rows_of(file, number)) for name, number in _chosen(file, state)]
+        chosen = [(name, state.test(number), rows_of(file, number)) for name, number in _chosen(file, state)]
     if not chosen:
         raise UserError(f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}")
     template = Variants(subject.world, subject.robot, subject.scenario)
@@ -158,7 +158,7 @@ def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
     passes = nearest(file, state)
     pair = None if passes is None else passes.parting
     if state.f_test is not None:
-        alike = None if pair is None or state.tests[pair.with_test - 1].outcome != F else pair.with_test
+        alike = None if pair is None or state.test(pair.with_test).outcome != F else pair.with_test
         yield "whole", alike or state.f_test.id
     if state.evidence_test is not None:
         yield "left", state.evidence_test

@@ -8,14 +8,27 @@ import os
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
 from ddenv.engine.limits import GENEROUS, GIGABYTE, memory_limit
-from ddenv.engine.worker import Broken, Make, Moment, Ready, Run, Settle, Start, Task, WorkerProcess, simulator_of
+from ddenv.engine.worker import (
+    AskSettled,
+    Broken,
+    Ended,
+    Make,
+    Moment,
+    Ready,
+    Run,
+    Settle,
+    Start,
+    Task,
+    WorkerProcess,
+    simulator_of,
+)
 from ddenv.errors import UserError
 from ddenv.robot import check_drake
 from ddenv.robot.deadline import Stopwatch
@@ -76,8 +89,8 @@ class Workers(Protocol):
     @property
     def busy(self) -> int: ...
     def submit(self, test: int, run: Run) -> None: ...
-    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]: ...
-    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]: ...
+    def finished(self, seconds: float) -> list[Ended]: ...
+    def settle(self, elements: frozenset[str]) -> AskSettled: ...
     def live(self) -> list[tuple[Live, float]]: ...
     def close(self) -> None: ...
 
@@ -163,7 +176,7 @@ class Pool:
         if slot.ready and slot.job is not None:
             slot.worker.give(slot.job.task)
 
-    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
+    def finished(self, seconds: float) -> list[Ended]:
         """Tests that have ended, waiting at most `seconds` for one if one runs. Raises UserError if the world cannot be simulated.
 
         Between two calls no more than `LONGEST_LOOK` counts as time of the tests.
@@ -174,7 +187,7 @@ class Pool:
             self._look(min(left, CLOCK_PERIOD))
         return ended
 
-    def _ended(self) -> list[tuple[int, RunResult | Broken]]:
+    def _ended(self) -> list[Ended]:
         ended = []
         for slot in self._slots:
             if slot.job is not None and slot.job.test is not None and isinstance(slot.result, RunResult | Broken):
@@ -245,7 +258,7 @@ class Pool:
         if broken is None:
             self._hand_over(slot)
 
-    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
+    def settle(self, elements: frozenset[str]) -> AskSettled:
         """Lets an idle worker find which of `elements` rest on which. The result returns it, or None until it is known."""
         slot = self._start(Job(None, Settle(elements), PREPARATION))
 

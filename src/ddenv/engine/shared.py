@@ -21,6 +21,7 @@ from ddenv.runfile.store import ROBOT, RunFile
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
 from ddenv.runs.playback import table
+from ddenv.text import Names
 from ddenv.world.scenario import Scenario
 
 OURS = ("straight", "costmap")
@@ -35,7 +36,7 @@ class Place:
 
     path: Path
     test: Test
-    elements: tuple[str, ...]
+    elements: Names
 
 
 def simulator() -> str:

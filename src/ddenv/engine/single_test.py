@@ -8,7 +8,6 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import table
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
-from ddenv.text import count
+from ddenv.text import Data, Names, count
 from ddenv.words.claims import still_fails
 from ddenv.words.early_stop import beside_record
 from ddenv.world.scenario import Oracle, seed_of
@@ -74,7 +73,7 @@ def plan(
             raise UserError("--test: needs a run; a scenario has no tests yet")
         if not 0 < test <= len(state.tests):
             raise UserError(f"--test: there is no test {test}; the run has tests 1 to {len(state.tests)}")
-        models, seed = state.models_of(state.tests[test - 1]), state.tests[test - 1].seed
+        models, seed = state.models_of(state.test(test)), state.test(test).seed
     for name in leave_out or []:
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
@@ -90,7 +89,7 @@ def plan(
     return trials
 
 
-def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
+def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
     if minimal and subject.state is None:
         raise UserError("--minimal: needs a run; a scenario has no minimal environment yet")
     if minimal and keep is not None:
@@ -103,7 +102,7 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[st
     return subject.state.environment if minimal and subject.state else subject.elements
 
 
-def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
+def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Data]:
     """Makes the runs in worker processes; yields the result of each, in order, as plain data. Without f a failed run is just
     "failed".
     """
@@ -118,7 +117,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
                 test.id: (test, table(file.motion(test.id) or array("d"))) for test in repeated if test.is_finished
             }
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
-    results: dict[int, dict[str, Any]] = {}
+    results: dict[int, Data] = {}
     started = shown = 0
     try:
         while shown < len(trials):
@@ -191,24 +190,22 @@ def expected(subject: Subject, where: object) -> Certificate:
     return found
 
 
-def reproduce(
-    subject: Subject, certificate: Certificate, most: int, jobs: int
-) -> Iterator[tuple[dict[str, Any], Reproduction]]:
+def reproduce(subject: Subject, certificate: Certificate, most: int, jobs: int) -> Iterator[tuple[Data, Reproduction]]:
     """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
     expects; where chosen runs were reduced, with their seeds, of which each has to show f. Yields each run's result, and what all
     of them show together.
     """
     shown: list[bool] = []
-    broken, seeds, rate = 0, certificate.seeds[:most], certificate.claims[0].low
+    broken = 0
+    seeds = certificate.seeds[:most]
+    rate = certificate.claims[0].low
     state = subject.state
-    known = (
-        {}
-        if state is None
-        else {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
-    )
-    # The search has made these runs; how they compare with its records is said, too.
-    trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
-    for result in run_trials(subject, trials or plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most), jobs):
+    trials = plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most)
+    if seeds and state is not None:
+        # The search has made these runs; how they compare with its records is said, too.
+        known = {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
+        trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
+    for result in run_trials(subject, trials, jobs):
         if result["outcome"] in BROKEN:
             broken += 1
         else:

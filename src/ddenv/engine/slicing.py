@@ -15,7 +15,7 @@ from ddenv.reduction.round import Stacks
 from ddenv.runfile.events import Sliced, SlicesRefuted
 from ddenv.runfile.fold_claims import rests_on_slices
 from ddenv.runfile.fold_decisions import exact_runs, rested_on
-from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
+from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runfile.supports import stacks_of
 from ddenv.settings import SETTINGS, read
 
@@ -30,7 +30,7 @@ def slice_environment(journal: Journal) -> bool:
     """
     state, there = journal.state, journal.environment
     tests, met = _known(journal, there)
-    if state.accept_mode == "ask" or not any(test.outcome == "similar" for test in tests):
+    if state.accept_mode == "ask" or not any(test.shows_f for test in tests):
         return False
     reduction = state.scenario["reduction"]
     if state.node and reduction["accept_rate"] == "kept" and fresh_chance(met) > 1.0 - reduction["keep_rate"]:
@@ -57,7 +57,7 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
     state, here = journal.state, journal.state.here
     if here is None or not here.to_audit or here.evidence_test is None or state.refuted is not None:
         return ()
-    environment, run = journal.environment, state.tests[here.evidence_test - 1].run
+    environment, run = journal.environment, state.test(here.evidence_test).run
     return () if journal.test(environment, run) is not None else (Wanted(environment, run, "audit"),)
 
 
@@ -69,9 +69,9 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
     met: dict[int, Environment] = {}
     ties, exact = journal.ties, exact_runs(journal.state)
     for test in rested_on(journal.state):
-        if not test.is_finished or test.outcome in BROKEN:
+        if not test.is_sound:
             continue
-        if exact and (test.run not in exact or test.outcome != "similar"):
+        if exact and (test.run not in exact or not test.shows_f):
             continue
         environment = journal.state.environments[test.environment]
         if ties is not None and test.took_part is not None and implies(test.took_part, environment, there, ties):
@@ -108,7 +108,7 @@ def repeats(journal: Journal, audit: Test) -> bool:
     """Whether a finished audit has the bits of the run that implies it; True for one without bits, since its worker died."""
     if audit.audits is None or not (again := journal.file.motions(audit.id)):
         return True
-    source, state = journal.state.tests[audit.audits - 1], journal.state
+    source, state = journal.state.test(audit.audits), journal.state
     # What took no part may have moved by itself.
     gone = (state.environments[0] - state.environments[audit.environment]).names(state.elements)
     first = {name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone}

@@ -98,6 +98,12 @@ class Broken:
     failure: str
 
 
+# What a test ends in, beside its number where several run; and what asks whether it is known how the world settles, until it is.
+Result = RunResult | Broken
+Ended = tuple[int, Result]
+AskSettled = Callable[[], Start | Broken | None]
+
+
 @dataclass(frozen=True)
 class Moment:
     """A test goes on: `time` s are simulated; the robot and the models that have moved are there. It began at `begun`, s of

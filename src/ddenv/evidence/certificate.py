@@ -20,7 +20,7 @@ from functools import lru_cache
 from typing import Literal
 
 from ddenv.environment import Environment
-from ddenv.evidence.rates import HIGHEST_RATE, Shown, iterations_needed, wilson_interval
+from ddenv.evidence.rates import HIGHEST_RATE, Interval, Shown, ShownIn, iterations_needed, wilson_interval
 
 Verdict = Literal[
     "", "kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "passes", "fails", "not shown", "unknown"
@@ -164,13 +164,17 @@ def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
     return known
 
 
+# The run of an environment with this number.
+NumberedRun = tuple[Environment, int]
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What a procedure asks for: these `tests`, as (environment, run); `later` environments will run with later seeds, if at all.
     `bound` is what its tests have shown so far.
     """
 
-    tests: tuple[tuple[Environment, int], ...]
+    tests: tuple[NumberedRun, ...]
     later: tuple[Environment, ...]
     bound: float | None = None
 
@@ -187,10 +191,10 @@ class Claim:
 
     verdict: Verdict
     bound: float | None = None
-    rests_on: tuple[tuple[Environment, int], ...] = ()
+    rests_on: tuple[NumberedRun, ...] = ()
     broken: int = 0
-    wanted: tuple[tuple[Environment, int], ...] = ()
-    later: tuple[tuple[Environment, int], ...] = ()
+    wanted: tuple[NumberedRun, ...] = ()
+    later: tuple[NumberedRun, ...] = ()
 
 
 class Settling:
@@ -199,11 +203,11 @@ class Settling:
     def __init__(self, procedure: Procedure) -> None:
         # Every procedure asks for a run.
         self._procedure, self._wanted = procedure, next(procedure)
-        self._tests: list[tuple[Environment, int]] = []
+        self._tests: list[NumberedRun] = []
         self._broken = 0
         self._settled: Claim | None = None
 
-    def claim(self, shown: Callable[[Environment, int], Shown], ahead: int = 1) -> Claim:
+    def claim(self, shown: ShownIn, ahead: int = 1) -> Claim:
         """What it claims by now. Looks `ahead` for so many runs of each environment, so that idle workers have something to do."""
         while self._settled is None:
             wanted = self._wanted
@@ -228,7 +232,7 @@ class Settling:
         return self._settled
 
 
-def settle(procedure: Procedure, shown: Callable[[Environment, int], Shown], ahead: int = 1) -> Claim:
+def settle(procedure: Procedure, shown: ShownIn, ahead: int = 1) -> Claim:
     """What a procedure claims by the finished runs."""
     return Settling(procedure).claim(shown, ahead)
 
@@ -342,6 +346,9 @@ def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: 
 
 # How many tests a certificate takes.
 
+# How many it takes, as (low, likely, high).
+Expected = tuple[int, int, int]
+
 # It takes so many times the expected number, if the rates are right.
 SHORTER, LONGER = 0.55, 2.2
 # Of the pairs of runs with the same seed, so many end alike whatever their rates are.
@@ -352,9 +359,7 @@ NEEDS = 1.0 / (IN_TURN * error_of(1))
 EIGHT_OF_TEN = 1.28
 
 
-def certificate_tests(
-    rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0
-) -> tuple[int, int, int]:
+def certificate_tests(rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0) -> Expected:
     """Tests of a certificate of `left` needed models, as (low, likely, high): about seven of ten or more take
     between low and high, if f never shows without one of these models.
 
@@ -371,16 +376,14 @@ def certificate_tests(
     return math.floor(ends[0] / shorter), round(ends[0]), math.ceil(most)
 
 
-def _factors(ends: Sequence[float]) -> tuple[float, float]:
+def _factors(ends: Sequence[float]) -> Interval:
     """It takes one of `ends` tests by what may be the rates, the first one probably: how many times fewer or more it may take."""
     # What is not known of the rates and chance within the certificate are independent factors.
     shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
     return shorter, math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
 
 
-def certificate_from_here(
-    made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int
-) -> tuple[int, int, int]:
+def certificate_from_here(made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int) -> Expected:
     """The same once removals have shown something: `made` tests so far, `left_runs` of them of what is left.
 
     Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all removals were as `seen`.

@@ -10,6 +10,8 @@ from statistics import median
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
     HELPING,
+    Expected,
+    NumberedRun,
     Pairs,
     Terms,
     certificate_from_here,
@@ -27,7 +29,7 @@ from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
-from ddenv.text import percent_at_least, percent_at_most
+from ddenv.text import Names, percent_at_least, percent_at_most
 
 # After so many pairs without a model, what a certificate still takes is forecast from what it has seen.
 PAIRS_THAT_SHOW = 10
@@ -40,7 +42,7 @@ def is_minimal(certificate: Certificate) -> bool:
     return kept and certificate.elsewhere is None and all(claim.verdict == "needed" for claim in claims[1:])
 
 
-def helping(certificate: Certificate) -> tuple[str, ...]:
+def helping(certificate: Certificate) -> Names:
     """The models but for which a certificate shows the end to be minimal; the one without which f shows most often comes first."""
     left, *removals = certificate.claims
     helps = [claim for claim in removals if claim.verdict != "needed"]
@@ -50,7 +52,7 @@ def helping(certificate: Certificate) -> tuple[str, ...]:
     return tuple(claim.without for claim in helps if claim.without is not None)
 
 
-def only_helping(certificate: Certificate) -> tuple[str, ...]:
+def only_helping(certificate: Certificate) -> Names:
     """Those of them without which f is shown to be not much rarer: a user may leave one out."""
     little = {claim.without for claim in certificate.claims if claim.verdict == "helps"}
     return tuple(name for name in helping(certificate) if name in little)
@@ -77,8 +79,8 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     left, outcomes = state.environments[node.id], _outcomes(state, certificate)
     rests = {
         test.without: state.environments[test.environment]
-        for test in state.confirm_tests
-        if test.run >= certificate.first_run and test.is_finished and test.node == certificate.node and test.without
+        for test in _finished(state, certificate)
+        if test.node == certificate.node and test.without
     }
 
     def shown(environment: Environment, run: int) -> Shown:
@@ -92,15 +94,18 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     return {None: kept, **{name: settle(falls(rest, left, error), shown) for name, rest in rests.items()}}
 
 
-def _outcomes(state: RunState, certificate: Certificate) -> dict[tuple[Environment, int], Shown]:
+def _outcomes(state: RunState, certificate: Certificate) -> dict[NumberedRun, Shown]:
     """What its finished runs showed, by environment and run, counted from its first one."""
     return {
         (state.environments[test.environment], test.run - certificate.first_run): "broken"
-        if test.outcome in BROKEN
-        else test.outcome == "similar"
-        for test in state.confirm_tests
-        if test.run >= certificate.first_run and test.is_finished
+        if test.broke
+        else test.shows_f
+        for test in _finished(state, certificate)
     }
+
+
+def _finished(state: RunState, certificate: Certificate) -> list[Test]:
+    return [test for test in state.confirm_tests if test.run >= certificate.first_run and test.is_finished]
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
@@ -132,7 +137,7 @@ def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tupl
         fresh = (test for test in state.confirm_tests if state.rests_on >> test.id & 1)
         own = [test for test in fresh if test.node == certificate.node and test.run >= certificate.first_run]
     finished = (test for test in own if test.environment == claim.environment and test.is_finished)
-    return tuple({test.run: test for test in finished if test.outcome not in BROKEN}.values())
+    return tuple({test.run: test for test in finished if not test.broke}.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +156,7 @@ def failing_instead(state: RunState, certificate: Certificate, claim: Claim) -> 
     """What the robot does without a model that is needed, where it mostly fails otherwise and does not reach its goal."""
     if claim.verdict != "needed" or claim.without is None:
         return None
-    runs = [test for test in runs_behind(state, certificate, claim) if test.outcome != "similar"]
+    runs = [test for test in runs_behind(state, certificate, claim) if not test.shows_f]
     ends = Counter(test.failure if test.outcome == "other" else "pass" for test in runs)
     if not ends or (failure := ends.most_common(1)[0][0]) == "pass":
         return None
@@ -167,10 +172,10 @@ def in_the_making(state: RunState) -> Certificate | None:
 
 def fresh_runs_made(state: RunState, now: Certificate) -> int:
     """How many runs of the last certificate are finished."""
-    return sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
+    return len(_finished(state, now))
 
 
-def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
+def expected_fresh_runs(state: RunState, now: Certificate) -> Expected:
     """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     if now.seeds:
         return now.at_least, now.at_least, now.at_least

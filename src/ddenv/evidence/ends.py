@@ -10,6 +10,7 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import pdist
 
+from ddenv.environment import Numbers
 from ddenv.runfile.events import EndsElsewhere, Place
 from ddenv.runfile.state import RunState, Test
 
@@ -40,7 +41,7 @@ def of_baseline(state: RunState) -> list[Test]:
 class Groups:
     """Ends in groups, by their places in a list, the largest group first; no two groups are nearer than `apart`, m."""
 
-    groups: tuple[tuple[int, ...], ...]
+    groups: tuple[Numbers, ...]
     apart: float
 
     @property

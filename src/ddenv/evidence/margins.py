@@ -16,6 +16,7 @@ from ddenv.evidence.rates import leans_to
 from ddenv.runfile.events import NumberAsked
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN
+from ddenv.text import Names
 
 # "f" still shows, the robot reaches its "goal" instead, "other" things happen; "undecided" after the most runs that a value gets,
 # "impossible" in the world, "" while it is open.
@@ -107,8 +108,8 @@ class Value:
 
     value: float
     verdict: Verdict
-    outcomes: tuple[str, ...] = ()
-    failures: tuple[str, ...] = ()
+    outcomes: Names = ()
+    failures: Names = ()
     why: str = ""
 
 

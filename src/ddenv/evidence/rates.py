@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Literal
+
+from ddenv.environment import Environment
 
 Z_95 = 1.959963984540054
 # Few runs never show that f is certain.
@@ -13,9 +15,13 @@ HIGHEST_RATE = 0.985
 SPURIOUS = 0.03
 # Whether a run showed f. A broken one says nothing; None is a run that is not finished.
 Shown = bool | Literal["broken"] | None
+# Whether the run of an environment with this number showed it.
+ShownIn = Callable[[Environment, int], Shown]
+# From low to high.
+Interval = tuple[float, float]
 
 
-def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tuple[float, float]:
+def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> Interval:
     """The Wilson interval of a rate seen `successes` times in `trials`, of 95 % or so many standard deviations. Raises ValueError
     for impossible counts.
     """
@@ -28,7 +34,7 @@ def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tu
     return min(rate, max(0.0, centre - half)), max(rate, min(1.0, centre + half))
 
 
-def anytime_interval(successes: int, trials: int, error: float = 0.05) -> tuple[float, float]:
+def anytime_interval(successes: int, trials: int, error: float = 0.05) -> Interval:
     """An interval of a rate that misses it with a probability of at most `error`, however it is decided when to stop; 0 to 1
     without runs.
 

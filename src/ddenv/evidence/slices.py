@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.progress import Node
-from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, RunState
+from ddenv.runfile.state import CERTIFY, ISOLATE, RunState
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def fresh_chance(met: Sequence[Environment]) -> float:
 
 def in_whole_world(state: RunState) -> tuple[Counter[str], int]:
     """In how many of the baseline runs each model took part, empty where that is unknown; and how many runs these are."""
-    runs = [test for test in state.tests if test.phase == "baseline" and test.outcome not in BROKEN]
+    runs = [test for test in state.tests if test.phase == "baseline" and not test.broke]
     return Counter(name for test in runs for name in (test.took_part or NOTHING).names(state.elements)), len(runs)
 
 
@@ -97,7 +97,7 @@ def met_by(state: RunState, node: Node) -> list[Environment]:
     """What took part in each of the runs by which the environment of a node was cut down to its slice, by seed."""
     met: dict[int, Environment] = {}
     for number in node.sliced_by:
-        test = state.tests[number - 1]
+        test = state.test(number)
         met[test.run] = met.get(test.run, NOTHING) | (test.took_part or NOTHING)
     return list(met.values())
 

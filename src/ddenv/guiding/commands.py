@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, dataclass_transform, get_args
 
+from ddenv.environment import Numbers
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, fresh_runs_made, in_the_making, only_helping
 from ddenv.runfile.deeds import deed
@@ -22,7 +23,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import made_for, purpose
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.text import as_sentence, coordinates, count, first_of, printable, shortened, snake_case
+from ddenv.text import Data, Names, as_sentence, coordinates, count, first_of, printable, shortened, snake_case
 
 Row = Candidate | Trial
 
@@ -88,7 +89,7 @@ def label_of(state: RunState, test: Test) -> str:
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 
-def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
+def numbers_of(state: RunState, names: Iterable[str]) -> Numbers:
     """The numbers of models, in the order of the world."""
     number = {name: index for index, name in enumerate(state.elements)}
     return tuple(sorted(number[name] for name in names))
@@ -239,7 +240,7 @@ class Change(Asked):
     begins from the whole world.
     """
 
-    settings: dict[str, Any]
+    settings: Data
 
     def refusal(self, now: Situation) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
@@ -391,7 +392,7 @@ def round_over(state: RunState) -> str:
     return "the rounds are over" if state.confirming and not state.ended else "this round is over"
 
 
-def _names_of(state: RunState, numbers: Sequence[int]) -> tuple[str, ...] | None:
+def _names_of(state: RunState, numbers: Sequence[int]) -> Names | None:
     """The names of numbered models, each once; None if there are no such models."""
     if not all(0 <= number < len(state.elements) for number in numbers):
         return None
@@ -401,7 +402,7 @@ def _names_of(state: RunState, numbers: Sequence[int]) -> tuple[str, ...] | None
 class Pin(Asked):
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
-    models: tuple[int, ...]
+    models: Numbers
 
     def refusal(self, now: Situation) -> str:
         names, kept = _names_of(now.state, self.models), frozenset(now.state.environment)
@@ -414,7 +415,7 @@ class Pin(Asked):
     def words(self, state: RunState) -> Words:
         return Words("pin", f"pinned, so that it always stays: {named(self.new(state))}. {new_search(state)}")
 
-    def new(self, state: RunState) -> tuple[str, ...]:
+    def new(self, state: RunState) -> Names:
         """The models that are not pinned yet."""
         return tuple(name for name in _names_of(state, self.models) or () if name not in state.pinned)
 
@@ -422,7 +423,7 @@ class Pin(Asked):
 class Unpin(Asked):
     """Let pinned models be removed again."""
 
-    models: tuple[int, ...]
+    models: Numbers
 
     def refusal(self, now: Situation) -> str:
         return "" if self.pinned(now.state) else "not pinned"
@@ -430,7 +431,7 @@ class Unpin(Asked):
     def words(self, state: RunState) -> Words:
         return Words("unpin", f"unpinned: {named(self.pinned(state))}. {new_search(state)}")
 
-    def pinned(self, state: RunState) -> tuple[str, ...]:
+    def pinned(self, state: RunState) -> Names:
         """The models that are pinned."""
         return tuple(name for name in _names_of(state, self.models) or () if name in state.pinned)
 
@@ -438,7 +439,7 @@ class Unpin(Asked):
 class Try(Asked):
     """Test a selection: `models` are the ones that are kept."""
 
-    models: tuple[int, ...]
+    models: Numbers
 
     def refusal(self, now: Situation) -> str:
         state, names = now.state, _names_of(now.state, self.models)
@@ -475,7 +476,7 @@ class Adopt(Asked):
         if trial is None:
             return "there is no such try"
         # What counted as f in the test may no longer count.
-        if trial.verdict != "similar" or state.tests[trial.tests[-1] - 1].outcome != "similar":
+        if trial.verdict != "similar" or not state.test(trial.tests[-1]).shows_f:
             return f"{trial.label} did not show f"
         if trial.models == state.environment:
             return f"{trial.label} is the environment already"
@@ -511,7 +512,7 @@ class LeaveOut(Asked):
         if found is None or not set(names) & set(only_helping(found)):
             return None
         fresh = (test for test in state.confirm_tests if test.node == found.node and test.run >= found.first_run)
-        return next((test for test in fresh if test.without in names and test.outcome == "similar"), None)
+        return next((test for test in fresh if test.without in names and test.shows_f), None)
 
 
 def _lacks_pinned(state: RunState, label: str, models: Sequence[str]) -> str:
@@ -535,7 +536,7 @@ class AcceptOther(Asked):
             return NO_FAILURE
         if not 0 < self.test <= len(state.tests):
             return "there is no such test"
-        test = state.tests[self.test - 1]
+        test = state.test(self.test)
         if test.outcome != "other" or test.end_pose is None:
             return f"test {test.id} did not end in another failure"
         if self.instead:
@@ -546,7 +547,7 @@ class AcceptOther(Asked):
         return _lacks_pinned(state, label, models.names(state.elements))
 
     def words(self, state: RunState) -> Words:
-        test = state.tests[self.test - 1]
+        test = state.test(self.test)
         models, label = count(len(state.environments[test.environment]), "model"), label_of(state, test)
         if self.instead:
             brief, what = "branch to another failure", f"test {test.id}"
@@ -636,7 +637,7 @@ def send(file: RunFile, command: Command) -> int:
     return file.send(kind, **data)
 
 
-def written(command: Command) -> tuple[str, dict[str, Any]]:
+def written(command: Command) -> tuple[str, Data]:
     """A command as it stands in the run file: its kind, and its fields as JSON."""
     return snake_case(type(command).__name__), plain(command)
 

@@ -10,6 +10,7 @@ from ddenv.evidence.claims import current, only_helping
 from ddenv.guiding import commands as c
 from ddenv.runfile.state import REFUSED, RunState, Test, Trial
 from ddenv.runfile.tested import adoptable
+from ddenv.text import Names
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +19,7 @@ class Pointed:
 
     row: c.Row | None = None
     follows: bool = False
-    models: tuple[str, ...] = ()
+    models: Names = ()
 
 
 @dataclass(frozen=True, slots=True)

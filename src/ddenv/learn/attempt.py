@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.text import Names
 from ddenv.words.claims import of_all_parts
 from ddenv.world.access import read_bytes
 
@@ -21,8 +22,8 @@ MOST_MODELS = 14
 class RecordedRound:
     """The parts of a round that an algorithm made, and the labels of the candidates that it tested, such as "without A"."""
 
-    parts: tuple[tuple[str, ...], ...]
-    tested: tuple[str, ...]
+    parts: tuple[Names, ...]
+    tested: Names
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Oracle:
     `rounds` is what algorithms did in this world, by their names.
     """
 
-    models: tuple[str, ...]
+    models: Names
     outcomes: dict[frozenset[str], str]
     otherwise: str
     rates: dict[frozenset[str], float] = field(default_factory=dict)
@@ -56,13 +57,13 @@ class Oracle:
         return frozenset(kept for kept, outcome in self.outcomes.items() if outcome == "similar")
 
     @cached_property
-    def minimal(self) -> tuple[tuple[str, ...], ...]:
+    def minimal(self) -> tuple[Names, ...]:
         """The 1-minimal sets, the smallest first, each in the order of the models."""
         found = [kept for kept in self.showing if not any(kept - {name} in self.showing for name in kept)]
         ordered = (tuple(name for name in self.models if name in kept) for kept in found)
         return tuple(sorted(ordered, key=lambda kept: (len(kept), kept)))
 
-    def could_go(self, kept: Iterable[str]) -> tuple[str, ...]:
+    def could_go(self, kept: Iterable[str]) -> Names:
         """The models of `kept` that can each be left out alone: f still shows."""
         there = frozenset(kept)
         return tuple(name for name in self.models if name in there and there - {name} in self.showing)
@@ -100,8 +101,8 @@ def read_oracle(path: Path) -> Oracle:
 class Tried:
     """A test of the models `kept` of those that were held, without the models `out`."""
 
-    kept: tuple[str, ...]
-    out: tuple[str, ...]
+    kept: Names
+    out: Names
     outcome: str
 
 
@@ -114,10 +115,10 @@ class Attempt:
     def __init__(self, oracle: Oracle, budget: int, moves: Iterable[str] = ()) -> None:
         """After these moves; from the first one that is not possible on, they are dropped."""
         self.oracle, self.budget = oracle, budget
-        self.moves: tuple[str, ...] = ()
+        self.moves: Names = ()
         self.tried: list[Tried] = []
         self.ended = False
-        self._chain: list[tuple[str, ...]] = [oracle.models]
+        self._chain: list[Names] = [oracle.models]
         for move in moves:
             what, _, names = move.partition(" ")
             try:
@@ -131,7 +132,7 @@ class Attempt:
                 return
 
     @property
-    def held(self) -> tuple[str, ...]:
+    def held(self) -> Names:
         return self._chain[-1]
 
     @property

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -15,7 +14,7 @@ from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, Test
 from ddenv.runfile.tested import pointed
-from ddenv.text import count
+from ddenv.text import Data, Names, count
 
 SAID = {
     "similar": "f again: it fails as in the whole world",
@@ -25,7 +24,7 @@ SAID = {
 # Candidates of a round to choose from, and models of a candidate that are named there.
 MOST, FEW = 6, 3
 # Why something came about, as questions and answers.
-REASONS: dict[str, dict[str, Any]] = yaml.safe_load(Path(__file__).with_name("reasons.yaml").read_text())
+REASONS: dict[str, Data] = yaml.safe_load(Path(__file__).with_name("reasons.yaml").read_text())
 # By the setting `growth`, what n does.
 _GROWTH = {
     "paper": "After each round n grows by one, but never above the number of models.",
@@ -69,7 +68,7 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     number = len(moment.after.tests)
     if not isinstance(moment.recorded.event, TestStarted) or not 0 < number <= len(position.end.tests):
         return None
-    test, candidate = position.end.tests[number - 1], pointed(moment)
+    test, candidate = position.end.test(number), pointed(moment)
     later = (position.moment(id) for id in position.ids if id > moment.recorded.id)
     ended = (each.recorded for each in later if each is not None and isinstance(each.recorded.event, TestFinished))
     until = next((each.id for each in ended if each.data["test"] == number), None)
@@ -78,17 +77,17 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     seen = "The robot reached the goal."
     if test.outcome != "pass":
         away = "" if test.distance is None else f" {test.distance:.1f} m from f's end"
-        seen = f"The robot {deed(test.failure)}{away}: {'that is f' if test.outcome == 'similar' else 'that is not f'}."
+        seen = f"The robot {deed(test.failure)}{away}: {'that is f' if test.shows_f else 'that is not f'}."
     answers = tuple(Answer(words, outcome == test.outcome, seen) for outcome, words in SAID.items())
     label = f"{candidate.label} alone" if candidate.kind == "partition" else f"E {candidate.label}"
     what = f"Test {number} runs {label}: {_named(candidate.models)}. How does it end?"
-    runs = [position.end.tests[id - 1] for id in {*candidate.tests, number} if id <= number]
+    runs = [position.end.test(id) for id in {*candidate.tests, number} if id <= number]
     missed = len(runs) if all(each.outcome in ("pass", "other") for each in runs) else 1
     reason = _why_ended(test, candidate, settings(moment.after), missed)
     return Foretelling(Question(what, answers, _hint(candidate)), until, reason, test.outcome)
 
 
-def _named(models: tuple[str, ...]) -> str:
+def _named(models: Names) -> str:
     if len(models) > 6:
         return count(len(models), "model")
     return ", ".join(models) or "no model"
@@ -224,7 +223,7 @@ def _why_ended(test: Test, candidate: Candidate, options: Settings, missed: int)
     elif options.most_runs > 1:
         goes = f"f showed without {gone}. Here the first run with f decides, so they go."
     # Of a single model nobody would be wrong to call it the smallest world.
-    most = 2 if test.outcome == "similar" and candidate.size == 1 else None
+    most = 2 if test.shows_f and candidate.size == 1 else None
     often = f"All {missed} runs missed f. That makes it likely, but it proves nothing."
     luck = often if missed > 1 else "It may have been bad luck: one test proves little."
     return _reason(test.outcome, test.id, most, goes=goes, luck=luck)

@@ -10,6 +10,8 @@ from typing import Literal
 
 import yaml
 
+from ddenv.text import Names
+
 Foretold = Literal["outcome", "winner", "parts"]
 
 
@@ -49,7 +51,7 @@ class Step:
     question: Question | None = None
     foretell: Foretold | None = None
     budget: int | None = None
-    race: tuple[str, ...] = ()
+    race: Names = ()
     line: int = 0
 
 

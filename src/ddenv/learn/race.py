@@ -19,7 +19,7 @@ from ddenv.runfile.state import BROKEN, Candidate, RunState, Split, Trial
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runfile.tested import made_for
 from ddenv.schemas import BOTH, uses
-from ddenv.text import count, first_of
+from ddenv.text import Names, Sentences, count, first_of
 
 # The least and the most searches of a race, and how many searches a sentence names.
 RACERS = (2, 4)
@@ -37,7 +37,7 @@ class Turn:
     candidate: Candidate | Trial
     round: int
     outcome: str
-    left: tuple[str, ...]
+    left: Names
     again: bool = False
 
     @property
@@ -50,7 +50,7 @@ class Play:
     """The tests of one search: it begins with the models `begins`. `ended` says whether it came to its end."""
 
     name: str
-    begins: tuple[str, ...]
+    begins: Names
     turns: tuple[Turn, ...]
     ended: bool = True
     method: str = ""
@@ -60,10 +60,10 @@ class Play:
         return len(self.turns)
 
     @property
-    def left(self) -> tuple[str, ...]:
+    def left(self) -> Names:
         return self.after(self.tests)
 
-    def after(self, tests: int) -> tuple[str, ...]:
+    def after(self, tests: int) -> Names:
         """The models that are kept after so many tests."""
         return self.turns[min(tests, self.tests) - 1].left if tests and self.turns else self.begins
 
@@ -117,11 +117,11 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
     for recorded, _, state in steps(events):
         event = recorded.event
         if isinstance(event, TestStarted):
-            test = state.tests[event.test - 1]
+            test = state.test(event.test)
             if (candidate := made_for(state, test)) is not None:
                 begun[test.id] = candidate, test.run > 0
         elif isinstance(event, TestFinished) and event.test in begun:
-            test, (candidate, again) = state.tests[event.test - 1], begun[event.test]
+            test, (candidate, again) = state.test(event.test), begun[event.test]
             turns.append(Turn(candidate, test.round or 0, test.outcome, state.environment, again))
         elif turns and state.environment is not turns[-1].left:
             turns[-1] = replace(turns[-1], left=state.environment)
@@ -199,7 +199,7 @@ class Race:
         return self.at >= play.tests
 
 
-def result(plays: Sequence[Play]) -> tuple[str, ...]:
+def result(plays: Sequence[Play]) -> Sentences:
     """Who won and why, in sentences; a search that did not end cannot win."""
     ended = sorted((play for play in plays if play.ended), key=lambda play: play.tests)
     open_ones = [play.name for play in plays if not play.ended]
@@ -254,7 +254,7 @@ class Line:
 
     name: str
     tests: int
-    left: tuple[str, ...] | None = None
+    left: Names | None = None
     can_go: bool = False
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer
+from ddenv.text import Names
 
 # Of one search; what is longer is no search.
 MOST_MOVES = 2000
@@ -28,7 +29,7 @@ class Score:
     streak: int = 0
     best: int = 0
     misconceptions: Mapping[str, int] = field(default_factory=dict)
-    moves: Mapping[str, Annotated[tuple[str, ...], Field(max_length=MOST_MOVES)]] = field(default_factory=dict)
+    moves: Mapping[str, Annotated[Names, Field(max_length=MOST_MOVES)]] = field(default_factory=dict)
 
     @property
     def right(self) -> int:

@@ -64,4 +64,4 @@ def _result(test: Test) -> str:
         return "the goal was reached"
     how = test.failure if test.failure in DEEDS else test.outcome
     away = "" if test.distance is None else f", {test.distance:.1f} m from f's end"
-    return f"{'f again' if test.outcome == 'similar' else 'not f'}: {how}{away}"
+    return f"{'f again' if test.shows_f else 'not f'}: {how}{away}"

@@ -16,6 +16,7 @@ import numpy as np
 from ddenv.map.raster import extent
 from ddenv.text import plain, shortened, width
 from ddenv.world.extent import convex_hull
+from ddenv.world.pose import Point
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
@@ -31,7 +32,6 @@ LONGEST_LABEL = 26  # columns
 MARK = 14.0  # half the size of a mark, with some space, pixels
 MOST_COVERED = 0.3  # maximum fraction of a name that may cover other models
 LARGE = 10.0  # a model at least this many times larger than a name may carry the name of another model
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

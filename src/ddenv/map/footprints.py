@@ -10,7 +10,7 @@ import numpy as np
 from ddenv.map.colors import RGB
 from ddenv.world.extent import circle, convex_hull, model_bounds, vertices_of
 from ddenv.world.model import Model, Plane, World, is_ground
-from ddenv.world.pose import HERE, Pose, Vector, vector
+from ddenv.world.pose import HERE, Point, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
 ROUND = 12
@@ -27,11 +27,11 @@ class Footprint:
 
     name: str
     polygons: tuple[np.ndarray, ...]
-    low: tuple[float, float]
-    high: tuple[float, float]
+    low: Point
+    high: Point
 
     @property
-    def center(self) -> tuple[float, float]:
+    def center(self) -> Point:
         return ((self.low[0] + self.high[0]) / 2, (self.low[1] + self.high[1]) / 2)
 
     @property
@@ -39,7 +39,7 @@ class Footprint:
         """The area of the rectangle around it, m^2."""
         return (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
 
-    def distance(self, point: tuple[float, float]) -> float:
+    def distance(self, point: Point) -> float:
         """The distance from a point to the nearest polygon, m; 0 inside. Without polygons, to the model's centre."""
         if not self.polygons:
             return math.dist(self.center, point)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ddenv.world.pose import Point
+
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
@@ -52,7 +54,7 @@ class View:
             return None
         return int(half // 2), int(column)
 
-    def point(self, cell: tuple[int, int]) -> tuple[float, float]:
+    def point(self, cell: tuple[int, int]) -> Point:
         """The middle of a cell (row, column), m."""
         row, column = cell
         return (
@@ -60,7 +62,7 @@ class View:
             self.y + (self.rows - 2 * row - 1) * self.scale,
         )
 
-    def zoomed(self, factor: float, about: tuple[float, float] | None = None) -> View:
+    def zoomed(self, factor: float, about: Point | None = None) -> View:
         """The view `factor` times closer; the point `about` (m), by default the centre, stays in place."""
         scale = min(COARSEST, max(FINEST, self.scale / factor))
         x, y = about or (self.x, self.y)
@@ -78,7 +80,7 @@ class View:
 
 def fit(
     prints: Sequence[Footprint],
-    points: Iterable[tuple[float, float]],
+    points: Iterable[Point],
     columns: int,
     rows: int,
     margin: float = 1.0,
@@ -90,7 +92,7 @@ def fit(
     return View(float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2, float(scale), columns, rows)
 
 
-def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of all `points` and of the models except huge ones, m; 10 m around zero for nothing.
 
     A model is huge if it is several times larger than the area that the smaller models, and the points among them, span. The

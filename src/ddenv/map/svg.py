@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from ddenv.map.colors import RGB, blend, packed
-from ddenv.map.drawing import Frame, Point, at, badge, labels, path_of, plot, tick, written
+from ddenv.map.drawing import Frame, at, badge, labels, path_of, plot, tick, written
 from ddenv.map.footprints import Drawn, plan
 from ddenv.text import count, shortened
 from ddenv.world.model import World
+from ddenv.world.pose import Point, Vector
 
 # Maximum width and height and minimum width of the map, and its margins, pixels.
 WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0
@@ -38,7 +39,7 @@ svg { font: 12px Inter, "Segoe UI", Helvetica, Arial, "DejaVu Sans", sans-serif;
 """
 
 
-def svg_map(world: World, *, spawn: tuple[float, float, float] | None = None, goal: Point | None = None) -> str:
+def svg_map(world: World, *, spawn: Vector | None = None, goal: Point | None = None) -> str:
     """The world from above, without its ground.
 
     If given, marks `spawn`, x, y (m) and yaw (rad), and `goal`, x, y (m); all finite.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from ddenv.text import Data
 from ddenv.text import duration as duration
 from ddenv.text import percent as percent
 
@@ -115,7 +116,7 @@ def thousands(number: int) -> str:
     return f"{number:,}".replace(",", " ")
 
 
-def section(data: Mapping[str, Any], key: str) -> dict[str, Any]:
+def section(data: Mapping[str, Any], key: str) -> Data:
     """A part of a scenario; empty if a damaged file has something else."""
     value = data.get(key)
     return value if isinstance(value, dict) else {}

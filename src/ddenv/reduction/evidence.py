@@ -10,9 +10,9 @@ import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.environment import Environment
+from ddenv.text import Names
 
 # Models by name, for schemas.
-Names = tuple[str, ...]
 Place = tuple[float, float, float]
 
 # Probabilities of being needed stay between these, so that no test is impossible.

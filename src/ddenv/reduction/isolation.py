@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from ddenv.environment import NOTHING, Environment
+from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.evidence.certificate import Claim, Procedure, Wanted, error_of, falls, often
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import ddmin
@@ -68,7 +68,7 @@ class Passing:
 class Each:
     """The rule where chosen runs are reduced exactly: a world passes if the robot reaches its goal in each of them."""
 
-    exact: tuple[int, ...]
+    exact: Numbers
 
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""

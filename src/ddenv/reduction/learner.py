@@ -9,8 +9,9 @@ from scipy.spatial.distance import cdist
 from sklearn.linear_model import SGDClassifier
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.reduction.evidence import LEAST, MOST, Evidence, Names, Traits, distances_to_failure, spatial_prior
+from ddenv.reduction.evidence import LEAST, MOST, Evidence, Traits, distances_to_failure, spatial_prior
 from ddenv.reduction.partitionings import grouped
+from ddenv.text import Names
 
 # After this number of candidates the classifier counts as much as the spatial prior.
 TRUST = 10.0

@@ -11,7 +11,8 @@ from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
 from ddenv.arrays import Floats
-from ddenv.reduction.evidence import Evidence, Names
+from ddenv.reduction.evidence import Evidence
+from ddenv.text import Names
 
 # With more clusters or models than this, k-means starts once instead of four times, and with more clusters than this from random
 # models: it would take a second instead of a tenth.

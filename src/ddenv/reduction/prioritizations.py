@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ddenv.reduction.evidence import Evidence, Names, nearest_on_path
+from ddenv.reduction.evidence import Evidence, nearest_on_path
+from ddenv.text import Names
 
 
 def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:

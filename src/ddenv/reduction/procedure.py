@@ -19,11 +19,12 @@ from itertools import islice, zip_longest
 from random import Random
 from typing import Protocol, TypeVar
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.evidence.certificate import (
     HELPING,
     NEEDED_SHARE,
     Claim,
+    NumberedRun,
     Procedure,
     Settling,
     Terms,
@@ -33,7 +34,7 @@ from ddenv.evidence.certificate import (
     keeps,
     often,
 )
-from ddenv.evidence.rates import Shown
+from ddenv.evidence.rates import Shown, ShownIn
 from ddenv.reduction.round import Candidate, Partition, Round, Search
 from ddenv.reduction.verdict import (
     FEWEST_SHOWN,
@@ -121,7 +122,7 @@ class Certificate:
 
     first_run: int
     terms: Terms
-    exact: tuple[int, ...] = ()
+    exact: Numbers = ()
 
 
 @dataclass(frozen=True)
@@ -133,10 +134,10 @@ class NamedClaim:
     model: int | None
     environment: Environment
     claim: Claim
-    exact: tuple[int, ...] = ()
+    exact: Numbers = ()
 
     @property
-    def runs(self) -> tuple[int, ...]:
+    def runs(self) -> Numbers:
         """The fresh runs of its environment on which it rests, counted from the certificate's first one."""
         return tuple(run for environment, run in self.claim.rests_on if environment == self.environment)
 
@@ -216,7 +217,7 @@ class Driver(Runs, Protocol):
     def certified(self, made: Certified) -> None:
         """A certificate is finished."""
 
-    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[tuple[Environment, int], ...]) -> Leg:
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> Leg:
         """What is left lost the rate, by these fresh tests, as (environment, run): the search goes back to place number `place` of
         the chain, and leaves out the groups `again` first. The environment at `place` + 1 and all its parts are not taken again.
         """
@@ -358,12 +359,15 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
         yield tuple(Test(left, run, "round") for run in missing)
     certificate = driver.certificate_due()
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
+    fresh = _fresh(driver, certificate.first_run)
 
     def ends(claim: NamedClaim) -> bool:
-        if claim.model is None:
-            fresh = (driver.shown(left, certificate.first_run + run, full=True) for run in claim.runs)
-            return claim.claim.verdict == "lost" or (claim.claim.verdict == "not shown" and True not in fresh)
-        return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
+        verdict = claim.claim.verdict
+        if claim.model is not None:
+            return verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
+        if verdict != "not shown":
+            return verdict == "lost"
+        return all(fresh(left, run) is not True for run in claim.runs)
 
     settle_claims = _settled_in_turn if certificate.terms.order_seed is None else _settled_in_blocks
     made = yield from settle_claims(driver, certificate, left, whole, rests, ends)
@@ -422,9 +426,7 @@ def settled(
 ) -> Work[tuple[NamedClaim, ...]]:
     """Makes fresh runs until each of `claims` has a verdict, up to one that `ends` them; returns them."""
 
-    def fresh(environment: Environment, run: int) -> Shown:
-        return driver.shown(environment, first_run + run, full=True)
-
+    fresh = _fresh(driver, first_run)
     opened: list[tuple[int | None, Environment, Settling]] = []
     while True:
         named: list[NamedClaim] = []
@@ -465,9 +467,7 @@ def _settled_in_blocks(
     """
     first_run, terms = certificate.first_run, certificate.terms
 
-    def fresh(environment: Environment, run: int) -> Shown:
-        return driver.shown(environment, first_run + run, full=True)
-
+    fresh = _fresh(driver, first_run)
     without = {rest: model for model, rest in rests.items()}
 
     def claims_of(models: Mapping[int, Settling]) -> list[NamedClaim]:
@@ -512,6 +512,11 @@ def _settled_in_blocks(
         yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
 
 
+def _fresh(driver: Runs, first_run: int) -> ShownIn:
+    """Asks for full runs by their number, counted from the first one of a certificate."""
+    return lambda environment, run: driver.shown(environment, first_run + run, full=True)
+
+
 def _opened(rests: Mapping[int, Environment], left: Environment, error: float, first: int) -> dict[int, Settling]:
     """A claim of each model, with runs from block number `first` on."""
     return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
@@ -520,10 +525,12 @@ def _opened(rests: Mapping[int, Environment], left: Environment, error: float, f
 def _without_more_runs(named: Iterable[NamedClaim], ended: NamedClaim | None) -> tuple[NamedClaim, ...]:
     """What is said of these claims. To a search that goes on after one `ended`, those that are still open are of no use."""
     used = (one for one in named if ended is None or one.model in (None, ended.model))
-    return tuple(replace(one, claim=_given_up(one.claim)) for one in used)
+    return tuple(
+        one if one.claim.verdict else replace(one, claim=replace(one.claim, verdict="not shown")) for one in used
+    )
 
 
-def _in_drawn_order(tests: Iterable[tuple[Environment, int]], seed: int | None) -> list[tuple[Environment, int]]:
+def _in_drawn_order(tests: Iterable[NumberedRun], seed: int | None) -> list[NumberedRun]:
     return sorted(tests, key=lambda test: Random(f"{seed} {test[1]} {test[0].bits}").random())
 
 
@@ -532,7 +539,7 @@ def _left_of(terms: Terms, made: int) -> float:
     return math.inf if terms.most_tests is None else terms.most_tests - made
 
 
-def _have_turn(of_left: NamedClaim, fresh: Callable[[Environment, int], Shown]) -> bool:
+def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:
     """Whether what is left is judged, or seems to keep the rate that the search aims at and is shown to keep a part of it."""
     claim = of_left.claim
     if claim.verdict or (claim.bound or 0.0) < LOOKS_KEPT_BOUND:
@@ -540,10 +547,6 @@ def _have_turn(of_left: NamedClaim, fresh: Callable[[Environment, int], Shown]) 
     with_f = [environment for environment, run in claim.rests_on if fresh(environment, run) is True]
     of_what_is_left = with_f.count(of_left.environment)
     return of_what_is_left >= NEEDED_SHARE * (len(with_f) - of_what_is_left)
-
-
-def _given_up(claim: Claim) -> Claim:
-    return claim if claim.verdict else replace(claim, verdict="not shown")
 
 
 def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified) -> Work[Leg | None]:
@@ -568,10 +571,7 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
     """
     first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
     rate = driver.rate()
-
-    def fresh(environment: Environment, run: int) -> Shown:
-        return driver.shown(environment, first + run, full=True)
-
+    fresh = _fresh(driver, first)
     sound = [shown for run in lost.runs if isinstance(shown := fresh(lost.environment, run), bool)]
     lost_rate = sum(sound) / max(1, len(sound))
     claims: dict[Environment, Claim] = {}
@@ -595,9 +595,7 @@ def groups_again(good: Environment, bad: Environment, end: Environment) -> list[
     return [group for group in (later, *halves) if group]
 
 
-def last_good(
-    chain: Sequence[Environment], judged: Callable[[Environment], Claim]
-) -> int | tuple[tuple[Environment, int], ...]:
+def last_good(chain: Sequence[Environment], judged: Callable[[Environment], Claim]) -> int | tuple[NumberedRun, ...]:
     """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
 
     `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.

@@ -18,16 +18,16 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import LONGER, Terms, Verdict, error_of, tests_in_blocks
+from ddenv.evidence.certificate import LONGER, NumberedRun, Terms, Verdict, error_of, tests_in_blocks
 from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate, wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
-from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
+from ddenv.reduction.evidence import Evidence, Place, Traits, Trial
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.round import Partition, Round, Search
 from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.settings import SETTINGS
-from ddenv.text import count, percent, rounded
+from ddenv.text import Names, count, percent, rounded
 
 NEVER_SHOWS = (
     "the failure does not show with all elements: in none of {}, so it shows in less than {} % of them (95 %); "
@@ -103,7 +103,7 @@ class Reduction:
     `flaky`: calls with the same elements gave different answers.
     """
 
-    kept: tuple[str, ...]
+    kept: Names
     rounds: int
     history: tuple[Step, ...]
     minimal: bool | None
@@ -279,7 +279,7 @@ class _Caller:
         self.calls: Counter[str] = Counter()
         self.trials: list[Trial] = []
         self.history = [Step(0, self.names)]
-        self._known: dict[tuple[Environment, int], bool] = {}
+        self._known: dict[NumberedRun, bool] = {}
         # What calls with all elements showed.
         self._of_whole: list[bool] = []
         self._chain: tuple[Environment, ...] = (self.whole,)

@@ -8,8 +8,8 @@ from functools import lru_cache
 from itertools import count
 from typing import Literal, NamedTuple, Protocol
 
-from ddenv.environment import Environment
-from ddenv.evidence.rates import HIGHEST_RATE, SPURIOUS, Shown
+from ddenv.environment import Environment, Numbers
+from ddenv.evidence.rates import HIGHEST_RATE, SPURIOUS, Shown, ShownIn
 
 Verdict = Literal["", "similar", "dissimilar", "unknown"]
 
@@ -51,8 +51,8 @@ class Acceptance:
     rate: float = 0.0
     keep_rate: float = 0.8
     steps_back: int = 0
-    exact: tuple[int, ...] = ()
-    broke: tuple[int, ...] = ()
+    exact: Numbers = ()
+    broke: Numbers = ()
 
     def run(self, place: int) -> int:
         """The number of the run at this place, from 0."""
@@ -126,7 +126,7 @@ REFUSED = Decision("dissimilar", (), runs=0, shown=0, broken=0)
 
 def standing(
     candidates: Iterable[Environment],
-    shown: Callable[[Environment, int], Shown],
+    shown: ShownIn,
     rule: Rule,
     refused: Callable[[Environment], bool] = lambda _: False,
     *,
@@ -151,7 +151,7 @@ def standing(
     return verdicts, wanted
 
 
-def decided_by(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> Decision:
+def decided_by(shown: ShownIn, candidate: Environment, rule: Rule) -> Decision:
     """The decision of `rule` on a candidate, by its runs in their order.
 
     A later run that showed f decides nothing while an earlier one is open: else the verdict would depend on timing.

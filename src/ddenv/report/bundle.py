@@ -98,7 +98,7 @@ def _copy_run(run: Path, target: Path, record: Record) -> None:
     drawn = {test for test in (state.evidence_test, *state.failures, *record.ways) if test is not None}
     drawn |= {test.id for test in state.tests if test.phase == "baseline"}
     # An implied test has the trajectories of another one.
-    drawn |= {by for test in drawn if (by := state.tests[test - 1].implied_by) is not None}
+    drawn |= {by for test in drawn if (by := state.test(test).implied_by) is not None}
     try:
         source = sqlite3.connect(f"{run.absolute().as_uri()}?mode=ro", uri=True)
         with closing(source), closing(sqlite3.connect(target)) as copy:

@@ -140,7 +140,7 @@ def others_met(record: Record) -> Section | None:
     for each in found[:MOST]:
         size = f"{count(each.size, 'model')} (test {each.smallest})"
         away = "" if state.f_position is None else f"{math.dist(state.f_position, each.position):.2f}"
-        models = named(state.models_of(state.tests[each.smallest - 1]), MOST_NAMES) or "none"
+        models = named(state.models_of(state.test(each.smallest)), MOST_NAMES) or "none"
         rows.append((each.name, away, thousands(len(each.tests)), size, models))
     more = len(found) - MOST
     rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []

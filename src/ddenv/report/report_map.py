@@ -10,13 +10,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ddenv.map.drawing import FAR, Frame, Point, at, badge, labels, path_of, plot, written
+from ddenv.map.drawing import FAR, Frame, at, badge, labels, path_of, plot, written
 from ddenv.map.footprints import Drawn, rings
 from ddenv.page.step_chart import opening
 from ddenv.report.run_data import Record
 from ddenv.runfile.run_settings import settings
 from ddenv.runs.changes import Limit
 from ddenv.runs.playback import table
+from ddenv.world.pose import Point
 
 # Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.
 Ways = Mapping[str, "array[float] | None"]

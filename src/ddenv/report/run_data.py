@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
@@ -20,6 +20,7 @@ from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.changes import Change, changes
 from ddenv.runs.reasons import Nearest, Reason, nearest, reasons
 from ddenv.runs.subject import read_parts
+from ddenv.text import Data, Sentences
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 
@@ -42,7 +43,7 @@ class Record:
     path: Path
     state: RunState
     rounds: tuple[Round, ...]
-    asked: dict[str, Any]
+    asked: Data
     started: float
     alive: bool
     scenario: Scenario | None
@@ -50,7 +51,7 @@ class Record:
     models: tuple[Drawn, ...]
     original: array[float] | None
     evidence: array[float] | None
-    troubles: tuple[str, ...]
+    troubles: Sentences
     elements: frozenset[str]
     kept: frozenset[str]
     reasons: tuple[Reason, ...]

@@ -54,7 +54,7 @@ def _models(record: Record) -> list[Block]:
     }
     # In the last similar run, s; old files do not say it.
     test = state.evidence_test
-    if test is not None and 0 < test <= len(state.tests) and (first := dict(state.tests[test - 1].first_touched)):
+    if test is not None and 0 < test <= len(state.tests) and (first := dict(state.test(test).first_touched)):
         columns["first touched, s"] = [f"{first[name]:.1f}" if name in first else "never" for name in names]
     right = range(2, len(columns))
     carried = [drops_without(state, frozenset({name})) for name in names]

@@ -18,9 +18,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ddenv.arrays import Floats
+from ddenv.text import Names
 from ddenv.world.drive import Twist as Twist
 from ddenv.world.drive import WheelSpeeds as WheelSpeeds
-from ddenv.world.pose import Vector
+from ddenv.world.pose import Point, Vector
 
 STOP = Twist(0.0, 0.0)
 
@@ -102,10 +103,10 @@ class Setup:
     a controller of your own. `seed` is the seed of the run.
     """
 
-    goal: tuple[float, float]
+    goal: Point
     tolerance: float
-    start: tuple[float, float, float]
-    joints: tuple[str, ...]
+    start: Vector
+    joints: Names
     left: tuple[bool, ...]
     radius: float
     track: float

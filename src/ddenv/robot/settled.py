@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from ddenv.text import count, first_of
+from ddenv.text import Names, count, first_of
 from ddenv.world.model import World
 from ddenv.world.pose import Pose
 
@@ -25,9 +25,9 @@ class Settled:
 
     seconds: float = 0.0
     places: Mapping[str, tuple[Pose, ...]] = field(default_factory=dict)
-    restless: tuple[str, ...] = ()
-    fallen: tuple[str, ...] = ()
-    broken: tuple[str, ...] = ()
+    restless: Names = ()
+    fallen: Names = ()
+    broken: Names = ()
 
 
 def moved(world: World, settled: Settled) -> dict[str, float]:

@@ -7,12 +7,12 @@ from 1. A field with a default may be missing in a file. Times are in s, places 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, dataclass_transform
+from typing import Annotated, dataclass_transform
 
 from ddenv.environment import NOTHING
 from ddenv.runfile.deeds import named
 from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Pose, Positive, Real, Seconds, Share
-from ddenv.text import snake_case
+from ddenv.text import Data, Names, snake_case
 
 Pair = tuple[Natural, Natural]
 Place = tuple[Real, Real, Real]
@@ -37,8 +37,8 @@ class Created(Event):
     the second.
     """
 
-    scenario: dict[str, Any]
-    elements: tuple[str, ...]
+    scenario: Data
+    elements: Names
     welds: tuple[Pair, ...] = ()
 
 
@@ -80,11 +80,12 @@ class Resumed(Event):
 
 
 class DiskSpace(Event):
-    """Whether the disk has room for more tests: `needed` bytes; `free` are there."""
+    """Whether the disk has room for more tests: `needed` bytes; `free` are there. `in_file`: up to the limit of a file's size."""
 
     enough: bool
     needed: Natural
     free: Natural
+    in_file: bool = False
 
 
 class ClockJumped(Event):
@@ -224,7 +225,7 @@ class SeenFailure:
 
     test: Number
     runs: Natural
-    kinds: tuple[str, ...]
+    kinds: Names
     position: Place
 
     @property
@@ -657,7 +658,7 @@ class WentBack(Event):
 class Changed(Event):
     """New values of settings. Where they say anew which failures are the same, `baseline` is fixed again, and judges all tests."""
 
-    settings: dict[str, Any]
+    settings: Data
     baseline: BaselineFinished | None = None
 
 

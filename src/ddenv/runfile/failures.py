@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
+from ddenv.environment import Numbers
 from ddenv.runfile.deeds import named
 from ddenv.runfile.events import Place
 from ddenv.runfile.run_settings import settings
@@ -28,7 +29,7 @@ class OtherFailure:
 
     kind: str
     position: Place
-    tests: tuple[int, ...]
+    tests: Numbers
     smallest: int
     size: int
 
@@ -51,7 +52,7 @@ def atlas(state: RunState) -> tuple[OtherFailure, ...]:
     found = []
     for kind, ends in kinds.items():
         for position, tests in _by_end(ends, epsilon):
-            sizes = {test: len(state.environments[state.tests[test - 1].environment]) for test in tests}
+            sizes = {test: len(state.environments[state.test(test).environment]) for test in tests}
             smallest = min(tests, key=lambda test: (sizes[test], test))
             found.append(OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest]))
     return tuple(sorted(found, key=lambda one: (-len(one.tests), one.tests)))

@@ -20,7 +20,7 @@ from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, wi
 from ddenv.runfile.progress import Node, PastRound, Point
 from ddenv.runfile.state import Candidate, PersistentTuple, Round, RunState, Split, spent
 from ddenv.runfile.store import Recorded
-from ddenv.text import count
+from ddenv.text import Data, count
 
 # Verdicts that tests led to, not the user.
 JUDGED = ("similar", "missed", "dissimilar", "unknown")
@@ -61,7 +61,7 @@ def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator
         yield recorded, before, after
 
 
-def recorded_scenario(scenario: dict[str, Any]) -> dict[str, Any]:
+def recorded_scenario(scenario: Data) -> Data:
     """A scenario as a run file has it: where it does not say so, seeds were consecutive."""
     reduction = scenario.get("reduction")
     return scenario | {"reduction": {"seeds": "consecutive"} | reduction} if isinstance(reduction, dict) else scenario
@@ -336,7 +336,10 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
 } | {
     e.Cluster: lambda _, event, __: {"jobs": event.jobs, "cluster": event.words},
     e.Comparing: lambda *_: {},
-    e.DiskSpace: lambda _, event, __: {"needs_room": 0 if event.enough else event.needed},
+    e.DiskSpace: lambda _, event, __: {
+        "needs_room": 0 if event.enough else event.needed,
+        "file_is_full": event.in_file,
+    },
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Still: lambda *_: {"ties": ()},
     e.Noted: lambda state, event, _: {"notes": (*state.notes, (event.about, event.words))},

@@ -23,7 +23,7 @@ def certificate_started(state: RunState, event: e.CertificateStarted, _: float) 
     certificate = Certificate(**shared(event, Certificate) | special)
     if certificate.number != len(state.certificates) + 1:
         raise ValueError(certificate.number)
-    fresh = PersistentTuple.of(test for test in state.fresh if state.tests[test - 1].run >= event.run)
+    fresh = PersistentTuple.of(test for test in state.fresh if state.test(test).run >= event.run)
     return {"confirming": True, "certificates": (*state.certificates, certificate), "fresh": fresh}
 
 
@@ -158,7 +158,7 @@ def open_margins(state: RunState) -> Margins:
 def sliced(state: RunState, event: e.Sliced, at: float) -> Changes:
     """The environment is cut down to what took part in the runs known there."""
     _check_tests(state, event.tests)
-    if not event.tests or any(state.tests[test - 1].took_part is None for test in event.tests):
+    if not event.tests or any(state.test(test).took_part is None for test in event.tests):
         raise ValueError(event.tests)
     changes = arrived(state, event.environment, event.evidence_test, at, "sliced", "the slice", ())
     *others, last = changes["nodes"]
@@ -170,7 +170,7 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
 
     The results of all implied tests are void. The run goes back to the last environment that rests on none.
     """
-    audit, node = state.tests[event.test - 1], state.nodes[event.node]
+    audit, node = state.test(event.test), state.nodes[event.node]
     path = state.changed(node=node.number).path
     if audit.audits != event.by or any(rests_on_slices(state, earlier) for earlier in path):
         raise ValueError(event.by)
@@ -181,7 +181,7 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
     for reached in state.nodes:
         runs = [test for test in state.tests_of(reached.runs) if test.implied_by is None]
         if len(runs) < len(reached.runs):
-            shown = sum(test.outcome == "similar" for test in runs)
+            shown = sum(test.shows_f for test in runs)
             reached = replace(reached, runs=tuple(test.id for test in runs), shown=shown)
         nodes.append(reached)
     # Void tests are no longer counted.
@@ -212,4 +212,4 @@ def rests_on_slices(state: RunState, node: Node) -> bool:
 
 
 def _any_implied(state: RunState, tests: Sequence[int]) -> bool:
-    return any(state.tests[test - 1].implied_by is not None for test in tests if test > 0)
+    return any(state.test(test).implied_by is not None for test in tests if test > 0)

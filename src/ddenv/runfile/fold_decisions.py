@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
 from ddenv.runfile.fold_tests import (
     Changes,
     baseline_finished,
@@ -19,9 +19,9 @@ from ddenv.runfile.fold_tests import (
 )
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, RunState, Test, Trial
+from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
 from ddenv.settings import SETTINGS, read
-from ddenv.text import count, first_of, plain, truncated
+from ddenv.text import Data, count, first_of, plain, truncated
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -69,7 +69,7 @@ def adopted(state: RunState, event: e.Adopted, at: float) -> Changes:
 
 def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Changes:
     """Another failure counts as f from now on, and the environment that showed it becomes the current one."""
-    test = state.tests[event.test - 1]
+    test = state.test(event.test)
     # A trial has a number; otherwise `what` names the candidate.
     trial = None if event.trial is None else state.trials[event.trial - 1]
     what = event.what if trial is None else trial.label
@@ -141,7 +141,7 @@ def changed(state: RunState, event: e.Changed, at: float) -> Changes:
     return changes if set(event.settings) == {"budget"} else changes | searched_anew(state)
 
 
-def with_settings(scenario: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+def with_settings(scenario: Data, new: Mapping[str, Any]) -> Data:
     """A scenario as plain data with new values of settings. Raises KeyError for a setting that there is not."""
     sections = {SETTINGS[name].section for name in new}
     return scenario | {
@@ -152,15 +152,12 @@ def with_settings(scenario: dict[str, Any], new: Mapping[str, Any]) -> dict[str,
 
 def _judged_anew(state: RunState, baseline: e.BaselineFinished, at: float) -> Changes:
     """Other runs show f now, so the search begins from the whole world again; tests keep their ends."""
-    state = state.changed(**left_round(state))
-    state = state.changed(**baseline_finished(state, baseline, at))
+    changes = left_round(state)
+    changes |= baseline_finished(state.changed(**changes), baseline, at)
+    state = state.changed(**changes)
     nodes = counted_again(state.nodes, state.tests)
     return {
-        **{
-            name: getattr(state, name)
-            for name in ("tests", "tally", "baseline", "certificates", "isolations", "margins")
-        },
-        **{name: getattr(state, name) for name in ("round", "status", "waiting_candidate", "confirming", "failures")},
+        **changes,
         **at_node(state, nodes[0]),
         "nodes": nodes,
         "search_due": True,
@@ -175,7 +172,7 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
     if state.evidence_test is None:
         raise ValueError("f is not known")
     start = event.round, state.node, event.n_partitions, state.pinned, state.evidence_test, state.scenario["reduction"]
-    tests = tuple(test for test in state.judged if state.tests[test - 1].is_finished)
+    tests = tuple(test for test in state.judged if state.test(test).is_finished)
     leg = Leg(*start, event.rate, state.steps_back, tests, state.again)
     return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
 
@@ -244,7 +241,7 @@ def refused(state: RunState, environment: Environment, verdict: str, round: int 
     return {"refused": (*state.refused, *more), "refusals": state.refusals + 1}
 
 
-def failures_at(state: RunState, number: int) -> tuple[int, ...]:
+def failures_at(state: RunState, number: int) -> Numbers:
     """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
     way, first = path(state.nodes, number), origin(state, number)
     counted = (node for node in way[way.index(first) :] if node is first or node.how == "accepted")
@@ -257,12 +254,12 @@ def origin(state: RunState, number: int) -> Node:
     return next((node for node in reversed(way) if node.how == "instead"), way[0])
 
 
-def exact_runs(state: RunState) -> tuple[int, ...]:
+def exact_runs(state: RunState) -> Numbers:
     """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
     asked, whole = settings(state), origin(state, state.node).id
     if asked.accept_rate != "exact":
         return ()
-    tests = (test for test in rested_on(state) if test.environment == whole and test.outcome == "similar")
+    tests = (test for test in rested_on(state) if test.environment == whole and test.shows_f)
     return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
 
 
@@ -271,12 +268,12 @@ def stands_for_all(state: RunState) -> bool:
     return state.baseline is not None and state.baseline.alike and settings(state).reduces_one_run
 
 
-def broken_runs(state: RunState) -> tuple[int, ...]:
+def broken_runs(state: RunState) -> Numbers:
     """The runs of the baseline that broke each time, ascending."""
     runs: dict[int, bool] = {}
     for test in state.tests:
         if test.phase == "baseline" and test.is_finished:
-            runs[test.run] = runs.get(test.run, True) and test.outcome in BROKEN
+            runs[test.run] = runs.get(test.run, True) and test.broke
     return tuple(sorted(run for run, broke in runs.items() if broke))
 
 

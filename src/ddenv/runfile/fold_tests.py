@@ -7,8 +7,10 @@ from dataclasses import fields, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
+from ddenv.environment import Numbers
 from ddenv.runfile.progress import Node, Point, Removal
-from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
+from ddenv.runfile.state import CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
+from ddenv.text import Data
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -53,7 +55,7 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
     return changes | with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
 
 
-def shared(event: Any, kind: type[Any]) -> dict[str, Any]:
+def shared(event: Any, kind: type[Any]) -> Data:
     """The fields that a part of an event and the state have in common."""
     return {field.name: getattr(event, field.name) for field in fields(kind) if hasattr(event, field.name)}
 
@@ -80,7 +82,7 @@ def test_finished(state: RunState, event: e.TestFinished, _: float) -> Changes:
     return _ended_as(state, event.test, values)
 
 
-def _ended_as(state: RunState, test: int, values: dict[str, Any]) -> Changes:
+def _ended_as(state: RunState, test: int, values: Data) -> Changes:
     changes = with_test(state, test, values)
     return changes | _noted(state, changes["tests"][test - 1])
 
@@ -89,8 +91,8 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
     """A test that starts and ends at once: it has the result of another one."""
     started = test_started(state, event, at)
     now = state.changed(**started)
-    test, made = now.tests[-1], now.tests[event.by - 1]
-    if not made.is_finished or made.outcome in BROKEN or made.implied_by is not None or made.run != test.run:
+    test, made = now.tests[-1], now.test(event.by)
+    if not made.is_sound or made.implied_by is not None or made.run != test.run:
         raise ValueError(event.by)
     there = frozenset(now.models_of(test))
     values = {name: getattr(made, name) for name in END} | {
@@ -103,7 +105,7 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
 
 
 def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
-    lost = state.tests[event.test - 1]
+    lost = state.test(event.test)
     return with_test(state, event.test, {"outcome": "lost"}) | {"audits": state.audits - (lost.audits is not None)}
 
 
@@ -127,10 +129,10 @@ def with_outcomes(state: RunState, judged: e.Outcomes) -> Changes:
     return {"tests": state.tests, "tally": state.tally}
 
 
-def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
+def with_test(state: RunState, id: int, values: Data) -> Changes:
     if id < 1:
         raise IndexError(id)
-    before = state.tests[id - 1]
+    before = state.test(id)
     after = replace(before, **values)
     return {"tests": state.tests.changed(id - 1, after), **counts(state, before, after)}
 
@@ -169,31 +171,27 @@ def _noted(state: RunState, test: Test) -> Changes:
     elif round is not None and here is not None and test.candidate is not None and test.round == round.number:
         # It ran ahead of the verdict that made its candidate the environment.
         node = here if round.winner == test.candidate and here.round == round.number else None
-    if node is None or not _is_sound(test):
+    if node is None or not test.is_sound:
         return {}
-    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + (test.outcome == "similar"))
+    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + test.shows_f)
     return {"nodes": with_node(state.nodes, after)}
 
 
-def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
+def same_runs(state: RunState, test: Test) -> Numbers:
     """The tests that were made for the same candidate, try or environment as `test`."""
     made_for = attrgetter("phase", "round", "candidate", "trial", "removal", "node", "without")
     return tuple(other.id for other in state.tests if made_for(other) == made_for(test))
 
 
-def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:
+def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[Numbers, int]:
     """Those of some tests that ended and did not break, each once, and how many of them showed f."""
-    sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and _is_sound(tests[id - 1]))
-    return sound, sum(tests[id - 1].outcome == "similar" for id in sound)
+    sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and tests[id - 1].is_sound)
+    return sound, sum(tests[id - 1].shows_f for id in sound)
 
 
 def counted_again(nodes: Sequence[Node], tests: Sequence[Test]) -> tuple[Node, ...]:
     """The nodes after the outcomes of tests changed."""
     return tuple(replace(node, shown=seen(tests, node.runs)[1]) for node in nodes)
-
-
-def _is_sound(test: Test) -> bool:
-    return test.is_finished and test.outcome not in BROKEN
 
 
 def with_node(nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:

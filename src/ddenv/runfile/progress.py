@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ddenv.environment import Environment
+from ddenv.environment import Environment, Numbers
+from ddenv.text import Data, Names
 
 if TYPE_CHECKING:
     from ddenv.runfile import events as e
@@ -27,11 +28,11 @@ class Leg:
     n_partitions: int | None
     pinned: frozenset[str]
     evidence_test: int
-    settings: dict[str, Any]
+    settings: Data
     rate: float = 0.0
     steps_back: int = 0
-    tests: tuple[int, ...] = ()
-    again: tuple[tuple[int, ...], ...] = ()
+    tests: Numbers = ()
+    again: tuple[Numbers, ...] = ()
     past: tuple[PastRound, ...] = ()
 
 
@@ -44,8 +45,8 @@ class PastRound:
     digest: int
     winner: int | None
     evidence_test: int | None
-    tests: tuple[int, ...]
-    unknown: tuple[int, ...] = ()
+    tests: Numbers
+    unknown: Numbers = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class Node:
     parent: int | None
     how: str
     what: str
-    environment: tuple[str, ...]
+    environment: Names
     id: int = 0
     n_partitions: int | None = None
     round: int | None = None
@@ -90,9 +91,9 @@ class Node:
     minimal: bool = False
     rejected: bool = False
     lost_rate: bool = False
-    runs: tuple[int, ...] = ()
+    runs: Numbers = ()
     shown: int = 0
-    sliced_by: tuple[int, ...] = ()
+    sliced_by: Numbers = ()
     to_audit: bool = False
 
 
@@ -124,7 +125,7 @@ class Certificate:
     claims: tuple[Claim, ...] = ()
     past: bool = False
     branch: bool = False
-    seeds: tuple[int, ...] = ()
+    seeds: Numbers = ()
     elsewhere: e.EndsElsewhere | None = None
 
 
@@ -178,10 +179,10 @@ class Removal:
     broke), by the `tests` with these ids.
     """
 
-    models: tuple[str, ...]
+    models: Names
     environment: int
     verdict: str = ""
-    tests: tuple[int, ...] = ()
+    tests: Numbers = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +248,7 @@ class Margins:
     broken_off: bool = False
 
     @property
-    def wanted(self) -> tuple[str, ...]:
+    def wanted(self) -> Names:
         """The names of the numbers that the last call asks for."""
         return tuple(one.name for one in self.asked.numbers)
 
@@ -266,7 +267,7 @@ class Physics:
 
     now: str = ""
     proven: str = ""
-    mixed: tuple[str, ...] = ()
+    mixed: Names = ()
 
     def started(self, engine: e.EngineStarted, tests: int) -> Physics:
         """After the start of an engine, when `tests` tests were finished."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ddenv.runfile.state import RunState
 from ddenv.settings import SETTINGS, Failure, Reduction, read
-from ddenv.text import plain
+from ddenv.text import Data, plain
 
 
 class Settings(Reduction, Failure):
     """A scenario's `name` and its settings; a damaged one has its default."""
 
-    def __init__(self, scenario: dict[str, Any]) -> None:
+    def __init__(self, scenario: Data) -> None:
         self.name = plain(scenario.get("name", "run"))
         for one in SETTINGS.values():
             setattr(self, one.name, read(scenario, one))

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from ddenv.environment import NOTHING, Environment
+from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.runfile.progress import Isolation, Margins, Node, Physics, path
+from ddenv.text import Data, Names
 
 if TYPE_CHECKING:
     from ddenv.runfile.events import BaselineFinished, EarlyStopEnded, Forecast, Place
@@ -127,30 +128,32 @@ class RunState:
     `engines` counts the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one
     makes them again. `notes` say what is wrong with the whole world: a word and a sentence each. `refusal` is the last command
     that the engine could not obey, with the reason. `needs_room` is how many bytes have to be free on the disk before more tests
-    start. `working_seconds` is the time that ended engines have worked; `started_at` (Unix time, s) is set while one works.
+    start; where the `file_is_full`, below the limit of a file's size. `working_seconds` is the time that ended engines have worked;
+    `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
     status: str = "created"
     reason: str = ""
-    scenario: dict[str, Any] = field(default_factory=dict)
-    elements: tuple[str, ...] = ()
+    scenario: Data = field(default_factory=dict)
+    elements: Names = ()
     environments: PersistentTuple[Environment] = field(default_factory=PersistentTuple)
-    environment: tuple[str, ...] = ()
+    environment: Names = ()
     leg: Leg | None = None
     search_due: bool = False
     judged: PersistentTuple[int] = field(default_factory=PersistentTuple)
     refused: tuple[Refusal, ...] = ()
     refusals: int = 0
-    lost: tuple[tuple[tuple[int, ...], Environment], ...] = ()
+    lost: tuple[tuple[Numbers, Environment], ...] = ()
     steps_back: int = 0
-    again: tuple[tuple[int, ...], ...] = ()
+    again: tuple[Numbers, ...] = ()
     engines: int = 0
     left_unknown: bool = False
     mixed_until: int = 0
     accept_mode: str = "automatic"
     paused: bool = False
     needs_room: int = 0
+    file_is_full: bool = False
     waiting_candidate: int | None = None
     baseline: BaselineFinished | None = None
     round: Round | None = None
@@ -168,7 +171,7 @@ class RunState:
     came_at: int = 0
     trials: tuple[Trial, ...] = ()
     decisions: tuple[Decision, ...] = ()
-    failures: tuple[int, ...] = ()
+    failures: Numbers = ()
     certificates: tuple[Certificate, ...] = ()
     fresh: PersistentTuple[int] = field(default_factory=PersistentTuple)
     isolations: tuple[Isolation, ...] = ()
@@ -204,13 +207,17 @@ class RunState:
         state.__dict__.update(self.__dict__, **values)
         return state
 
-    def models_of(self, test: Test) -> tuple[str, ...]:
+    def models_of(self, test: Test) -> Names:
         """The names of the models in the world of a test, collected at each call."""
         return self.environments[test.environment].names(self.elements)
 
+    def test(self, number: int) -> Test:
+        """The test with this number: they are counted from 1."""
+        return self.tests[number - 1]
+
     def tests_of(self, numbers: Iterable[int]) -> list[Test]:
         """The tests with these numbers, as far as the file has them."""
-        return [self.tests[number - 1] for number in numbers if 0 < number <= len(self.tests)]
+        return [self.test(number) for number in numbers if 0 < number <= len(self.tests)]
 
     @property
     def evidence(self) -> Test | None:
@@ -302,7 +309,7 @@ class RunState:
     @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
-        return tuple(self.tests[test - 1] for test in self.fresh)
+        return tuple(map(self.test, self.fresh))
 
     @property
     def running_tests(self) -> tuple[Test, ...]:
@@ -349,11 +356,11 @@ class Round:
     accepted: int | None = None
 
     @property
-    def environment(self) -> tuple[str, ...]:
+    def environment(self) -> Names:
         return self.split.environment
 
     @property
-    def partitions(self) -> tuple[tuple[str, ...], ...]:
+    def partitions(self) -> tuple[Names, ...]:
         return self.split.partitions
 
 
@@ -364,16 +371,16 @@ class Split:
     part that was one in the round before keeps its letter.
     """
 
-    environment: tuple[str, ...]
-    partitions: tuple[tuple[str, ...], ...]
-    pinned: tuple[str, ...] = ()
+    environment: Names
+    partitions: tuple[Names, ...]
+    pinned: Names = ()
     whole: Environment = NOTHING
     parts: tuple[Environment, ...] = ()
     always: Environment = NOTHING
-    letters: tuple[int, ...] = ()
+    letters: Numbers = ()
 
     @property
-    def lettered(self) -> Iterator[tuple[int, tuple[str, ...]]]:
+    def lettered(self) -> Iterator[tuple[int, Names]]:
         """Each part's names, with the number of its letter."""
         return zip(self.letters or range(len(self.partitions)), self.partitions, strict=True)
 
@@ -399,7 +406,7 @@ class Candidate:
     split: Split = field(repr=False, hash=False)
     distance: float | None = None
     verdict: str = ""
-    tests: tuple[int, ...] = ()
+    tests: Numbers = ()
 
     @property
     def kept(self) -> Environment:
@@ -408,7 +415,7 @@ class Candidate:
         return part | self.split.always if self.kind == "partition" else self.split.whole - part
 
     @property
-    def models(self) -> tuple[str, ...]:
+    def models(self) -> Names:
         """The names of its models, collected at each call; use `size` for their number."""
         part = self.split.partitions[self.partition]
         if self.kind == "partition":
@@ -436,11 +443,11 @@ class Trial:
     """
 
     number: int
-    models: tuple[str, ...]
+    models: Names
     node: int
     environment: int = 0
     verdict: str = ""
-    tests: tuple[int, ...] = ()
+    tests: Numbers = ()
     adopted: bool = False
 
     @property
@@ -493,6 +500,20 @@ class Test:
     @property
     def is_finished(self) -> bool:
         return self.outcome not in UNFINISHED
+
+    @property
+    def broke(self) -> bool:
+        """Whether it ended and says nothing of f."""
+        return self.outcome in BROKEN
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it ended and says whether f showed."""
+        return self.is_finished and not self.broke
+
+    @property
+    def shows_f(self) -> bool:
+        return self.outcome == "similar"
 
     @property
     def is_deflake_run(self) -> bool:

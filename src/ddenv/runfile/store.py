@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.reading import LARGEST, Invalid, Pose, Real, plain, read
+from ddenv.text import Data
 
 # The classes of events are loaded with the first event that is read: a screen is shown before.
 if TYPE_CHECKING:
@@ -72,9 +73,9 @@ class Recorded:
         return NAMES[type(self.event)]
 
     @property
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """What the file says of it, as JSON."""
-        fields: dict[str, Any] = plain(self.event)
+        fields: Data = plain(self.event)
         return fields if self.command is None else fields | {"command": self.command}
 
 
@@ -85,7 +86,7 @@ class Request:
     id: int
     time: float
     kind: str
-    data: dict[str, Any]
+    data: Data
 
 
 @dataclass(frozen=True, slots=True)
@@ -392,7 +393,7 @@ def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
         raise UserError(f"damaged run file: event {id}{named}: {invalid}") from None
 
 
-def _object(id: Any, data: Any) -> dict[str, Any]:
+def _object(id: Any, data: Any) -> Data:
     with suppress(ValueError, TypeError, RecursionError):
         content = json.loads(data)
         if isinstance(content, dict):
@@ -407,7 +408,7 @@ def _moment(value: Any) -> float:
     return float(value)
 
 
-def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any], at: float) -> int:
+def _insert(db: sqlite3.Connection, table: str, kind: str, data: Data, at: float) -> int:
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (at, kind, text))
     assert cursor.lastrowid is not None

@@ -7,8 +7,7 @@ from functools import lru_cache
 
 from ddenv.runfile.state import Candidate, Pairs, RunState, Trial
 from ddenv.settings import SETTINGS, read
-
-Names = tuple[str, ...]
+from ddenv.text import Names
 
 
 def drops(state: RunState, tried: Candidate | Trial) -> Names:

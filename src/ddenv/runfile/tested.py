@@ -66,9 +66,9 @@ def told(moment: Moment) -> Test | None:
 
     state, event = moment.after, moment.recorded.event
     if isinstance(event, TestFinished | Implied):
-        return state.tests[event.test - 1]
+        return state.test(event.test)
     row = pointed(moment) if isinstance(event, CandidateJudged) else None
-    return state.tests[row.tests[-1] - 1] if row is not None and row.tests else None
+    return state.test(row.tests[-1]) if row is not None and row.tests else None
 
 
 def pointed(moment: Moment) -> Candidate | None:
@@ -77,6 +77,6 @@ def pointed(moment: Moment) -> Candidate | None:
 
     state, event = moment.after, moment.recorded.event
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
-        row = made_for(state, state.tests[event.test - 1])
+        row = made_for(state, state.test(event.test))
         return row if isinstance(row, Candidate) else None
     return state.round.candidates[event.candidate] if state.round and isinstance(event, OfCandidate) else None

@@ -106,7 +106,7 @@ def _write(
 ) -> None:
     documents["scenario"] = scenario.model_dump_json().encode()
     documents |= {f"{RESOURCE}{key}": content for key, content in resources.items()}
-    elements = world.elements(frozenset(scenario.protected))
+    elements = world.elements(scenario.protected)
     number = {name: at for at, name in enumerate(elements)}
     # What is welded to a model that stays is tied to nothing.
     welds = tuple((number[one], number[other]) for one, other in world.ties if one in number and other in number)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.evidence.margins import fixes_of
@@ -16,6 +15,7 @@ from ddenv.runs.reasons import removed_in_passing
 from ddenv.runs.subject import RESOURCE, Subject, read_subject
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
+from ddenv.text import Data, Names
 from ddenv.world.access import Missing, Unusable, check_ending, write_file
 from ddenv.world.files.resources import Resources, find
 from ddenv.world.model import World
@@ -124,7 +124,7 @@ def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Pa
     return name, found
 
 
-def keys_in(folder: Path, scenario: Scenario) -> dict[str, Any]:
+def keys_in(folder: Path, scenario: Scenario) -> Data:
     """The keys of a file in `folder` with this scenario: what lies in there is named relative to it, so that it can be moved."""
     data = scenario.model_dump(mode="json")
     # The scenario's folder is only searched for the user's own programs.
@@ -145,7 +145,7 @@ def _name(path: Path, folder: Path) -> str:
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
-def renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> tuple[str, ...]:
+def renamed(protected: Names, world: World, removed: frozenset[str], minimal: World) -> Names:
     """The names of protected models in the minimal world, where copies of one name are numbered anew; a part's is its model's."""
     wholes = {model.name: model.inside or model.name for model in world.models}
     kept = dict.fromkeys(whole for name, whole in wholes.items() if name not in removed)

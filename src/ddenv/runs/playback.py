@@ -14,6 +14,7 @@ from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
 from ddenv.runfile.tested import purpose
 from ddenv.runs.changes import changed_run
+from ddenv.text import Names
 from ddenv.world.pose import Pose, pose_at
 
 # Time between two frames: a run file has a row of each motion so often, s.
@@ -34,10 +35,10 @@ class Played:
 
     test: Test
     words: str
-    models: tuple[str, ...]
+    models: Names
     rows: array[float]
     moving: dict[str, np.ndarray]
-    lacks: tuple[str, ...] = ()
+    lacks: Names = ()
 
     @property
     def robot(self) -> np.ndarray:

@@ -17,8 +17,9 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runfile.supports import stack_with
-from ddenv.text import coordinates, count, first_of, percent
+from ddenv.text import Names, coordinates, count, first_of, percent
 from ddenv.words.claims import of_passing, uncertified, verdict_on
+from ddenv.world.pose import Point
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
 F, GOAL = "similar", "pass"
@@ -47,7 +48,7 @@ class End:
     kind: str
     number: int
     seconds: float
-    place: tuple[float, float]
+    place: Point
     reach: float = 0.0
     away: float = math.nan
 
@@ -65,7 +66,7 @@ class Parting:
     seed: int
     equal: float
     apart: float | None
-    place: tuple[float, float] | None
+    place: Point | None
     met: float | None
     touched: bool
 
@@ -79,7 +80,7 @@ class Reason:
     """
 
     without: str
-    gone: tuple[str, ...]
+    gone: Names
     runs: int
     ends: tuple[End, ...]
     parting: Parting | None
@@ -148,7 +149,7 @@ def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str
     return parting, first, ""
 
 
-def parted(first: array[float], second: array[float]) -> tuple[float, float | None, tuple[float, float] | None]:
+def parted(first: array[float], second: array[float]) -> tuple[float, float | None, Point | None]:
     """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second is `APART` from the first."""
     equal, same = 0.0, True
     for row in range(0, min(len(first), len(second)), COLUMNS):
@@ -224,7 +225,7 @@ class Nearest:
     with one seed shows it; `lacks` says why, if the run file does not have what it takes. `first` of `gone` took part first there.
     """
 
-    gone: tuple[str, ...]
+    gone: Names
     words: str
     shown: bool
     parting: Parting | None = None
@@ -257,7 +258,7 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     return Nearest(gone, words, shown, parting, first, lacks)
 
 
-def removed_in_passing(state: RunState, where: object) -> tuple[str, ...]:
+def removed_in_passing(state: RunState, where: object) -> Names:
     """The models that the nearest world that passes lacks. Raises UserError where there is no such world yet."""
     one = state.isolated
     if one is None:

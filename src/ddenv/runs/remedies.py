@@ -11,6 +11,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runs.remembered import read_state, write_state
+from ddenv.text import Data
 from ddenv.world.access import is_folder, without_tilde
 
 REMEDIES = "remedies.json"
@@ -57,7 +58,7 @@ def _is_usable(text: str) -> bool:
         return False
 
 
-def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[str, Any]:
+def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> Data:
     """The `options` of the command line that say the same as the remedies, too."""
     folders = tuple(dict.fromkeys(Path(text) for text in found.values() if text.startswith("/")))
     stand_ins = tuple(f"{uri}={text}" for uri, text in found.items() if text and not text.startswith("/"))

@@ -19,13 +19,14 @@ from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
-from ddenv.text import first_of, shortened
+from ddenv.text import Data, Names, first_of, shortened
 from ddenv.world.access import MissingFiles, is_read_as_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import at_start, check_spawn
+from ddenv.world.pose import Point
 from ddenv.world.scenario import PLAIN, Reading, Scenario
 from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_model, read_world
 from ddenv.world.sdf.standin import AUTO, NONE, parse_option
@@ -52,8 +53,8 @@ class Subject:
     state: RunState | None = None
 
     @property
-    def elements(self) -> tuple[str, ...]:
-        return self.world.elements(frozenset(self.scenario.protected))
+    def elements(self) -> Names:
+        return self.world.elements(self.scenario.protected)
 
 
 def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
@@ -189,7 +190,7 @@ def without_guesses_at_start(scenario: Scenario, announce: Announce | None = Non
     return scenario.model_copy(update={"reading": reading})
 
 
-def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
+def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: Point) -> Scenario:
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
         "name": world.stem.removesuffix(".dmd")[:80] or "world",
@@ -240,7 +241,7 @@ def with_options(
     return validate(chosen, "options", named)
 
 
-def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
+def with_values(data: Data, values: Mapping[str, Value]) -> Data:
     """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
     for name in values:
         if name not in SETTINGS:
@@ -273,7 +274,7 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     for name in scenario.protected:
         if name not in known:
             raise UserError(f"protected: the world {scenario.world} has no model '{name}'")
-    if not world.elements(frozenset(scenario.protected)):
+    if not world.elements(scenario.protected):
         raise UserError(f"{scenario.world}: has no model that can be removed")
     if scenario.reading.inside and not any(model.inside for model in world.models):
         why = next((note.why for note in world.notes if note.what == "--inside"), "no static model has two collisions")
@@ -299,7 +300,7 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     stored = Resources(run.documents(RESOURCE))
     world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
     robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
-    if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
+    if fold(run.events(most=1)).elements != world.elements(scenario.protected):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
 

@@ -9,13 +9,13 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, certificate_tests
+from ddenv.evidence.certificate import RUNS_BESIDE, RUNS_BESIDE_ALIKE, Expected, certificate_tests
 from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made, in_the_making
 from ddenv.runfile.fold_decisions import stands_for_all
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.settings import Reduction
-from ddenv.text import about, count, rounded
+from ddenv.text import Sentences, about, count, rounded
 
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
 LATEST, BUSY = 50, 0.9
@@ -47,7 +47,7 @@ TOOK_PART = (5, 20, 35)
 class Remaining:
     """What is left from now on, as (low, likely, high). `seconds` is None while nothing is run."""
 
-    tests: tuple[int, int, int]
+    tests: Expected
     seconds: tuple[float, float, float] | None
 
 
@@ -72,7 +72,7 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
     return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
 
 
-def left_said(state: RunState, at_work: bool) -> tuple[str, ...]:
+def left_said(state: RunState, at_work: bool) -> Sentences:
     """What is left, in tests and with the time in brackets, from the longest form to none; nothing if it is unknown."""
     left = remaining(state, at_work)
     if left is None:
@@ -96,7 +96,7 @@ def _is_overdue(state: RunState) -> bool:
     return searches and forecast is not None and state.tests_done - forecast.tests_done >= forecast.tests[-1]
 
 
-def _expected(state: RunState) -> tuple[int, int, int] | None:
+def _expected(state: RunState) -> Expected | None:
     """How many tests are left, as (low, likely, high); None if unknown."""
     forecast, baseline = state.forecast, state.baseline
     if state.isolating is not None or state.margining is not None:
@@ -117,13 +117,13 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
     return low, likely, high
 
 
-def _after(expected: tuple[int, int, int], done: int) -> tuple[int, int, int]:
+def _after(expected: Expected, done: int) -> Expected:
     """What is left of `expected`, as (low, likely, high), once `done` are made. What is late is not about to end."""
     low, likely, high = (max(0, each - done) for each in expected)
     return low, max(likely, min(expected[1], high) // LATE), high
 
 
-def search_tests(models: int, asked: Reduction, rate: float | None = None) -> tuple[int, int, int]:
+def search_tests(models: int, asked: Reduction, rate: float | None = None) -> Expected:
     """Tests of a search in this number of `models`, as (low, likely, high), for an unknown world in which f shows at `rate`, by
     default always. For every round the engine writes them as its forecast.
     """
@@ -145,11 +145,11 @@ class Rough:
     """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`."""
 
     baseline: int
-    search: tuple[int, int, int]
-    certificate: tuple[int, int, int]
+    search: Expected
+    certificate: Expected
 
     @property
-    def tests(self) -> tuple[int, int, int]:
+    def tests(self) -> Expected:
         low, likely, high = (self.baseline + sum(each) for each in zip(self.search, self.certificate, strict=True))
         return low, likely, high
 

@@ -8,15 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import meshcat.geometry as meshcat
 import numpy as np
 
 from ddenv.scene import colors
 from ddenv.scene.colors import Color
+from ddenv.text import Data
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, Visual
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Point, Pose
 
 SIDES = 24  # of the polygon that stands for a circle
 # Minimum distance between points of a drawn trajectory, as part of its radius: a robot that stands still leaves one point.
@@ -88,7 +88,7 @@ def box(size: Sequence[float]) -> Surface:
     return Surface(CORNERS[np.ravel(_SIDES)] * np.asarray(size, dtype=float), _HALVES)
 
 
-def revolved(*profiles: Sequence[tuple[float, float]], sides: int = SIDES) -> Surface:
+def revolved(*profiles: Sequence[Point], sides: int = SIDES) -> Surface:
     """The surface of profiles (radius, z), each from top to bottom, turned around z; between profiles the edge is sharp."""
     angles = np.arange(sides) * 2 * math.pi / sides
     parts = []
@@ -122,7 +122,7 @@ def ring(radius: float, thickness: float) -> Surface:
     return revolved([(radius + r, z) for r, z in circle], sides=2 * SIDES)
 
 
-def _arc(radius: float, begin: float, end: float, pieces: int) -> list[tuple[float, float]]:
+def _arc(radius: float, begin: float, end: float, pieces: int) -> list[Point]:
     """A part of a circle as a profile; angles from z on, rad."""
     return [(radius * math.sin(at), radius * math.cos(at)) for at in np.linspace(begin, end, pieces + 1).tolist()]
 
@@ -227,7 +227,7 @@ def paint(model: Model) -> list[Surface]:
 
 def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> meshcat.Mesh:
     """An object of one colour. `glow` 0..1 is its own light; with `offset` above 0, others in the same plane are drawn over it."""
-    options: dict[str, Any] = {}
+    options: Data = {}
     if glow:
         red, green, blue, _ = color
         options["emissive"] = colors.hexadecimal((glow * red, glow * green, glow * blue, 1.0))

@@ -26,6 +26,7 @@ from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
 from ddenv.scene.shot import Shot, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
+from ddenv.text import Data, Names
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose, pose_of
 from ddenv.world.sdf.numbers import changed
@@ -45,7 +46,7 @@ class Player:
         self._name = scenario.name
         self._position = Position(run.events)
         self._wanted = Wanted()
-        self._elements = world.elements(frozenset(scenario.protected))
+        self._elements = world.elements(scenario.protected)
         wheels = Wheels(robot, scenario.robot.wheels, scenario.controller.skid)
         self._scenery = Scenery(stage, world, wheels, self._elements)
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
@@ -53,7 +54,7 @@ class Player:
         self._shot: Shot | None = None
         self._ran_at = -math.inf
         self._live: list[Live] = []
-        self._parts: tuple[tuple[int, tuple[str, ...]], ...] = ()
+        self._parts: tuple[tuple[int, Names], ...] = ()
         self._letters: list[Any] = []
         self._trail: list[tuple[float, ...]] = []
         self._evidence: int | None = None
@@ -79,7 +80,7 @@ class Player:
         self._wanted = wanted
         self._position.go(wanted.at)
 
-    def play(self, test: int) -> dict[str, Any]:
+    def play(self, test: int) -> Data:
         """A finished test for a browser: what is there, how it moves, and what the run file `lacks` of it, in sentences.
 
         `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
@@ -108,7 +109,7 @@ class Player:
             "lacks": " ".join(one.lacks),
         }
 
-    def pairs(self) -> dict[str, Any]:
+    def pairs(self) -> Data:
         """What a browser may choose: how many tests there are, and pairs with the same seed that show why the robot fails.
 
         There are none before fresh runs show it. The ghost's test is the last of a pair; `equal` is until when they are the same,
@@ -163,9 +164,9 @@ class Player:
         if test < 0:
             return shot_of_test(self._state, "replay", changed_run(self._state, test)[1])
         start, state = self._position.start_of(test), self._state
-        if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
+        if start is None or test > len(state.tests) or not state.test(test).is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")
-        return shot_of_test(start.after, "replay", state.tests[test - 1])
+        return shot_of_test(start.after, "replay", state.test(test))
 
     def tick(self, now: float) -> None:
         """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""

@@ -40,7 +40,7 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
     shown = [state.evidence_test] if state.evidence_test is not None else []
     if state.waiting_candidate is not None and state.round is not None:
         tests = state.tests_of(state.round.candidates[state.waiting_candidate].tests)
-        shown += [test.id for test in tests if test.outcome == "similar"]
+        shown += [test.id for test in tests if test.shows_f]
     finished = (test for test in reversed(state.tests) if test.is_finished)
     test = next(reversed(state.tests_of(shown)), None) or next(finished, None)
     if test is None:
@@ -53,7 +53,7 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
     tests = state.tests_of(row.tests)
     # At an earlier moment of the run, what ran then has ended by now.
     running = [test for test in tests if test.outcome == "running"]
-    similar = [test for test in tests if test.outcome == "similar"]
+    similar = [test for test in tests if test.shows_f]
     if not tests:
         return _shot(state, "start", None, frozenset(row.models), f"{row.label} · not tested yet")
     test = (running[:1] or similar[-1:] or tests[-1:])[0]

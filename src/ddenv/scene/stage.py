@@ -12,6 +12,7 @@ import numpy as np
 import umsgpack
 from meshcat.geometry import Object
 
+from ddenv.text import Data
 from ddenv.world.pose import Pose
 
 Path = tuple[str, ...]
@@ -35,7 +36,7 @@ class Stage:
         self._kept.pop(((*path, DRAWN), "property castShadow"), None)
         self.set((*path, DRAWN), "castShadow", shadow)
 
-    def draw_json(self, path: Path, thing: dict[str, Any]) -> None:
+    def draw_json(self, path: Path, thing: Data) -> None:
         """Like `draw`, for a three.js object without geometry and material, such as a light."""
         metadata = {"version": 4.5, "type": "Object"}
         self._keep(path, "object", {"type": "set_object", "object": {"metadata": metadata, "object": thing}})
@@ -71,7 +72,7 @@ class Stage:
         """The messages that a new browser needs, objects before their properties."""
         return [message for (_, kind), message in sorted(self._kept.items(), key=lambda item: item[0][1] != "object")]
 
-    def _keep(self, path: Path, kind: str, command: dict[str, Any], newest_only: bool = False) -> None:
+    def _keep(self, path: Path, kind: str, command: Data, newest_only: bool = False) -> None:
         message = umsgpack.packb(command | {"path": _text(path)})
         key = (path, kind)
         # A slow browser may have missed a `newest_only` message, so it is sent again.

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.scene import mesh
 from ddenv.scene.mesh import Surface, paint
+from ddenv.text import Data
 from ddenv.world.drive import Drive, find_drive, rolled, wheel_links
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector, pose_of
@@ -66,7 +66,7 @@ class Wheels:
         """How far left and right wheels have turned at each row of a motion, shape (N, 2), rad; see `rolled`."""
         return np.zeros((len(rows), 2)) if self._drive is None else rolled(self._robot, self._drive, self._skid, rows)
 
-    def data(self) -> list[dict[str, Any]]:
+    def data(self) -> list[Data]:
         return [{"key": each.key, "axis": list(each.axis), "side": each.side} for each in self.all]
 
     def _made(self, drive: Drive) -> Iterator[Wheel]:

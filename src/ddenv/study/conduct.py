@@ -19,7 +19,6 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
@@ -91,7 +90,7 @@ def is_done(folder: Path, cell: Cell) -> bool:
         return False
     # Where the baseline, or a claim of the certificate, is open since tests broke, an engine makes them again.
     if state.baseline is None:
-        return not all(test.outcome in BROKEN for test in state.finished_tests)
+        return not all(test.broke for test in state.finished_tests)
     certificate = current(state)
     return certificate is None or all(claim.verdict != "unknown" for claim in certificate.claims)
 

@@ -15,6 +15,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runs.folder import SUFFIX
 from ddenv.runs.subject import with_options
+from ddenv.text import Names
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 
@@ -48,7 +49,7 @@ class Method:
         return partitioning, prioritization
 
     @property
-    def used(self) -> tuple[str, ...]:
+    def used(self) -> Names:
         return tuple(filter(None, self.parts))
 
     @property
@@ -136,7 +137,7 @@ def make_plan(
     chosen_algorithms = _chosen("--algorithms", algorithms, partial(schemas.check, "algorithm"), known)
     loaded = tuple(with_options(load_scenario(find_scenario(name)), **options) for name in scenario_names(scenarios))
     # Methods that use the same parts are the same.
-    methods: dict[tuple[str, ...], Method] = {}
+    methods: dict[Names, Method] = {}
     for method in (Method(*parts) for parts in product(chosen_algorithms, chosen_pairs)):
         methods.setdefault((method.algorithm, *method.used), method)
     plan = Plan(loaded, tuple(methods.values()), seeds)
@@ -145,21 +146,19 @@ def make_plan(
     return plan
 
 
-def scenario_names(words: Sequence[str]) -> tuple[str, ...]:
+def scenario_names(words: Sequence[str]) -> Names:
     """The names or files of the scenarios, each once; the paper's three if none is given. Raises UserError."""
     return _names("--scenarios", ",".join(words)) if words else SCENARIOS
 
 
-def _names(option: str, words: str) -> tuple[str, ...]:
+def _names(option: str, words: str) -> Names:
     names = tuple(dict.fromkeys(word.strip() for word in words.split(",") if word.strip()))
     if not names:
         raise UserError(f"{option}: expected names separated by commas; found '{words}'")
     return names
 
 
-def _chosen(
-    option: str, words: str, check: Callable[[str], object], groups: Mapping[str, Sequence[str]]
-) -> tuple[str, ...]:
+def _chosen(option: str, words: str, check: Callable[[str], object], groups: Mapping[str, Sequence[str]]) -> Names:
     """The names in `words`, each once; that of a group stands for all in it. Raises UserError."""
     names = tuple(dict.fromkeys(name for word in _names(option, words) for name in groups.get(word, (word,))))
     for name in names:

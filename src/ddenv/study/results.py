@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
@@ -30,6 +30,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.study.plan import Cell, Method, Plan, run_path
+from ddenv.text import Data, Names
 from ddenv.world.access import read_bytes
 from ddenv.world.scenario import Scenario
 
@@ -75,8 +76,8 @@ class Result:
     ended: bool = False
     minimal: bool = False
     problem: str = "not made yet"
-    elements: tuple[str, ...] = ()
-    left: tuple[str, ...] = ()
+    elements: Names = ()
+    left: Names = ()
     tests: int = 0
     simulated: int = 0
     reruns: int = 0
@@ -133,7 +134,7 @@ def _read(file: RunFile, cell: Cell) -> Result:
     sizes, misses, steps_back = list[tuple[int, int]](), list[int](), 0
     for recorded, _, state in steps(file.events()):
         match event := recorded.event:
-            case TestFinished(test) if state.tests[test - 1].phase == "baseline":
+            case TestFinished(test) if state.test(test).phase == "baseline":
                 search[test] = None
             case CandidateJudged():
                 search |= dict.fromkeys(event.tests)
@@ -146,7 +147,7 @@ def _read(file: RunFile, cell: Cell) -> Result:
             sizes.append((len(search), len(state.environment)))
     if not all(0 < number <= len(state.tests) for number in (*search, *fresh)):
         raise UserError(f"{file.path}: damaged run file: a verdict relies on tests that are missing")
-    tests, fresh_tests = ([state.tests[number - 1] for number in numbers] for numbers in (search, fresh))
+    tests, fresh_tests = ([state.test(number) for number in numbers] for numbers in (search, fresh))
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
     problem = "it has no certificate" if state.minimal else state.reason if state.ended else "has not ended"
@@ -190,7 +191,7 @@ class Paper(NamedTuple):
 
 
 # The paper's tables, by scenario: their numbers, and their rows by pair.
-TABLES: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text())
+TABLES: Data = yaml.safe_load(Path(__file__).with_name("paper.yaml").read_text())
 
 
 def paper_row(cell: Cell) -> Paper | None:

@@ -17,7 +17,7 @@ from ddenv.report.report_map import picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import file_name, run_path
 from ddenv.study.results import Result, Row, spread
-from ddenv.text import count, plain
+from ddenv.text import Names, count, plain
 
 HEIGHT = 320.0
 LINE, SAMPLE = 22.0, 30.0
@@ -87,7 +87,7 @@ def _line_end(row: Row) -> str:
 
 def worlds(folder: Path, rows: Sequence[Row], file: str) -> Iterator[Block]:
     """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
-    ends = defaultdict[tuple[str, ...], list[Result]](list)
+    ends = defaultdict[Names, list[Result]](list)
     for result in over(rows):
         ends[result.left].append(result)
     ranked = sorted(ends.items(), key=lambda end: (-sum(result.minimal for result in end[1]), -len(end[1])))

@@ -23,7 +23,7 @@ from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import stack_with
-from ddenv.text import between, count, first_of, percent, percent_at_least, percent_at_most
+from ddenv.text import Sentences, between, count, first_of, percent, percent_at_least, percent_at_most
 from ddenv.words.signs import metres
 
 MOST_NAMES, MOST_SEEDS = 3, 4
@@ -403,7 +403,7 @@ def smaller_known(state: RunState) -> str:
         for one in state.trials
         if one.size < left and one.verdict == "similar"
         # Verdicts may stand although f is another failure by now.
-        if any(test.outcome == "similar" for test in state.tests_of(one.tests))
+        if any(test.shows_f for test in state.tests_of(one.tests))
     ]
     if not nodes and not trials:
         return ""
@@ -418,7 +418,7 @@ def missing(state: RunState) -> str:
     return "no fresh runs were made" if state.certificate is None else "its certificate is not finished"
 
 
-def drift(state: RunState) -> tuple[str, ...]:
+def drift(state: RunState) -> Sentences:
     """How often f showed in the current environment and where it was seen first, from all runs; shorter and shorter forms.
 
     Empty in the whole world, and where a certificate says more.

@@ -22,7 +22,7 @@ from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runfile.tested import adoptable
-from ddenv.text import as_sentence, count, first_of, percent, percent_at_least, plain, shortened
+from ddenv.text import Sentences, as_sentence, count, first_of, percent, percent_at_least, plain, shortened
 from ddenv.words.baseline import baseline
 from ddenv.words.claims import (
     drift,
@@ -57,7 +57,7 @@ _SETTLING = (
 )
 
 
-Happening = tuple[Step | None, tuple[str, ...]]
+Happening = tuple[Step | None, Sentences]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Explanation:
     """`line` is the number of the current one of the algorithm's `lines`, None if the run is at none of them."""
 
     line: int | None
-    sentences: tuple[str, ...]
+    sentences: Sentences
     lines: Lines = DDENV.lines
 
 
@@ -83,7 +83,7 @@ def explain(snapshot: Snapshot) -> Explanation:
     return Explanation(line, sentences, shown.lines)
 
 
-def _warnings(snapshot: Snapshot) -> tuple[str, ...]:
+def _warnings(snapshot: Snapshot) -> Sentences:
     """What the user has to know before anything else, and a try that could become the environment."""
     state, said = snapshot.state, []
     if snapshot.older_engine and snapshot.engine == "alive":
@@ -102,14 +102,14 @@ def _warnings(snapshot: Snapshot) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _implied(state: RunState) -> tuple[str, ...]:
+def _implied(state: RunState) -> Sentences:
     last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
     return (f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",)
 
 
-def _offered(state: RunState) -> tuple[str, ...]:
+def _offered(state: RunState) -> Sentences:
     """Another way for an f that is rare, never differs, or whose ends scatter, until something is left out."""
     notes = dict(state.notes)
     offers = [notes[about] for about in ("scatter", "rare", "alike") if about in notes]
@@ -118,7 +118,7 @@ def _offered(state: RunState) -> tuple[str, ...]:
     return tuple(f"{as_sentence(plain(offer))} Press c to change it." for offer in offers)
 
 
-def _by_hand(state: RunState) -> tuple[str, ...]:
+def _by_hand(state: RunState) -> Sentences:
     said = []
     for trial in (one for one in state.trials if not one.verdict):
         what = f"{trial.label} ({count(trial.size, 'model')})"
@@ -179,7 +179,12 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
     step, sentences = happening
     if state.needs_room and not state.ended:
         free = f"{state.needs_room / 1e6:.0f} MB"
-        return step, (f"The disk is full: no new test starts until {free} are free. Nothing is lost.", *sentences)
+        full = f"The disk is full: no new test starts until {free} are free."
+        if state.file_is_full:
+            full = (
+                "The run file is as large as a file may be (ulimit -f): no new test starts until that limit is raised."
+            )
+        return step, (f"{full} Nothing is lost.", *sentences)
     if not state.paused:
         return happening
     rest = "running tests finish first" if state.tally["running"] else "none is running"
@@ -187,7 +192,7 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
     return step, (first, *sentences)
 
 
-def _standing(state: RunState, status: str) -> tuple[str, ...]:
+def _standing(state: RunState, status: str) -> Sentences:
     reason = plain(state.reason).rstrip(".")
     match status:
         case "starting":
@@ -207,14 +212,14 @@ def _standing(state: RunState, status: str) -> tuple[str, ...]:
     return ()
 
 
-def _out_of_budget(state: RunState) -> tuple[str, ...]:
+def _out_of_budget(state: RunState) -> Sentences:
     budget = state.budget
     if budget is None or state.made < budget:
         return ()
     return (f"The budget of {count(budget, 'test')} is used up: c raises it, and the run goes on.",)
 
 
-def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
+def _baseline_so_far(state: RunState, options: Settings) -> Sentences:
     tests = state.finished_tests
     times = count(options.baseline_runs, "time")
     if options.reduces_one_run:
@@ -233,7 +238,7 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
+def _between(snapshot: Snapshot, options: Settings) -> Sentences:
     state, here = snapshot.state, snapshot.state.here
     number = 1 if state.round is None else state.round.number + 1
     first = f"Round {number}: {beginning(options, len(state.environment))}"
@@ -293,7 +298,7 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     return "rerun" if number else "test", sentences
 
 
-def _last_reduction(state: RunState) -> tuple[str, ...]:
+def _last_reduction(state: RunState) -> Sentences:
     """The last reduction, until the next test is made: a step shows its result."""
     here = state.here
     if here is None or here.how != "reduced" or here.parent is None or here.tests != state.tests_done:
@@ -315,7 +320,7 @@ def _next(state: RunState, candidate: Candidate, place: str, options: Settings) 
     return f"Next is re-run {len(candidate.tests)} of {options.most_runs - 1} of {place}: {again}"
 
 
-def _of_run(state: RunState, candidate: Candidate, number: int, place: str, options: Settings) -> tuple[str, ...]:
+def _of_run(state: RunState, candidate: Candidate, number: int, place: str, options: Settings) -> Sentences:
     """What a run of a candidate is for, its `number` counted from 0."""
     if not number:
         return (
@@ -385,7 +390,7 @@ def _finished(state: RunState) -> Happening:
     )
 
 
-def _instead_of_f(state: RunState) -> tuple[str, ...]:
+def _instead_of_f(state: RunState) -> Sentences:
     """What the robot does without models that f needs, where it mostly fails in another way; and what can be done about it."""
     if (certificate := current(state)) is None:
         return ()
@@ -415,7 +420,7 @@ def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> 
 # While fresh runs show what the result of the rounds is worth, or find the nearest world that passes.
 
 
-def _certifying(snapshot: Snapshot) -> tuple[str, ...]:
+def _certifying(snapshot: Snapshot) -> Sentences:
     state = snapshot.state
     if state.isolating is not None:
         return (
@@ -449,7 +454,7 @@ def _certifying(snapshot: Snapshot) -> tuple[str, ...]:
     )
 
 
-def _so_far(rows: Sequence[FreshRuns]) -> tuple[str, ...]:
+def _so_far(rows: Sequence[FreshRuns]) -> Sentences:
     if not rows or not rows[0].runs:
         return ()
     left, whole = rows[0], rows[-1]
@@ -459,7 +464,7 @@ def _so_far(rows: Sequence[FreshRuns]) -> tuple[str, ...]:
     return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
 
 
-def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
+def _now(snapshot: Snapshot, certificate: Certificate) -> Sentences:
     # A test of the certificate before may still run.
     running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
     if not running:

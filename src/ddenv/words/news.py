@@ -102,6 +102,8 @@ def _compared(before: RunState, after: RunState) -> str:
 
 def _disk_space(before: RunState, after: RunState) -> str:
     if after.needs_room:
+        if after.file_is_full:
+            return "  the run file is as large as a file may be (ulimit -f): waiting until that limit is raised"
         return f"  out of disk space: waiting until {after.needs_room / 1e6:.0f} MB are free"
     return "  there is disk space again" if before.needs_room else ""
 
@@ -239,7 +241,7 @@ def what_happened(moment: Moment) -> str:
     """The same in a few words, without the time."""
     kind, event, state = moment.recorded.kind, moment.recorded.event, moment.after
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
-        return _of_test(state, state.tests[event.test - 1])
+        return _of_test(state, state.test(event.test))
     if kind == "created":
         return "the run was created"
     if kind == "finished":

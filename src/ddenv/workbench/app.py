@@ -21,7 +21,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runs.folder import dropped_run
-from ddenv.text import plain
+from ddenv.text import Data, plain
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
@@ -114,7 +114,7 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
-        self._held: tuple[str, dict[str, Any]] | None = None
+        self._held: tuple[str, Data] | None = None
         self._first, self._run, self._watch, self._file = first, run, watch, file
         if run is not None:
             from ddenv.workbench.shared.observed import Observed

@@ -12,6 +12,7 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.text import Names
 from ddenv.world.extent import bounds
 from ddenv.world.model import (
     Capsule,
@@ -56,7 +57,7 @@ class Drive:
     `signs` are 1 for wheels whose joint velocity is positive when they roll forward, and -1 for the others.
     """
 
-    joints: tuple[str, ...]
+    joints: Names
     left: tuple[bool, ...]
     radius: float
     track: float
@@ -90,7 +91,7 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     else:
         sides = _named(robot, wheels)
     joints = [joint for joint in robot.joints if joint.name in sides]
-    across = [robot.pose.inverse().rotate(joint.axis)[1] for joint in joints]
+    across = [_part_across(robot, joint) for joint in joints]
     for joint, part in zip(joints, across, strict=True):
         where = f"robot '{robot.name}': joint '{joint.name}'"
         if abs(part) < ACROSS:
@@ -110,6 +111,17 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
         track=track,
         signs=tuple(1.0 if part > 0 else -1.0 for part in across),
     )
+
+
+def _part_across(robot: Model, joint: Joint) -> float:
+    """How much of a joint's axis runs across the robot, to the left, -1..1."""
+    return robot.pose.inverse().rotate(joint.axis)[1]
+
+
+def turning_links(robot: Model) -> tuple[Link, ...]:
+    """The links of all joints that may be wheels: they turn about an axis across the robot."""
+    wheels = (joint for joint in robot.joints if _turns(joint) and abs(_part_across(robot, joint)) >= ACROSS)
+    return tuple(link for joint in wheels for link in wheel_links(robot, joint))
 
 
 def wheel_links(robot: Model, joint: Joint) -> list[Link]:
@@ -198,8 +210,3 @@ def _round(collision: Collision, axis: Vector) -> float:
             apart = points[:, None] - points[None, :]
             return float(np.sqrt((apart**2).sum(axis=2).max())) / 2
     return 0.0
-
-
-def _across(axis: Vector) -> Floats:
-    """The matrix (3, 3) that removes a vector's component along the unit vector `axis`."""
-    return np.eye(3) - np.outer(axis, axis)

@@ -24,7 +24,7 @@ from ddenv.world.model import (
     Sphere,
     World,
 )
-from ddenv.world.pose import HERE, Pose, Vector, vector
+from ddenv.world.pose import HERE, Point, Pose, Vector, vector
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -132,9 +132,9 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
     ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
     if len(ordered) < 3:
         return np.array(ordered).reshape(-1, 2)
-    corners: list[tuple[float, float]] = []
+    corners: list[Point] = []
     for side in (ordered, ordered[::-1]):
-        chain: list[tuple[float, float]] = []
+        chain: list[Point] = []
         for x, y in side:
             while len(chain) > 1:
                 (ax, ay), (bx, by) = chain[-2:]

@@ -15,6 +15,7 @@ from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
+from ddenv.text import Data
 from ddenv.world.access import is_folder, not_yaml, read_bytes, resolved
 from ddenv.world.scenario import Oracle, Scenario
 
@@ -58,7 +59,7 @@ def load_scenario(path: Path) -> Scenario:
     robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
     model_path = tuple(folder / each for each in scenario.reading.model_path)
     reading = scenario.reading.model_copy(update={"model_path": model_path})
-    places: dict[str, Any] = {"world": folder / scenario.world, "folder": folder / scenario.folder}
+    places: Data = {"world": folder / scenario.world, "folder": folder / scenario.folder}
     if scenario.oracle is not None and scenario.oracle.folder is not None:
         places["oracle"] = scenario.oracle.model_copy(update={"folder": folder / scenario.oracle.folder})
     return scenario.model_copy(update={**places, "robot": robot, "reading": reading})
@@ -77,7 +78,7 @@ def load_simulator(path: Path) -> Oracle:
     return oracle.model_copy(update={"folder": folder / (oracle.folder or "")})
 
 
-def _data(path: Path, expected: str) -> dict[str, Any]:
+def _data(path: Path, expected: str) -> Data:
     """The keys of the YAML file `path`, such as those `expected`. Raises UserError."""
     data = read_yaml(path)
     if not isinstance(data, dict):
@@ -94,7 +95,7 @@ def read_yaml(path: Path) -> Any:
         raise not_yaml(path, error) from None
 
 
-def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) -> Scenario:
+def validate(data: Data, where: str, named: Mapping[str, str] = {}) -> Scenario:
     """`data` as a scenario. Raises UserError with the first wrong key.
 
     `where` names its file; `named` has what the user calls some of the keys, such as an option.

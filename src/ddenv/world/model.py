@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from ddenv.text import Names
 from ddenv.world.pose import Pose, Vector
 
 
@@ -263,10 +264,15 @@ class World:
                 return model
         raise KeyError(name)
 
-    def elements(self, protected: frozenset[str] = frozenset()) -> tuple[str, ...]:
+    @property
+    def names(self) -> Names:
+        """The names of all models, in the file's order."""
+        return tuple(model.name for model in self.models)
+
+    def elements(self, protected: Collection[str] = ()) -> Names:
         """Names of the models that a reduction may remove, in the file's order; a `protected` one stays with all its parts."""
         parts = {model.name for model in self.models if model.inside in protected}
-        stay = new = protected | self.anchors | parts
+        stay = new = self.anchors.union(protected, parts)
         while new:
             new = frozenset(other for model, other in self.ties if model in new) - stay
             stay |= new

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice, product, starmap
 
 import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.text import count, first_of
+from ddenv.world.drive import turning_links
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
 from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World, is_ground
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Point, Pose
 from ddenv.world.scenario import Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
@@ -115,6 +116,8 @@ def _depth(body: Hull, obstacle: Collision) -> float:
 INSIDE = 0.03
 # A robot that starts higher than this above the surface below it drops, m.
 DROP = 0.15
+# Wheels this far above the ground do not touch it, m: what is below is taken as large as the box around it.
+HANGING = 0.05
 # The maximum number of pairs of shapes that are compared: two fine meshes take a tenth of a second.
 MOST_PAIRS = 500
 
@@ -128,13 +131,19 @@ class Inside:
     depth: float
 
 
-def notes_on_start(
-    world: World, robot: Model, spawn: Spawn, goal: tuple[float, float] | None = None
-) -> Iterator[tuple[str, str]]:
+def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None = None) -> Iterator[tuple[str, str]]:
     """What is wrong with the start of the robot in `world`, and with its `goal` (x, y), m: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
         yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
+    if world.gravity[2] >= 0.0:
+        yield "gravity", f"gravity is {world.gravity[2]:g} m/s^2 upwards: the robot does not stay on the ground"
+    hanging = drop(world, replace(robot, links=turning_links(robot)), spawn) - height
+    if hanging > HANGING:
+        yield (
+            "wheels",
+            f"no wheel touches anything: the robot stands on its body, its wheels {hanging:.2f} m above the ground",
+        )
     # Planes and meshes may be ground.
     solid = (
         (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, (Plane, Mesh))

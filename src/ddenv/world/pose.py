@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import numpy as np
 
+# x and y of a place, or of a vector.
+Point = tuple[float, float]
 Vector = tuple[float, float, float]
 
 

@@ -15,6 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from ddenv import settings
 from ddenv.settings import FARTHEST, TURNS, Ignorable
+from ddenv.text import Data, Names
 
 # Maximum of all other numbers.
 LARGEST = 1e6
@@ -61,8 +62,8 @@ PLAIN = Reading()
 class Wheels(Section):
     """The joints of the robot's driven wheels by name, those on its left and those on its right."""
 
-    left: tuple[str, ...] = Field(min_length=1)
-    right: tuple[str, ...] = Field(min_length=1)
+    left: Names = Field(min_length=1)
+    right: Names = Field(min_length=1)
 
 
 class Robot(Section):
@@ -149,7 +150,7 @@ class Controller(Section):
     """
 
     use: str = Field(default="straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
-    options: dict[str, Any] = {}
+    options: Data = {}
     period: Positive = Field(default=0.05, description="time between two commands, s; a whole number of time steps")
     speed: Positive = Field(default=1.0, description="maximum forward speed, m/s")
     acceleration: Positive = Field(default=1.0, description="maximum forward acceleration, m/s^2")
@@ -163,7 +164,7 @@ class Controller(Section):
     answer_within: Positive = Field(default=1.0, description="real time that your own controller has for a command, s")
 
 
-def _with_as_printed(schema: dict[str, Any]) -> None:
+def _with_as_printed(schema: Data) -> None:
     one = settings.SETTINGS["as_printed"]
     schema["properties"][one.name] = {"type": "boolean", "default": one.default, "description": one.summary}
 
@@ -202,7 +203,7 @@ def _section(name: str, section: str, base: type[Section] = Section) -> Any:
     """The model of a section whose keys are settings."""
     declaration = settings.SECTIONS[section]
     hints = get_type_hints(declaration)
-    fields: dict[str, Any] = {
+    fields: Data = {
         each.name: (hints[each.name], _field(each)) for each in settings.declared(section, declaration) if each.stored
     }
     return create_model(name, __base__=base, __module__=__name__, __doc__=declaration.__doc__, **fields)
@@ -210,7 +211,7 @@ def _section(name: str, section: str, base: type[Section] = Section) -> Any:
 
 def _field(one: settings.Setting) -> Any:
     finite = False if one.kind is float else None
-    limits: dict[str, Any] = {"ge": one.least, "gt": one.above, "le": one.most, "allow_inf_nan": finite}
+    limits: Data = {"ge": one.least, "gt": one.above, "le": one.most, "allow_inf_nan": finite}
     given = {limit: value for limit, value in limits.items() if value is not None}
     return Field(one.default, description=one.summary, **given)
 
@@ -299,5 +300,5 @@ class Scenario(Section):
     failure: FailureSpec = FailureSpec()
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()
-    protected: tuple[str, ...] = Field(default=(), description="models that always stay")
+    protected: Names = Field(default=(), description="models that always stay")
     whole: Whole | None = Field(default=None, description="the world that this one is a part of")

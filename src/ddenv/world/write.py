@@ -45,7 +45,7 @@ RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")
 
 def without(world: World, removed: frozenset[str]) -> bytes:
     """The text of `world` without the models named in `removed` and their indentation; all other bytes stay. Raises ValueError."""
-    unknown = removed - {model.name for model in world.models}
+    unknown = removed.difference(world.names)
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
     spans = [(*span, b"") for model in world.models if model.name in removed for span in model.spans]
@@ -73,7 +73,7 @@ def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
     root = Element("sdf", version="1.9")
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
-    unique = _unique(model.name for model in world.models)
+    unique = _unique(world.names)
     for name, model in zip(unique, with_ground_boxes(world, corners(world)).models, strict=True):
         _model(SubElement(inside, "model", name=name), model, files)
     ElementTree.indent(root)

@@ -12,12 +12,14 @@ from textual.app import App
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
+from ddenv.runs.comparison import compared, differences
+from ddenv.runs.recent import Recent
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.runs.recent_runs import Recent, RunsFolder
+from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
-from ddenv.workbench.runs.runs_table import RunTable, compared, differences
+from ddenv.workbench.runs.runs_table import RunTable
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from tests.tiers import slow
 

@@ -25,7 +25,7 @@ from ddenv import __version__
 from ddenv.engine.cluster.made_there import Asked, Hello, NotWanted, forget, greet, make
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Run, Start, reason_of
+from ddenv.engine.worker import AskSettled, Broken, Ended, Result, Run, Start, reason_of
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
@@ -171,12 +171,12 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = Run(frozenset(world.elements(frozenset(scenario.protected))), seed_of(scenario.reduction, 0))
+        self._whole = Run(frozenset(world.elements(scenario.protected)), seed_of(scenario.reduction, 0))
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.
-        self._greeted: list[tuple[_Worker, RunResult | Broken | None]] = []
-        self._ready: list[tuple[int, RunResult | Broken]] = []
+        self._greeted: list[tuple[_Worker, Result | None]] = []
+        self._ready: list[Ended] = []
         self._progress: dict[int, Mapping[str, Any]] = {}
         self._news: list[str] = []
         self._said = 0
@@ -222,7 +222,7 @@ class ClusterPool:
         self._waiting.append(Asked(self._run, self._topic, test, run))
         self._send()
 
-    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
+    def finished(self, seconds: float) -> list[Ended]:
         """As `Pool.finished`. Raises UserError, too, if the run to compare with broke."""
         if self._home is not None and self._reference is None:
             for _, result in self._home.finished(0.0):
@@ -367,9 +367,9 @@ class ClusterPool:
     def _leave_out(self, worker: _Worker, why: str) -> None:
         self._news.append(f"worker {worker.name} is not used: {why}")
 
-    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
+    def settle(self, elements: frozenset[str]) -> AskSettled:
         """As `Pool.settle`, in the process here once that has made the run to compare with."""
-        asked: Callable[[], Start | Broken | None] | None = None
+        asked: AskSettled | None = None
 
         def found() -> Start | Broken | None:
             nonlocal asked
@@ -396,7 +396,7 @@ class ClusterPool:
         self._link.close()
 
 
-def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | None) -> str:
+def refusal(hello: Hello, there: Result | None, here: RunResult | None) -> str:
     """Why a worker is left out whose first run of the whole world is `there`; "" if it may make tests.
 
     Without a run `here` to compare with, only the version of ddenv counts.

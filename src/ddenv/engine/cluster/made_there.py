@@ -16,8 +16,7 @@ from distributed import get_worker
 from ddenv import __version__
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import machine, simulator
-from ddenv.engine.worker import Broken, Run
-from ddenv.robot.result import RunResult
+from ddenv.engine.worker import Result, Run
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -54,7 +53,7 @@ class NotWanted(Exception):
     """Nobody waits for the test any more."""
 
 
-def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]:
+def greet(parts: bytes, asked: Asked) -> tuple[Hello, Result | None]:
     """A worker's hello, and the test by which its bits are compared; none in a simulator of the user's own. Raises UserError where
     that cannot be started.
     """
@@ -69,7 +68,7 @@ def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]
     return hello, make(parts, asked)
 
 
-def make(parts: bytes, asked: Asked) -> RunResult | Broken:
+def make(parts: bytes, asked: Asked) -> Result:
     """Makes a test in a child process. Raises UserError if the world cannot be simulated, and NotWanted."""
     worker = get_worker()
     key = worker.get_current_task()

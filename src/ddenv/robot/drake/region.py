@@ -15,6 +15,7 @@ import numpy as np
 from ddenv.arrays import Booleans, Floats
 from ddenv.world.extent import Bounds, model_bounds, stacked
 from ddenv.world.model import Model
+from ddenv.world.pose import Point
 
 WIDTH = 8.0  # how far a region extends to each side of the straight way to the goal, m
 AROUND = 4.0  # and around each model that can move, m: most of them fall or lie where they are
@@ -24,13 +25,11 @@ MARGIN = 2.0
 # A world with at most so many shapes that never move is in the plant as a whole: that costs less than to watch an edge.
 FEW = 300
 
-Place = tuple[float, float]
-
 
 class LeftRegion(Exception):
     """Something that is simulated came near the edge of the region, at `place` (x, y, m)."""
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: Point) -> None:
         super().__init__(place)
         self.place = place
 
@@ -44,7 +43,7 @@ class Region:
     widths: Floats
 
     @classmethod
-    def of(cls, spawn: Place, goal: Place, moving: Iterable[Model]) -> Region:
+    def of(cls, spawn: Point, goal: Point, moving: Iterable[Model]) -> Region:
         """The region around the way from `spawn` to `goal` and around the models `moving`."""
         boxes = (box for model in moving if (box := model_bounds(model)) is not None)
         places = [(((low + high) / 2)[:2], AROUND + np.linalg.norm((high - low)[:2]) / 2) for low, high in boxes]
@@ -52,7 +51,7 @@ class Region:
         ends = np.array([goal, *starts[1:]], dtype=float)
         return cls(starts, ends, np.array([WIDTH, *(width for _, width in places)]))
 
-    def with_place(self, place: Place, times: int) -> Region:
+    def with_place(self, place: Point, times: int) -> Region:
         """A region that extends also around `place` (m), `times` as far as around the way."""
         starts, ends = np.vstack([self.starts, place]), np.vstack([self.ends, place])
         return Region(starts, ends, np.append(self.widths, times * WIDTH))
@@ -67,7 +66,7 @@ class Region:
         outside = self._depths((low + high)[:, :2] / 2) + _radii(low, high) < 0
         return frozenset(name for (name, _), out in zip(found, outside, strict=True) if out)
 
-    def watch(self, place: Place, reach: float, models: Bounds) -> None:
+    def watch(self, place: Point, reach: float, models: Bounds) -> None:
         """As `check` for the boxes `models`, and for the robot, no part of which is farther than `reach` (m) from `place`."""
         self.check(models)
         if not float(self._depths(np.array([place]))[0]) >= reach + MARGIN:

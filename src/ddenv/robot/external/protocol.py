@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ddenv.text import Names
+
 Row = tuple[float, Sequence[float]] | tuple[float, Sequence[float], Mapping[str, Sequence[float]]]
 
 
@@ -47,7 +49,7 @@ class SubWorld:
 
     path: Path
     scenario: Path
-    models: tuple[str, ...]
+    models: Names
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,8 +46,8 @@ class PythonSimulator:
         """Raises UserError if there is no such class, or if it makes no object."""
         assert scenario.oracle is not None and scenario.oracle.use is not None
         self._world, self._scenario = world, scenario
-        self._removable = frozenset(world.elements(frozenset(scenario.protected)))
-        self._names = frozenset(model.name for model in world.models)
+        self._removable = frozenset(world.elements(scenario.protected))
+        self._names = frozenset(world.names)
         self._folder = start_folder(scenario).resolve()
         make = load(scenario.oracle.use, self._folder, KEY, METHOD)
         self._name = scenario.oracle.use.partition(":")[2]

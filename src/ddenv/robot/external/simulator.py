@@ -46,10 +46,10 @@ class ExternalSimulator:
         self._world, self._scenario = world, scenario
         self._whole = whole_of(world, scenario)
         self._words = command_words(scenario)
-        self._names = frozenset(model.name for model in world.models)
+        self._names = frozenset(world.names)
         # What a test may take in real time, s.
         self.limit = scenario.simulation.wall_timeout or math.inf
-        self._removable = frozenset(world.elements(frozenset(scenario.protected)))
+        self._removable = frozenset(world.elements(scenario.protected))
 
     def run(
         self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None

@@ -11,7 +11,7 @@ from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.navigation.pursuit import BACK_SPEED, BACK_UP, TURN_LEFT, Follower, room
 from ddenv.robot.navigation.route import Path, Planner
 from ddenv.robot.protocol import STOP, Estimate, Imu, Reading, Setup, Twist
-from ddenv.world.pose import wrap
+from ddenv.world.pose import Point, wrap
 
 NEAR = 1.5  # clearing the costmap keeps what is within this distance of the robot, m
 # After clearing, the lidar gets this time to see obstacles again, s.
@@ -161,7 +161,7 @@ class Navigator:
         # When (s) it looked, planned and found a path last; where, and on which version of the map, it planned.
         self._looked = self._planned = -math.inf
         self._found, self._planned_at, self._planned_on = 0.0, setup.start[:2], -1
-        self._recovered: tuple[float, float] | None = None
+        self._recovered: Point | None = None
         self._speed = 0.0
         self._recovers = self._blocked = self._waits = False
         self.arrived = self.gave_up = False

@@ -10,7 +10,7 @@ from ddenv.arrays import Floats
 from ddenv.robot.navigation.footprint import Footprint, seen_from
 from ddenv.robot.navigation.route import Path
 from ddenv.robot.protocol import STOP, Estimate, Setup, Twist
-from ddenv.world.pose import wrap
+from ddenv.world.pose import Point, wrap
 
 # Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)
@@ -86,7 +86,7 @@ class Follower:
                 return self._drive(path, distance, bearing, free)
         return self._turn(bearing, estimate, points)
 
-    def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
+    def _aim(self, path: Path, estimate: Estimate, part: float) -> Point:
         """The distance (m) and the bearing (rad, from straight ahead) of the point that the robot aims at."""
         share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._fastest, 0.0), 1.0)
         x, y = path.ahead(part * share * self._look_ahead)

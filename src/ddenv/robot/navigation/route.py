@@ -13,8 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from ddenv.arrays import Floats, Integers
 from ddenv.robot.navigation.footprint import Footprint, legs_beside
 from ddenv.robot.protocol import Setup
-
-Place = tuple[float, float]
+from ddenv.world.pose import Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,7 @@ class Path:
     has before its start and after its end. `off` (m) is the robot's distance from the path.
     """
 
-    def __init__(self, corners: list[Place], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
+    def __init__(self, corners: list[Point], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
         self.corners, self.final = corners, final
         self.back, self.on, self.off = back, on, 0.0
         self._legs = []
@@ -49,7 +48,7 @@ class Path:
         self._number, self._along = 0, 0.0
 
     @property
-    def end(self) -> Place:
+    def end(self) -> Point:
         return self.corners[-1]
 
     @property
@@ -68,7 +67,7 @@ class Path:
             if off <= self.off:
                 self.off, self._number, self._along = off, number, along
 
-    def ahead(self, distance: float) -> Place:
+    def ahead(self, distance: float) -> Point:
         """The place `distance` (m) further along it, or its end."""
         number, along = self._number, self._along + distance
         while along > self._legs[number].length and number + 1 < len(self._legs):
@@ -259,7 +258,7 @@ class Planner:
         factors[:, nearest < self._side] = np.inf
         return factors, nearest
 
-    def _cut_short(self, places: Floats, near: Floats, points: Floats) -> list[Place]:
+    def _cut_short(self, places: Floats, near: Floats, points: Floats) -> list[Point]:
         """The corners of a path along `places` (K, 2) m that is as free, but straight wherever it can be.
 
         `near` (K,) m is the distance of the nearest point to each place: no leg comes nearer than what it replaces.

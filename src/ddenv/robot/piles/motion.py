@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.plant import Body
+from ddenv.text import Names
 from ddenv.world.extent import Bounds
 
 NEAR = 0.1  # m; models this near to something that moves are simulated with it
@@ -206,7 +207,7 @@ class Script:
     `resting` (K,) are the models that are at rest after the last row, or have fallen out of the world.
     """
 
-    names: tuple[str, ...]
+    names: Names
     states: Floats
     motions: tuple[Motion, ...]
     paces: tuple[Floats, ...]

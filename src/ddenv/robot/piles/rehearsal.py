@@ -22,6 +22,7 @@ from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.motion import CALM, NEAR, Links, Script, gaps, spread
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.settled import Settled
+from ddenv.text import Names
 from ddenv.world.extent import model_bounds
 from ddenv.world.model import World, still_links
 from ddenv.world.pose import Pose, vector
@@ -39,7 +40,7 @@ class Known:
     None: the simulation broke.
     """
 
-    names: tuple[str, ...]
+    names: Names
     near: frozenset[str]
     present: frozenset[str]
     script: Script | None
@@ -53,7 +54,7 @@ class Repertoire:
 
     def __init__(self, world: World, moving: int) -> None:
         self.moving = moving
-        self._known: dict[tuple[str, ...], list[Known]] = {}
+        self._known: dict[Names, list[Known]] = {}
         self._size = 0
         self._static = {
             model.name: model_bounds(model)
@@ -61,7 +62,7 @@ class Repertoire:
             if any(link.collisions for link in still_links(model))
         }
         # The static models near each pile of the whole world; None while that is unknown.
-        self.usual: dict[tuple[str, ...], frozenset[str]] | None = None
+        self.usual: dict[Names, frozenset[str]] | None = None
 
     @property
     def ties(self) -> dict[str, frozenset[str]]:
@@ -85,14 +86,14 @@ class Repertoire:
         )
         return frozenset(name for known in other for name in (*known.names, *(known.near & present)))
 
-    def find(self, names: tuple[str, ...], present: frozenset[str]) -> Known | None:
+    def find(self, names: Names, present: frozenset[str]) -> Known | None:
         """The script of the pile `names` in a world that keeps the models `present`; None if it has to be rehearsed."""
         for known in self._known.get(names, ()):
             if known.near & present == known.present:
                 return known
         return None
 
-    def add(self, names: tuple[str, ...], present: frozenset[str], script: Script | None, margin: float) -> Known:
+    def add(self, names: Names, present: frozenset[str], script: Script | None, margin: float) -> Known:
         """Stores the script of a pile that can touch what is within `margin` (m) of its links."""
         near = frozenset(self._static)
         if script is not None:
@@ -316,5 +317,5 @@ class Rehearsals:
         return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), sleep.at_rest)
 
 
-def _names(pile: Iterable[Body]) -> tuple[str, ...]:
+def _names(pile: Iterable[Body]) -> Names:
     return tuple(body.name for body in pile)

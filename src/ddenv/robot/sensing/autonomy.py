@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ddenv.robot.clock import Clock, Tick
 from ddenv.robot.controllers import Listener
 from ddenv.robot.protocol import Drives, Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
+from ddenv.text import Data
 from ddenv.world.drive import Drive, footprint
 from ddenv.world.model import Model
 from ddenv.world.pose import wrap
@@ -223,7 +224,7 @@ class Autonomy:
         self._wheels = (0.0,) * len(drive.joints)
         self._imu = Imu(0.0, 0.0, 0.0)
         # What was measured since the last command, by the names of `Reading`.
-        self._new: dict[str, Any] = {}
+        self._new: Data = {}
 
     @property
     def is_over(self) -> bool:

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from ddenv.arrays import Floats, Integers
+from ddenv.text import Names
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, World, still_links
 from ddenv.world.pose import HERE, Pose, Vector, vector
@@ -78,7 +79,7 @@ class Obstacles:
     shape's link in its model, -1 for a shape that never moves. `shapes` on moving links are still in their link's frame.
     """
 
-    names: tuple[str, ...]
+    names: Names
     owners: Integers
     links: Integers
     shapes: Shapes
@@ -113,7 +114,7 @@ class Obstacles:
                 if isinstance(shape, Mesh)
             },
         )
-        names = tuple(model.name for model in world.models)
+        names = world.names
         return cls(names, np.array(owners, dtype=int), np.array(links, dtype=int), arrays)
 
 

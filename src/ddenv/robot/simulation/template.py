@@ -12,7 +12,7 @@ from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import BUILT_IN, Listener, controllers
 from ddenv.robot.drake.plant import build
-from ddenv.robot.drake.region import LeftRegion, Place, Region
+from ddenv.robot.drake.region import LeftRegion, Region
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.sleep import Sleep
@@ -29,6 +29,7 @@ from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
 from ddenv.world.placement import spawn_pose
+from ddenv.world.pose import Point
 from ddenv.world.scenario import Scenario
 from ddenv.world.whole import whole_of
 
@@ -53,7 +54,7 @@ class Template:
         self._robot, self._scenario = robot, scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
-        names = frozenset(model.name for model in world.models)
+        names = frozenset(world.names)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
         fixed = set(scenario.protected)
         self._always = grounds | {model.name for model in world.models if fixed & {model.name, model.inside}}
@@ -83,7 +84,7 @@ class Template:
         smaller._build(self.names - names)
         return smaller
 
-    def wider(self, place: Place, times: int) -> Template:
+    def wider(self, place: Point, times: int) -> Template:
         """A template of the same models with a larger region, see `Region.with_place`."""
         wider = copy(self)
         wider._surround(self._region.with_place(place, times))

@@ -14,6 +14,7 @@ from textual.widgets import Static
 from ddenv.learn.race import Turn
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import PersistentTuple, Round
+from ddenv.text import Names
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap
@@ -65,7 +66,7 @@ class LearnScreen(Screen[ScreenResultType]):
             self.app.exit(0)
 
 
-def snapshot_of(base: Snapshot, left: tuple[str, ...], turn: Turn | None = None) -> Snapshot:
+def snapshot_of(base: Snapshot, left: Names, turn: Turn | None = None) -> Snapshot:
     """The run of `base` as if `left` were its environment, with the parts of `turn`."""
     split = None if turn is None else turn.split
     round = (

@@ -15,7 +15,7 @@ from ddenv.learn.race import Play, Race, plays_of_runs, result, spent
 from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.text import count, plain, shortened, truncated
+from ddenv.text import Names, count, plain, shortened, truncated
 from ddenv.workbench.learn.learn_screen import LearnScreen, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.snapshot import Moments
@@ -67,7 +67,7 @@ class RacerPane(Vertical):
         self._said.update(Text(f"{truncated(what, room)}\n{_bar(play.begins, frozenset(left), there, room)}\n{last}"))
 
 
-def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> str:
+def _bar(models: Names, left: frozenset[str], there: frozenset[str], room: int) -> str:
     """A cell for each model in the world's order; of more models than there is room, by their shares."""
     if len(models) <= room:
         return "".join(GONE if name not in left else IN if name in there else OUT for name in models)

@@ -24,8 +24,8 @@ from ddenv.text import plain, shortened
 from ddenv.workbench.map.map_colors import DULL, FAINT, ORIGINAL, PATH, REMOVED, Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts, kept, looks
-from ddenv.workbench.map.place import MovedPrints, Point, Shown
-from ddenv.world.pose import heading, pose_of
+from ddenv.workbench.map.place import MovedPrints, Shown
+from ddenv.world.pose import Point, Vector, heading, pose_of
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -40,7 +40,7 @@ ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 # A path, m, its colour, and its dash: this number of dots and of gaps in turn, 0 for a whole line.
 _Line = tuple[np.ndarray, int, int]
 # The place and heading of a robot, its colour, and the arrows to draw it with.
-_Robot = tuple[tuple[float, float, float], int, str]
+_Robot = tuple[Vector, int, str]
 
 
 # Lying models are the slow part of a frame: 16 of 19 ms with 3,000 models, and only zooming and panning change it.

@@ -92,7 +92,7 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
     test = state.evidence_test
     if test is None or not 0 < test <= len(state.tests):
         return []
-    return sorted(state.tests[test - 1].first_sensed, key=lambda entry: entry[1])
+    return sorted(state.test(test).first_sensed, key=lambda entry: entry[1])
 
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:

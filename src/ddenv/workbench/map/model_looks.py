@@ -18,6 +18,7 @@ from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.supports import drops
+from ddenv.text import Names
 from ddenv.words.signs import DROPS
 from ddenv.workbench.map.map_colors import (
     FLOOR,
@@ -108,12 +109,12 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 
 
 @lru_cache(maxsize=4)
-def _known(prints: tuple[Footprint, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+def _known(prints: tuple[Footprint, ...]) -> tuple[Names, np.ndarray]:
     areas = np.array([each.area for each in prints])
     return tuple(each.name for each in prints), areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
 
 
-def _signs(names: tuple[str, ...], kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
+def _signs(names: Names, kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
     """A letter for each model of a part, with its number in the order of sensing if that is shown, and whether it drops."""
     several = int(parts.max(initial=-1)) + 2
     groups = kinds * several + parts + 1
@@ -137,7 +138,7 @@ def _signs(names: tuple[str, ...], kinds: np.ndarray, parts: np.ndarray, who: Ke
 
 # The world and what is left of it stay the same while the user looks at one candidate after the other.
 @lru_cache(maxsize=8)
-def _among(names: tuple[str, ...], those: frozenset[str]) -> np.ndarray:
+def _among(names: Names, those: frozenset[str]) -> np.ndarray:
     if not those:
         return np.zeros(len(names), dtype=bool)
     return np.fromiter(map(those.__contains__, names), dtype=bool, count=len(names))

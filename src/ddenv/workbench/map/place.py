@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.world.pose import Point, Vector
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +35,6 @@ LAYERS = {
     "failure": "where the robot ended in f",
     "names": "the models' names, as n does on every map",
 }
-Point = tuple[float, float]
 # Outlines, (N, 2) m, of a model where it may move, each with its verdict, such as "f".
 Limits = tuple[tuple[str, "np.ndarray"], ...]
 # How long to retry a run file that another program has locked, s.
@@ -49,7 +49,7 @@ class Place:
     """
 
     prints: tuple[Footprint, ...] = ()
-    spawn: tuple[float, float, float] | None = None
+    spawn: Vector | None = None
     goal: Point | None = None
     elements: frozenset[str] = frozenset()
     movable: dict[str, Model] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Way:
 
     name: str
     points: np.ndarray
-    robot: tuple[float, float, float] | None = None
+    robot: Vector | None = None
     gone: int = 0
 
 

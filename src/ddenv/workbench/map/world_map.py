@@ -21,8 +21,9 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_words import describe
-from ddenv.workbench.map.place import Limits, Place, Point, Shown, Way
+from ddenv.workbench.map.place import Limits, Place, Shown, Way
 from ddenv.workbench.shared.bindings import keys
+from ddenv.world.pose import Point, Vector
 
 # What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class WorldMap(Widget, can_focus=True):
         self.fit()
         self.refresh()
 
-    def set_marks(self, spawn: tuple[float, float, float] | None, goal: Point | None) -> None:
+    def set_marks(self, spawn: Vector | None, goal: Point | None) -> None:
         self.shown = replace(self.shown, place=replace(self.place, spawn=spawn, goal=goal))
         self._refit()
 

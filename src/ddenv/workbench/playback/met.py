@@ -9,7 +9,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.runfile.state import Test
-from ddenv.text import plain, shortened
+from ddenv.text import Names, plain, shortened
 from ddenv.words.early_stop import WHY, ended_early
 from ddenv.words.signs import OUTCOME
 from ddenv.workbench.playback.timeline import ROBOTS
@@ -46,10 +46,10 @@ class Met(Widget):
         super().__init__(id=id)
         # When, in which test by its sign, and what.
         self._lines: list[tuple[float, str, str]] = []
-        self._lacks: tuple[str, ...] = ()
+        self._lacks: Names = ()
         self._now = 0
 
-    def put(self, tests: tuple[Test, ...], lacks: tuple[str, ...]) -> None:
+    def put(self, tests: tuple[Test, ...], lacks: Names) -> None:
         signs = ROBOTS if len(tests) > 1 else ("",)
         lines = ((at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test))
         self._lines, self._lacks, self._now = sorted(lines, key=itemgetter(0)), lacks, 0

@@ -22,23 +22,22 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import PersistentTuple, Round, RunState, Split, Test, Trial
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.supports import Names
 from ddenv.runfile.tested import purpose
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
-from ddenv.text import count, padded, plain, shortened
+from ddenv.text import Names, count, padded, plain, shortened
 from ddenv.words.signs import outcome
 from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
-from ddenv.workbench.map.place import Limits, MovedPrints, Place, Point, Way, read_world
+from ddenv.workbench.map.place import Limits, MovedPrints, Place, Way, read_world
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.timeline import ROBOTS, Timeline
 from ddenv.workbench.shared.background import refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
-from ddenv.world.pose import pose_at
+from ddenv.world.pose import Point, pose_at
 
 # Simulated seconds in a second.
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)

@@ -12,7 +12,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.text import count, shortened
+from ddenv.text import Names, count, shortened
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
@@ -22,7 +22,7 @@ from ddenv.workbench.shared.bindings import keys
 LISTED, WIDTH = 100, 36
 
 
-class ChooseModels(ModalScreen[tuple[str, ...] | None]):
+class ChooseModels(ModalScreen[Names | None]):
     """Returns the chosen names, None if it was cancelled. Beside the list the map marks the model under the cursor."""
 
     CSS_PATH = "run_dialogs.tcss"
@@ -137,7 +137,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         else:
             self.action_close((self._found[event.option_index],))
 
-    def action_close(self, chosen: tuple[str, ...] | None = None) -> None:
+    def action_close(self, chosen: Names | None = None) -> None:
         self._mark(None)
         self.dismiss(chosen)
 

@@ -35,7 +35,7 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
     start = position.start_of(number)
     if start is None:
         return None
-    state, test = position.end, position.end.tests[number - 1]
+    state, test = position.end, position.end.test(number)
     models, place, took = state.models_of(test), "", ""
     again = f" · re-run {test.run}" if test.phase == "round" and test.run else ""
     if test.end_pose is not None:

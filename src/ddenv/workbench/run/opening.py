@@ -16,7 +16,7 @@ from ddenv.runfile.failures import atlas
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.folder import attach_name, run_path
-from ddenv.text import plain, truncated
+from ddenv.text import Names, plain, truncated
 from ddenv.workbench.help.dialogs import Pick
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.change import Change
@@ -55,7 +55,7 @@ class Opening:
         title: str,
         names: Sequence[str],
         several: bool,
-        then: Callable[[tuple[str, ...]], None],
+        then: Callable[[Names], None],
         chosen: Sequence[str] = (),
     ) -> None:
         if not names:
@@ -247,12 +247,12 @@ def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tup
         own = [item] if isinstance(item, Test) else state.tests_of(item.tests if item else ())
     tests = [test for test in own if test.is_finished or not finished]
     if isinstance(item, FreshRuns) and item.without is not None:
-        left = {test.run: test for test in _fresh(state, item.node, None) if test.outcome == "similar"}
-        pairs = ((left[test.run], test) for test in tests if test.run in left and test.outcome != "similar")
+        left = {test.run: test for test in _fresh(state, item.node, None) if test.shows_f}
+        pairs = ((left[test.run], test) for test in tests if test.run in left and not test.shows_f)
         for partner, test in pairs:
             if test.is_finished:
                 return partner.id, test.id
-    similar = [test for test in tests if test.outcome == "similar"]
+    similar = [test for test in tests if test.shows_f]
     if similar or tests:
         return (similar or tests)[-1].id, None
     last = (test.id for test in reversed(state.tests) if test.is_finished or not finished)

@@ -22,7 +22,7 @@ from ddenv.runfile.position import Step
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.tested import Wanted
-from ddenv.text import plain
+from ddenv.text import Names, plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
@@ -278,7 +278,7 @@ class RunScreen(Screen[None]):
             self.opening.change()
         elif name in TITLES:
 
-            def chosen(models: tuple[str, ...]) -> None:
+            def chosen(models: Names) -> None:
                 now = offer(name, self.asking.situation, Pointed(models=models))
                 self.asking.refuse(now.why_not) if now.command is None else self.asking.ask(now.command)
 
@@ -302,7 +302,7 @@ class RunScreen(Screen[None]):
             offered = offer(name, now, pointed)
             self._footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
-    def _keys_here(self) -> tuple[str, ...]:
+    def _keys_here(self) -> Names:
         if self.browsing.is_past:
             return BROWSING
         if self.snapshot.state.status == "finished" and not self.poll.watch:

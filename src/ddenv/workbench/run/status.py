@@ -13,7 +13,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState
 from ddenv.runs.tests_left import left_said, remaining
-from ddenv.text import count, duration, percent, plain, shortened, truncated
+from ddenv.text import Sentences, count, duration, percent, plain, shortened, truncated
 from ddenv.words.claims import drift, ended
 from ddenv.words.methods import GROUPS, labels
 from ddenv.words.signs import STATUS
@@ -32,7 +32,7 @@ STEP = 5
 
 
 # What the status line says, by name, from the longest form to the shortest.
-Facts = dict[str, tuple[str, ...]]
+Facts = dict[str, Sentences]
 
 
 class Header(Widget):
@@ -40,7 +40,7 @@ class Header(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._heading: tuple[tuple[str, ...], tuple[str, ...]] = ("",), ("",)
+        self._heading: tuple[Sentences, Sentences] = ("",), ("",)
 
     def show(self, snapshot: Snapshot) -> None:
         now = heading(snapshot.state)
@@ -101,7 +101,7 @@ class Status(Widget):
         return Style(dim=name in ("time", "left", "mode", "cut"))
 
 
-def heading(state: RunState) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def heading(state: RunState) -> tuple[Sentences, Sentences]:
     options = settings(state)
     lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
     total, kept = len(state.elements), len(state.environment)
@@ -143,7 +143,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
     elif status == "lost":
         way_on = ": r resumes"
     elif state.needs_room and not state.ended:
-        sign, word = "!", "out of disk space"
+        sign, word = "!", "file too large" if state.file_is_full else "out of disk space"
     return {
         "state": (f"{sign} {word}{way_on}", f"{sign} {word}"),
         "asked": (f"… {asked}", "…") if asked else (),
@@ -179,7 +179,7 @@ def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
     return [(name, each[0]) for name, each in forms.items() if each[0]]
 
 
-def tests_said(state: RunState) -> tuple[str, ...]:
+def tests_said(state: RunState) -> Sentences:
     counts = state.outcomes()
     total = state.tests_done
     said = count(total, "test") if state.budget is None else f"{state.made} of {count(state.budget, 'test')}"
@@ -190,7 +190,7 @@ def tests_said(state: RunState) -> tuple[str, ...]:
     return (f"{said}: {parts}" if parts else said, said, "")
 
 
-def drift_said(state: RunState) -> tuple[str, ...]:
+def drift_said(state: RunState) -> Sentences:
     """How often f shows here, beside the whole world; marked where it has dropped, with the key that goes back."""
     forms = drift(state)
     if has_dropped(state):
@@ -198,7 +198,7 @@ def drift_said(state: RunState) -> tuple[str, ...]:
     return (*forms, "") if forms else ()
 
 
-def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
+def engine_said(snapshot: Snapshot) -> Sentences:
     """Whether the engine works, and whether it is of another version than this program."""
     state = snapshot.state
     if snapshot.engine == "starting":

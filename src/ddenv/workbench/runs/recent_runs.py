@@ -3,70 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.words.signs import STATUS
+from ddenv.runs.recent import ENDED, Recent, recent_of
 
 # The maximum number of runs in the list of the setup screen.
 SHOWN = 40
 # What SQLite says about a file that another program has locked.
 LOCKED = "database is locked"
-# The states in which no engine is expected.
-ENDED = ("created", "finished", "stopped", "failed")
-
-
-@dataclass(frozen=True, slots=True)
-class Recent:
-    """One run. `status` is the state's, "lost" if its engine has died, or "" if it is not read yet.
-
-    `changed` is Unix time, s. `computed` is the time that its own simulations took, s. `chosen`
-    is its scenario as it is now. `trouble` says why it cannot be opened.
-    """
-
-    path: Path
-    changed: float
-    status: str = ""
-    scenario: str = ""
-    algorithm: str = ""
-    pair: str = ""
-    total: int = 0
-    kept: tuple[str, ...] = ()
-    tests: int = 0
-    decisions: int = 0
-    minimal: bool = False
-    reason: str = ""
-    trouble: str = ""
-    computed: float = 0.0
-    chosen: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
-
-    @property
-    def sign(self) -> str:
-        return "✗" if self.trouble else STATUS.get(self.status, ("·", ""))[0]
-
-    @property
-    def state_words(self) -> str:
-        if self.trouble:
-            return "cannot be read"
-        if self.status == "finished":
-            return "minimal" if self.minimal else "finished"
-        return STATUS.get(self.status, ("", self.status or "..."))[1]
-
-    @property
-    def brief(self) -> str:
-        """How many models are left, for a list in which its sign is its state."""
-        return f"{len(self.kept)}/{self.total}" if self.total else ""
-
-    @property
-    def is_worked_on(self) -> bool:
-        return bool(self.status) and self.status not in (*ENDED, "lost")
 
 
 @dataclass(slots=True)
@@ -139,26 +88,4 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
     except UserError as error:
         locked = isinstance(error, Busy) or LOCKED in str(error)
         return _Read(() if locked else stamp, Recent(path, age, trouble=str(error)))
-    options = settings(state)
-    recent = Recent(
-        path,
-        state.updated_at or age,
-        status=state.status,
-        scenario=options.name,
-        algorithm=options.algorithm,
-        pair=options.pair,
-        total=len(state.elements),
-        kept=state.environment,
-        tests=state.tests_done,
-        decisions=len(state.decisions),
-        minimal=state.minimal,
-        reason=state.reason,
-        computed=computed(state),
-        chosen=state.scenario,
-    )
-    return _Read(stamp, recent, None if state.ended else state)
-
-
-def computed(state: RunState) -> float:
-    """How long the simulations of a run took, s; results that were copied or implied cost nothing."""
-    return sum(test.wall_seconds for test in state.tests if not test.taken and test.implied_by is None)
+    return _Read(stamp, recent_of(path, state, age), None if state.ended else state)

@@ -19,13 +19,15 @@ from textual.widgets import DataTable, Input, Static
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import LOGS
+from ddenv.runs.comparison import compared
 from ddenv.runs.folder import SUFFIX, dropped_run, find_run, runs_folder
+from ddenv.runs.recent import Recent
 from ddenv.text import count, plain, shortened
 from ddenv.workbench.help.dialogs import SideBySide
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.runs.recent_runs import Recent, RunsFolder
-from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, compared
+from ddenv.workbench.runs.recent_runs import RunsFolder
+from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
 from ddenv.workbench.shared.background import call_if_open, is_open, refuse
 from ddenv.workbench.shared.bindings import HELP, ids, keys
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup

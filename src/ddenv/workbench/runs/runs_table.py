@@ -1,11 +1,10 @@
-"""The list of recent runs, the table of all runs with as many columns as fit, and what is said of one run and of two."""
+"""The list of recent runs, the table of all runs with as many columns as fit, and what is said of one run."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from datetime import datetime
-from pathlib import PurePath
 from typing import Any, ClassVar
 
 from rich.text import Text
@@ -14,20 +13,16 @@ from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.runs.folder import runs_folder
-from ddenv.text import count, first_of, plain, shortened, truncated
+from ddenv.runs.recent import Recent
+from ddenv.text import count, first_of, plain, shortened
 from ddenv.words.signs import brief
-from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
+from ddenv.workbench.runs.recent_runs import SHOWN, RunsFolder
 from ddenv.workbench.shared import poll
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import keys
 
-# The maximum number of models to name, of one run and of two side by side, and the width of a value there.
-MOST_NAMES, MOST_COMPARED, LONGEST = 40, 20, 60
-NONE = "none"
-# What the screen shows elsewhere, or what every run has its own of.
-ASIDE = ("name", "description", "folder")
-# Files are the same if their names are: a run holds its own copy, and its machine has other folders.
-FILES = ("world", "model")
+# The maximum number of models to name.
+MOST_NAMES = 40
 
 
 class RunList(OptionList):
@@ -70,52 +65,6 @@ def about(run: Recent) -> Text:
     text.append(f"\n{brief(run.computed)} of simulations, {count(run.decisions, 'decision')} by hand", "not bold")
     left = first_of([plain(name) for name in run.kept], MOST_NAMES)
     return text.append(f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim")
-
-
-_FACTS: dict[str, Callable[[Recent], str]] = {
-    "state": lambda run: f"{run.sign} {run.state_words}",
-    "scenario": lambda run: plain(run.scenario),
-    "algorithm": lambda run: run.algorithm,
-    "pair": lambda run: run.pair,
-    "tests": lambda run: str(run.tests),
-    "computing": lambda run: brief(run.computed),
-    "decisions": lambda run: f"{run.decisions} by hand",
-    "models left": lambda run: f"{len(run.kept)} of {count(run.total, 'model')}",
-}
-
-
-def compared(first: Recent, second: Recent) -> Iterator[tuple[str, str, str]]:
-    """Two runs side by side: (name, value in the first, value in the second)."""
-    yield "run", plain(first.path.stem), plain(second.path.stem)
-    for name, say in _FACTS.items():
-        yield name, say(first), say(second)
-    both = _names(first, second, True)
-    yield "in both", both, both
-    yield "only in this one", _names(first, second, False), _names(second, first, False)
-    yield from differences(first.chosen, second.chosen)
-
-
-def differences(first: Mapping[str, Any], second: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str, str]]:
-    """The settings in which two scenarios differ, by their paths such as `reduction.iterations`."""
-    for key in dict.fromkeys((*first, *second)):
-        one, other = first.get(key), second.get(key)
-        if key in FILES:
-            one, other = (PurePath(each).name if isinstance(each, str) else each for each in (one, other))
-        if one == other or (not above and key in ASIDE):
-            continue
-        if isinstance(one, Mapping) and isinstance(other, Mapping):
-            yield from differences(one, other, f"{above}{key}.")
-        else:
-            yield f"{above}{plain(key)}", _value(one), _value(other)
-
-
-def _value(value: Any) -> str:
-    return NONE if value is None else truncated(plain(value), LONGEST)
-
-
-def _names(run: Recent, other: Recent, both: bool) -> str:
-    names = [plain(name) for name in run.kept if (name in other.kept) == both]
-    return f"{len(names)}: {first_of(names, MOST_COMPARED)}" if names else NONE
 
 
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.

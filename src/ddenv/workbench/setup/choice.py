@@ -91,7 +91,7 @@ class Choice:
 
     @property
     def models(self) -> int:
-        return len(self.world.elements(frozenset(self.settings.protected)))
+        return len(self.world.elements(self.settings.protected))
 
     @property
     def about(self) -> str:

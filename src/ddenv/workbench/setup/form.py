@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ddenv.errors import UserError
 from ddenv.settings import FARTHEST, JOBS, OPTIONS, SETTINGS, TURNS, Setting, Value, read
+from ddenv.text import Names
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -53,7 +54,7 @@ def in_words(wrong: Mapping[str, str]) -> str:
     return "; ".join(f"{', '.join(fields)}: {why}" for why, fields in labels.items())
 
 
-def choices(one: Setting) -> tuple[str, ...]:
+def choices(one: Setting) -> Names:
     return (OFF, ON) if one.kind is bool else one.choices
 
 

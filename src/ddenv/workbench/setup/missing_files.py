@@ -24,7 +24,7 @@ from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.runs.remedies import remedy, remembered, with_remedies
-from ddenv.text import count, plain
+from ddenv.text import Data, count, plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.files import complaints
 from ddenv.workbench.shared.bindings import keys
@@ -58,7 +58,7 @@ class Missing:
 
 def read_with_remedies(
     path: Path, reading: Reading, options: Mapping[str, Any]
-) -> tuple[World, dict[str, Any], tuple[Missing, ...]]:
+) -> tuple[World, Data, tuple[Missing, ...]]:
     """The world, with remembered remedies for what is missing, and a guess for all else; the `options` with these remedies.
 
     `reading` is the scenario's own, `options` are as on the command line. Raises UserError.

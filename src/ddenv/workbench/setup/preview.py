@@ -23,7 +23,7 @@ from ddenv.runs.folder import free_run_path, runs_folder
 from ddenv.runs.remedies import remember_remedies
 from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.map.place import Place, Point, place_of
+from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice, read_choice
@@ -32,6 +32,7 @@ from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.missing_files import MissingList
 from ddenv.workbench.setup.start_run import Past, past_of
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.world.pose import Point
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
 REMEDIES = {

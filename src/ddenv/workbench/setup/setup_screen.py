@@ -18,7 +18,7 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
-from ddenv.text import count, plain
+from ddenv.text import Names, count, plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
@@ -329,7 +329,7 @@ class SetupScreen(Screen[None]):
         panes.display = not all
         panes.mark(pane)
 
-    def _keys_here(self) -> tuple[str, ...]:
+    def _keys_here(self) -> Names:
         """The ids of the keys in the footer: those of what has the focus come first."""
         bindings = () if self.focused is None else Binding.make_bindings(self.focused.BINDINGS)
         return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *FIRST)

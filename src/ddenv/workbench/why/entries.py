@@ -13,12 +13,11 @@ from ddenv.runfile.progress import Claim
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.supports import Names
 from ddenv.runs.changes import changes
 from ddenv.runs.folder import attach_name
 from ddenv.runs.reasons import Parting, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.runs.subject import read_parts
-from ddenv.text import as_sentence, padded, percent, plain, shortened, told_apart
+from ddenv.text import Names, Sentences, as_sentence, padded, percent, plain, shortened, told_apart
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
 from ddenv.words.signs import CLAIM
@@ -44,7 +43,7 @@ class Entry:
     letter: str
     gone: Names
     sentence: str
-    more: tuple[str, ...]
+    more: Sentences
     parting: Parting | None
     ways: tuple[str, str]
     snapshot: Snapshot

@@ -12,9 +12,9 @@ import os
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
+from ddenv.text import Data
 from ddenv.world.access import Unusable, read
 from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, parts_of
 
@@ -65,7 +65,7 @@ def _buffer(uri: str, folder: Path, limit: int) -> bytes:
         raise Unusable(f"buffer '{uri[:60]}': {error}") from None
 
 
-def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
+def _shape(header: Data, limit: int) -> Data:
     """The header reduced to triangles and their transforms; a node's name is its number. Raises ValueError."""
     if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
         raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
@@ -105,7 +105,7 @@ def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
     }
 
 
-def _primitives(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def _primitives(mesh: Data, accessors: list[Data]) -> Iterator[Data]:
     """The triangle primitives of a mesh, without normals, colours and materials. Raises ValueError."""
     for primitive in mesh["primitives"]:
         mode, position = primitive.get("mode", _TRIANGLES), primitive["attributes"].get("POSITION")
@@ -122,7 +122,7 @@ def _primitives(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterat
         yield {"mode": mode, "attributes": {"POSITION": position}, **indices}
 
 
-def _size(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
+def _size(primitive: Data, accessors: list[Data]) -> int:
     """The larger of its number of vertices and its maximum number of triangles."""
     corners: int = accessors[primitive["indices"]]["count"] if "indices" in primitive else 0
     faces = corners // 3 if primitive["mode"] == _TRIANGLES else corners
@@ -130,7 +130,7 @@ def _size(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
     return max(vertices, faces)
 
 
-def _roots(header: dict[str, Any]) -> list[int]:
+def _roots(header: Data) -> list[int]:
     """The root nodes of the scene. Raises ValueError unless the nodes form trees."""
     nodes = header["nodes"]
     roots: list[int] = header["scenes"][header.get("scene", 0)]["nodes"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddenv.text import Names
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
 from ddenv.world.files.meshes import convex_hull as hull
@@ -155,7 +156,7 @@ def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:
     return Placed(_scaled(stand_in.shape, scale, element), Pose(_times(stand_in.offset.position, scale)))
 
 
-def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
+def remedies(lost: Lost, siblings: Names) -> str:
     """The error for a missing collision mesh, with all remedies; `siblings` are the kinds of other shapes in its link."""
     # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its meshes.
     package = "/".join(lost.uri.split("/")[:3]) if lost.uri.startswith(("model://", "package://")) else lost.uri

@@ -101,7 +101,7 @@ def _possible(moments: Vector, products: Vector) -> Vector | None:
     return moments if low > LEAST_MOMENT and high <= low + middle else None
 
 
-def _principal(moments: Vector, products: Vector) -> tuple[float, float, float]:
+def _principal(moments: Vector, products: Vector) -> Vector:
     """The principal moments in ascending order; NaN for unusable numbers."""
     xx, yy, zz = moments
     xy, xz, yz = products

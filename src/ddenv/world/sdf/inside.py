@@ -29,7 +29,7 @@ def opened(world: World, root: Element) -> World:
     at = {element.start: element for element in root.iter() if element.tag in ("model", "include")}
     models: list[Model] = []
     shared, notes = list(world.shared), list(world.notes)
-    taken = {model.name for model in world.models}
+    taken = set(world.names)
     for model in world.models:
         element = at[model.spans[0][0]]
         if len(model.collisions) < 2 or is_ground(model):

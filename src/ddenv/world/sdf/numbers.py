@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.text import Names
 from ddenv.world.access import is_directives
 from ddenv.world.extent import bounds
 from ddenv.world.files.resources import Resources
@@ -65,7 +66,7 @@ SIZES = ("radius", "length", "size_x", "size_y", "size_z")
 OF_MODELS = {"friction": _up_to("", 0.002, 1.0), "x": _PLACE, "y": _PLACE, **dict.fromkeys(SIZES, _SIZE)}
 OF_MODELS |= {"yaw": _ANGLE, "z": _HEIGHT, "mass": _times("kg", 0.1, 10.0)}
 # Those of a scenario, with the keys under which it has them.
-OF_SCENARIO: dict[str, tuple[Kind, tuple[str, ...]]] = {
+OF_SCENARIO: dict[str, tuple[Kind, Names]] = {
     "controller.speed": (_times("m/s", 0.1, 3.0), ("controller", "speed")),
     "spawn.y": (_PLACE, ("robot", "spawn", "y")),
     "spawn.yaw": (_ANGLE, ("robot", "spawn", "yaw")),
@@ -190,7 +191,7 @@ def part_of(
 
     A simulator of the user's own leaves models out of the world's text itself. Raises NotPossible.
     """
-    gone, whole = set(world.elements(frozenset(scenario.protected))) - kept, whole_of(world, scenario)
+    gone, whole = set(world.elements(scenario.protected)) - kept, whole_of(world, scenario)
     scenario, world = changed(scenario, world, changes)
     if scenario.oracle is None:
         world = replace(world, models=tuple(model for model in world.models if model.name not in gone))
