@@ -61,17 +61,15 @@ class _Checker:
             yield "an inertia that no body has", element
         known = known_children().get(element.tag, {}) if is_known else {}
         for child in element:
-            # Nothing that belongs to a plugin or to an extension is looked at.
-            if child.tag == "plugin" or ":" in child.tag:
-                continue
             if child.tag in known and (why := fault(child, known[child.tag])):
                 yield why, child
             if child.tag == "frame" and element.tag in ("world", "model"):
                 yield from self._frame(child, element)
             if child.tag == "include":
                 yield from self._included_file(child)
-                continue
-            yield from self._inside(child, no_colons, is_known=child.tag in known)
+            # Nothing that belongs to a plugin or to an extension is looked at.
+            elif child.tag != "plugin" and ":" not in child.tag:
+                yield from self._inside(child, no_colons, is_known=child.tag in known)
 
     def _names(self, element: Element, no_colons: bool) -> Iterator[Refusal]:
         names: set[str] = set()
