@@ -11,7 +11,7 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.world.access import Missing, Unusable, is_directives
-from ddenv.world.files.resources import FOLDER, Resources
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import World
 from ddenv.world.sdf.context import sdf_root, version
 from ddenv.world.sdf.known_elements import fault, known_children
@@ -38,21 +38,27 @@ def refused(world: World) -> list[tuple[str, str]]:
     if is_directives(world.path):
         return []
     checker = _Checker(Resources(world.resources))
-    return [(why, place(at)) for why, at in checker.check_file(sdf_root(world.text, world.path))]
+    return [(why, place(at)) for why, at in checker.check(sdf_root(world.text, world.path))]
 
 
 @dataclass
 class _Checker:
-    """Each included file is checked once. `names` has what a world or model holds by name: a model, or None for anything else."""
+    """Reads included files, each once. `names` has what a world or model holds by name: a model, or None for anything else."""
 
     resources: Resources
     files: dict[Path, Element] = field(default_factory=dict)
-    checked: set[Path] = field(default_factory=set)
     names: dict[Element, dict[str, Element | None]] = field(default_factory=dict)
 
-    def check_file(self, root: Element) -> Iterator[Refusal]:
-        self.checked.add(root.source)
-        yield from self._inside(root, version(root) >= (1, 8), is_known=True)
+    def check(self, root: Element) -> Iterator[Refusal]:
+        """What is refused in a file, and in all that it includes."""
+        pending = {root.source: root}
+        checked: set[Path] = set()
+        while pending:
+            source, root = pending.popitem()
+            checked.add(source)
+            yield from self._inside(root, version(root) >= (1, 8), is_known=True)
+            included = filter(None, map(self._root_of, root.iter("include")))
+            pending |= {each.source: each for each in included if each.tag == "sdf" and each.source not in checked}
 
     def _inside(self, element: Element, no_colons: bool, *, is_known: bool) -> Iterator[Refusal]:
         """What is refused below `element`. Nothing is known of what an element holds that is not `is_known` itself."""
@@ -65,10 +71,8 @@ class _Checker:
                 yield why, child
             if child.tag == "frame" and element.tag in ("world", "model"):
                 yield from self._frame(child, element)
-            if child.tag == "include":
-                yield from self._included_file(child)
-            # Nothing that belongs to a plugin or to an extension is looked at.
-            elif child.tag != "plugin" and ":" not in child.tag:
+            # Nothing that belongs to a plugin or to an extension is looked at, and of an include what it opens.
+            if child.tag not in ("plugin", "include") and ":" not in child.tag:
                 yield from self._inside(child, no_colons, is_known=child.tag in known)
 
     def _names(self, element: Element, no_colons: bool) -> Iterator[Refusal]:
@@ -125,11 +129,6 @@ class _Checker:
         model = None if own else self._model_of(element)
         return own or (None if model is None else model.get("name"))
 
-    def _included_file(self, include: Element) -> Iterator[Refusal]:
-        root = self._root_of(include)
-        if root is not None and root.tag == "sdf" and root.source not in self.checked and root.source.parent != FOLDER:
-            yield from self.check_file(root)
-
     def _model_of(self, include: Element) -> Element | None:
         """What `include` includes; None if that was not read."""
         root = self._root_of(include)
@@ -138,6 +137,7 @@ class _Checker:
         return next((child for child in root if child.tag in INCLUDABLE), None)
 
     def _root_of(self, include: Element) -> Element | None:
+        """The root of the file that `include` names; None if it was not read."""
         try:
             path, text = self.resources.sdf(text_of(include.find("uri")), include.source.parent)
             if path not in self.files:
