@@ -19,7 +19,7 @@ WORLD = b"""<sdf version='1.6'><world name='hall'>
 <surface><friction><ode><mu>1</mu><mu2>0.5</mu2></ode></friction></surface></collision></link></model>
 <model name='crate'><static>1</static><link name='l'/></model>
 <plugin name='p' filename='f'/>
-<state><model name='crate'><pose>4 2 3 0 0 0</pose></model></state>
+<state world_name='hall'><model name='crate'><pose>4 2 3 0 0 0</pose></model></state>
 </world></sdf>"""
 
 
